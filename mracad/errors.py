@@ -1,0 +1,61 @@
+"""The one root error: what went wrong, which exit code it means, and what to do about it."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+
+class Code(IntEnum):
+    """Exit codes of the command line (``docs/design.md``)."""
+
+    FAILED_CHECK = 1
+    USAGE = 2
+    FILE = 3
+    CANNOT_EDIT = 4
+    LIMIT = 5
+    INTERNAL = 70
+    INTERRUPTED = 130
+
+
+class MracadError(Exception):
+    """A failure that the user can act on.
+
+    Parameters
+    ----------
+    message : str
+        One line: what is wrong, and where.
+    hint : str
+        One line: what to do about it.
+    code : Code
+        The exit code of the command line.
+    """
+
+    def __init__(self, message: str, hint: str = "", code: Code = Code.INTERNAL) -> None:
+        super().__init__(message)
+        self.message = message
+        self.hint = hint
+        self.code = code
+
+    def __str__(self) -> str:
+        return f"{self.message}; {self.hint}" if self.hint else self.message
+
+
+class UsageError(MracadError, ValueError):
+    """A malformed value, an unknown option, face or step."""
+
+    def __init__(self, message: str, hint: str = "") -> None:
+        super().__init__(message, hint, Code.USAGE)
+
+
+class FileError(MracadError, OSError):
+    """An input or output that is missing, unreadable, unwritable or unsupported."""
+
+    def __init__(self, message: str, hint: str = "") -> None:
+        super().__init__(message, hint, Code.FILE)
+
+
+class EditError(MracadError):
+    """An edit that cannot be done as asked on this model."""
+
+    def __init__(self, message: str, hint: str = "") -> None:
+        super().__init__(message, hint, Code.CANNOT_EDIT)

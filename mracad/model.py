@@ -1,0 +1,226 @@
+"""The kernel-free snapshot of a CAD document: surfaces, faces, edges; and what an edit does to it.
+
+Lengths are millimetres.  Every array is float64 and must be treated as read-only.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from mracad.bspline.net import Curve, Net
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """One NURBS surface of the document; several faces may lie on it.
+
+    Attributes
+    ----------
+    index : int
+        Position in ``Model.surfaces``.
+    net : Net
+        Its control net in the surface's own frame (see ``Face.frame``), mm.
+    faces : tuple of int
+        Indices of the faces that lie on it.
+    origin : str
+        ``"bspline"``, ``"bezier"``, or the analytic kind it would be converted from (``"extrusion"``, …).
+    """
+
+    index: int
+    net: Net
+    faces: tuple[int, ...]
+    origin: str = "bspline"
+
+
+@dataclass(frozen=True, eq=False)
+class Trim:
+    """One use of an edge by a face: the edge's curve in the parameter plane of the face's surface.
+
+    Attributes
+    ----------
+    edge : int
+        Index in ``Model.edges``.
+    curve : Curve
+        The pcurve as a 2D NURBS curve over the edge's own parameter range (poles ``(n, 2)`` in ``u, v``).
+    """
+
+    edge: int
+    curve: Curve
+
+
+@dataclass(frozen=True, eq=False)
+class Face:
+    """One face of one part.  A part that is instanced counts once (``instances`` says how often it stands).
+
+    Attributes
+    ----------
+    index : int
+        Position in ``Model.faces``, from 0; users write ``#1`` for the first.
+    name, product : str
+        Names from the document, or ``""``.
+    colour : str
+        ``"#rrggbb"`` or ``""``.
+    kind : str
+        ``"bspline"``, ``"bezier"``, ``"plane"``, ``"cylinder"``, ``"cone"``, ``"sphere"``, ``"torus"``,
+        ``"extrusion"``, ``"revolution"``, ``"offset"``, ``"other"``.
+    surface : int or None
+        Index in ``Model.surfaces`` of a NURBS face; None for a face that stays as it is.
+    trims : tuple of Trim
+        The boundary, one entry per use of an edge (two for a closing edge); empty unless ``surface`` is set.
+    reversed : bool
+        Whether the face's outward normal is opposite to S_u × S_v.
+    frame : ndarray (4, 4)
+        Rigid map from the surface's frame to the part's.
+    box : ndarray (2, 3)
+        Lowest and highest corner in the part's frame, mm.
+    instances : int
+        How often the part stands in the document.
+    """
+
+    index: int
+    kind: str
+    surface: int | None
+    trims: tuple[Trim, ...]
+    reversed: bool
+    frame: Array
+    box: Array
+    name: str = ""
+    product: str = ""
+    colour: str = ""
+    instances: int = 1
+
+
+@dataclass(frozen=True, eq=False)
+class Side:
+    """One face's view of an edge, at the edge's sample parameters (see ``Edge.points``).
+
+    A NURBS side has ``uv`` and is evaluated on its surface, so that it follows an edit; any other side does not
+    move and carries its points, normals and curvature as measured by the kernel.
+
+    Attributes
+    ----------
+    face : int
+        Index in ``Model.faces``.
+    uv : ndarray (k, 2) or None
+        Parameters on the face's surface.
+    points, normals : ndarray (k, 3) or None
+        Points (mm) and outward unit normals in the part's frame.
+    """
+
+    face: int
+    uv: Array | None = None
+    points: Array | None = None
+    normals: Array | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Edge:
+    """An edge of a part.
+
+    Attributes
+    ----------
+    index : int
+        Position in ``Model.edges``, from 0; users write ``edge#1`` for the first.
+    points, tangents : ndarray (k, 3)
+        Samples of its 3D curve in the part's frame (mm) and unit tangents there; empty when degenerate.
+    sides : tuple of Side
+        One per use by a face: one for a free edge, two for a seam, two of the same face for a closing edge.
+    tolerance : float
+        The edge's tolerance, mm.
+    degenerate : bool
+        A pole: the edge is a point in space.
+    part : int
+        Which part (shape definition) it belongs to; frames of different parts are unrelated.
+    """
+
+    index: int
+    points: Array
+    tangents: Array
+    sides: tuple[Side, ...]
+    tolerance: float
+    degenerate: bool = False
+    part: int = 0
+
+    @property
+    def free(self) -> bool:
+        return len(self.sides) == 1 and not self.degenerate
+
+    @property
+    def closing(self) -> bool:
+        return len(self.sides) == 2 and self.sides[0].face == self.sides[1].face
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """A document as faces on surfaces, joined by edges.
+
+    Attributes
+    ----------
+    name : str
+        File name without folder.
+    surfaces, faces, edges
+        The parts' geometry.
+    diagonal : float
+        Diagonal of the bounding box of the whole document, instances placed, mm.
+    unit : str
+        The file's length unit (``"mm"``, ``"m"``, ``"in"``, …).
+    schema : str
+        STEP schema (``"AP203"``, ``"AP214"``, ``"AP242"``).
+    products : tuple of str
+    """
+
+    name: str
+    surfaces: tuple[Surface, ...]
+    faces: tuple[Face, ...]
+    edges: tuple[Edge, ...]
+    diagonal: float
+    unit: str = "mm"
+    schema: str = ""
+    products: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Offset:
+    """Pole offsets of one surface, in its own spline space or an exact refinement of it.
+
+    Attributes
+    ----------
+    u_knots, v_knots : ndarray
+        Knots to insert first (with repetition), beyond those the surface has; empty for none.
+    poles : ndarray (nu, nv, 3)
+        Offsets of the Euclidean control points of the (refined) net, mm; weights are kept.
+        Rows that are exactly zero are left bit-identical.
+    """
+
+    poles: Array
+    u_knots: Array = field(default_factory=lambda: np.empty(0))
+    v_knots: Array = field(default_factory=lambda: np.empty(0))
+
+
+@dataclass(frozen=True, eq=False)
+class Displacement:
+    """What an edit does: pole offsets by surface index.  Surfaces that are not named do not move."""
+
+    offsets: dict[int, Offset] = field(default_factory=dict)
+
+    def scaled(self, factor: float) -> Displacement:
+        """The same displacement times ``factor``."""
+        return Displacement({i: Offset(factor * o.poles, o.u_knots, o.v_knots) for i, o in self.offsets.items()})
+
+    def applied(self, model: Model) -> Model:
+        """The model with its surfaces displaced (baked sides stay where they are)."""
+        surfaces = list(model.surfaces)
+        for index, offset in self.offsets.items():
+            old = surfaces[index]
+            net = old.net.refined(offset.u_knots, offset.v_knots)
+            surfaces[index] = Surface(
+                index, Net(net.u, net.v, net.poles + offset.poles, net.weights), old.faces, old.origin
+            )
+        return Model(
+            model.name, tuple(surfaces), model.faces, model.edges, model.diagonal, model.unit, model.schema,
+            model.products,
+        )
