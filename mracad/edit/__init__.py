@@ -1,0 +1,1 @@
+"""The edits: each maps a model and its options to a displacement."""

@@ -1,0 +1,145 @@
+"""Separation: which control points of a surface an edit must leave, so that every joint stays as it is.
+
+METHOD (S. the paper's wavelet signal separation): S' = S + δ.  Along an edge that is an isoparametric curve u = c
+of the surface, δ and its cross derivatives up to order k vanish when the coefficients of all basis functions with
+a non-zero derivative of order ≤ k at c do: the outer k + 1 rows where c is a clamped end.  Along any other edge
+the coefficients of all functions whose open support meets the curve are left, so that δ vanishes there with all
+its derivatives; edges, vertices and pcurves stay exactly valid.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mracad.bspline.basis import basis
+from mracad.bspline.knots import KnotVector
+from mracad.bspline.net import Curve, Net
+from mracad.constraint.region import crossed_cells, face_region, supported
+from mracad.model import Face
+
+Array = np.ndarray
+
+CONTINUITY = {"g0": 0, "g1": 1, "g2": 2}
+"""Cross derivatives kept by ``--keep``."""
+
+ISO = 1e-7
+"""Deviation, as a fraction of the local span, within which a pcurve counts as isoparametric: δ's gradient on it is
+then below 1e-6 of δ per span, 1e-4° for a δ of a sixth of the span."""
+
+
+@dataclass(frozen=True, eq=False)
+class Separation:
+    """Control points of one surface by what they may do.
+
+    Attributes
+    ----------
+    visible : ndarray of bool (nu, nv)
+        Some part of an edited face depends on the point.
+    frozen : ndarray of bool (nu, nv)
+        The point must stay for the sake of an edge or of a face that is not edited.
+    """
+
+    visible: Array
+    frozen: Array
+
+    @property
+    def free(self) -> Array:
+        """Points that an edit may move: visible and not frozen."""
+        return self.visible & ~self.frozen
+
+
+def separate(net: Net, faces: Sequence[Face], edited: Collection[int], keep: str = "g1") -> Separation:
+    """Separate the control points of a surface.
+
+    Parameters
+    ----------
+    net : Net
+        The surface (refined or not).
+    faces : sequence of Face
+        All faces that lie on it.
+    edited : collection of int
+        Indices of those that may move; the others' whole region is frozen.
+    keep : {"g0", "g1", "g2"}
+        Which continuity each edge keeps with whatever lies beyond it.
+    """
+    visible = np.zeros(net.poles.shape[:2], bool)
+    frozen = np.zeros_like(visible)
+    for face in faces:
+        reach = supported(net, face_region(net, face).inside)
+        if face.index in edited:
+            visible |= reach
+            for trim in face.trims:
+                frozen |= frozen_along(net, trim.curve, keep)
+        else:
+            frozen |= reach
+    return Separation(visible, frozen)
+
+
+def frozen_along(net: Net, curve: Curve, keep: str = "g1") -> Array:
+    """Control points ``(nu, nv)`` that must stay so that ``net`` keeps its ``keep`` continuity along a pcurve."""
+    for axis, knots in enumerate((net.u, net.v)):
+        at = curve.poles[:, axis]
+        position = float(at.mean())
+        if np.ptp(at) <= 2 * ISO * _span(knots, position):
+            rows = jet_support(knots, position, CONTINUITY[keep])
+            other = (net.u, net.v)[1 - axis]
+            across = curve.poles[:, 1 - axis]
+            columns = _meeting(other, float(across.min()), float(across.max()))
+            return rows[:, None] & columns[None, :] if axis == 0 else columns[:, None] & rows[None, :]
+    return supported(net, crossed_cells(net, curve))
+
+
+def jet_support(knots: KnotVector, at: float, highest: int) -> Array:
+    """Basis functions ``(n,)`` with a non-zero derivative of order ≤ ``highest`` at ``at``, from either side."""
+    start, end = knots.domain
+    if knots.periodic:
+        at = start + (at - start) % (end - start)
+    nearest = knots.breaks[np.argmin(np.abs(knots.breaks - at))]
+    if abs(nearest - at) <= ISO * _span(knots, at):
+        at = float(nearest)
+    at = min(max(at, start), end)
+    touched = np.zeros(knots.count, bool)
+    places = {(at, "left"), (at, "right")}
+    if knots.periodic and at in (start, end):
+        places = {(start, "right"), (end, "left")}
+    for place, side in places:
+        if not knots.periodic and (place, side) in {(start, "left"), (end, "right")}:
+            continue
+        for order in range(min(highest, knots.degree) + 1):
+            first, values = basis(knots, np.array([place]), order, side)
+            values = values[0]
+            nonzero = np.abs(values) > 1e-12 * np.abs(values).max(initial=0.0)
+            touched[(first[0] + np.flatnonzero(nonzero)) % knots.count] = True
+    return touched
+
+
+def _span(knots: KnotVector, at: float) -> float:
+    """Length of the span at a parameter, the smaller of two at a knot."""
+    breaks = knots.breaks
+    start, end = knots.domain
+    if knots.periodic:
+        at = start + (at - start) % (end - start)
+    cell = int(np.clip(np.searchsorted(breaks, at, side="right") - 1, 0, len(breaks) - 2))
+    near = np.diff(breaks)[max(cell - 1, 0) : cell + 2]
+    return float(near.min())
+
+
+def _meeting(knots: KnotVector, low: float, high: float) -> Array:
+    """Basis functions ``(n,)`` whose open support meets [low, high]."""
+    start, end = knots.domain
+    first = knots.knots[: knots.count]
+    last = knots.knots[knots.degree + 1 : knots.degree + 1 + knots.count]
+    if not knots.periodic:
+        low, high = min(low, end), max(high, start)
+        touching = (first < high) & (last > low)
+        touching[0] |= low <= start
+        touching[-1] |= high >= end
+        return touching
+    period = end - start
+    met = np.zeros(knots.count, bool)
+    for turn in range(-3, 4):
+        met |= (first + turn * period < high) & (last + turn * period > low)
+    return met

@@ -1,0 +1,318 @@
+"""Smoothing: remove detail finer than a scale, or a number of levels, from NURBS faces.
+
+On one surface with control points f (Euclidean ones; weights are kept):
+
+    target   S f, the L2 projection onto the coarse tensor-product space of the knots that the scale leaves
+    result   x, the fairing solve towards S f with the frozen points exact (:mod:`mracad.constraint.fairing`)
+    edit     δ = amount · (x − f) on the free points, 0 elsewhere
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Collection
+from dataclasses import dataclass
+
+import numpy as np
+
+from mracad.bspline.knots import KnotVector
+from mracad.bspline.net import Net
+from mracad.constraint.fairing import Fairing, border_noise, fairing_length
+from mracad.constraint.frozen import Separation, separate
+from mracad.constraint.region import face_region, supported
+from mracad.edit.result import Edit, FaceOutcome, Status
+from mracad.model import Displacement, Face, Model, Offset, Surface
+from mracad.options import Smooth, length
+from mracad.wavelet.ladder import arc_lengths, ladder_for_scale, rungs_by_level
+from mracad.wavelet.project import projection
+
+Array = np.ndarray
+
+KINK = math.radians(0.1)
+"""A knot line of full multiplicity is a crease line where the normal turns by more than this across it."""
+
+DETAIL = 1e-7
+"""Least change of a control point, mm, that counts as detail: the kernel's coincidence tolerance."""
+
+REFINED_POINTS = 40_000
+"""Most control points to which a net is refined in search of free ones."""
+
+
+def smooth(
+    model: Model,
+    options: Smooth,
+    *,
+    faces: Collection[int] | None = None,
+    held: Collection[int] = (),
+    progress: Callable[[int, int], None] | None = None,
+) -> Edit:
+    """Smooth the NURBS faces of a model.
+
+    Parameters
+    ----------
+    model : Model
+    options : Smooth
+        ``faces`` and ``hold`` in it are the user's words for the next two parameters, not looked at here.
+    faces : collection of int, optional
+        Indices of the faces to smooth; all NURBS faces by default.
+    held : collection of int
+        Indices of faces that must not move.
+    progress : callable, optional
+        Called with surfaces done and surfaces in all.
+    """
+    selected = set(range(len(model.faces)) if faces is None else faces) - set(held)
+    bound = None if options.max_deviation is None else length(options.max_deviation, model.diagonal, "max-deviation")
+    scale = None if options.scale is None else length(options.scale, model.diagonal, "scale")
+    outcomes: dict[int, FaceOutcome] = {}
+    offsets: dict[int, Offset] = {}
+    for done, surface in enumerate(model.surfaces):
+        if progress:
+            progress(done, len(model.surfaces))
+        edited = selected.intersection(surface.faces)
+        on_surface = [model.faces[i] for i in surface.faces]
+        work = _SurfaceSmoothing(surface, on_surface, edited, options, scale, bound)
+        if work.offset is not None:
+            offsets[surface.index] = work.offset
+        for face in on_surface:
+            outcomes[face.index] = work.outcome(face, face.index in edited, face.index in held)
+    for face in model.faces:
+        if face.index not in outcomes:
+            outcomes[face.index] = FaceOutcome(face.index, "analytic", f"{face.kind}, not a NURBS face")
+    return Edit(Displacement(offsets), tuple(outcomes[i] for i in range(len(model.faces))))
+
+
+@dataclass(frozen=True, eq=False)
+class _Target:
+    """The smoothed net S f and what the fairing solve wants to know about it."""
+
+    poles: Array
+    along_u: Array
+    along_v: Array
+    scale: float
+
+
+class _SurfaceSmoothing:
+    """Smoothing of one surface: everything that the outcome of its faces tells."""
+
+    def __init__(
+        self,
+        surface: Surface,
+        faces: list[Face],
+        edited: Collection[int],
+        options: Smooth,
+        scale: float | None,
+        bound: float | None,
+    ) -> None:
+        net = surface.net
+        self.net, self.options = net, options
+        self.spans = (arc_lengths(net, 0), arc_lengths(net, 1))
+        regions = [face_region(net, face) for face in faces]
+        self.reach = {face.index: supported(net, r.inside) for face, r in zip(faces, regions, strict=True)}
+        inside = np.logical_or.reduce([r.inside for r in regions])
+        self.creases = (_crease_lines(net, 0, inside), _crease_lines(net, 1, inside))
+        self.separation = separate(net, faces, edited, options.keep)
+        self.fairing, self.inserted, self.offset = 0.0, 0, None
+        self.change = self.moved = np.zeros(net.poles.shape)
+        target = self._target(scale)
+        self.coarser = target is not None
+        if target is None:
+            return
+        self.change = target.poles - net.poles
+        if not edited or not self._detail(self.separation.visible) or options.amount == 0:
+            return
+        if self._detail(self.separation.free):
+            moved = self._solve(net, self.spans, self.separation, target)
+            extra_u = extra_v = np.empty(0)
+        elif options.refine:
+            refined = self._refine(faces, edited, target)
+            if refined is None:
+                return
+            moved, extra_u, extra_v = refined
+            self.inserted = len(extra_u) + len(extra_v)
+        else:
+            return
+        moved = options.amount * moved
+        if bound is not None:
+            moved = _bounded(moved, bound, self._window(moved))
+        if np.any(moved):
+            self.moved = moved
+            self.offset = Offset(moved, extra_u, extra_v)
+
+    def outcome(self, face: Face, edited: bool, held: bool) -> FaceOutcome:
+        """What became of one face."""
+        reach = self.reach[face.index]
+        detail = _largest(self.change, reach)
+        free = int((reach & self.separation.free).sum())
+        moved = _largest(self.moved, reach) if self.moved.shape == self.net.poles.shape else _largest(self.moved)
+        pairs = [(s[1:] + s[:-1]).min() for s in self.spans if len(s) > 1]
+        creases = sum(len(c) for c in self.creases)
+        status: Status
+        if held or not edited:
+            status, reason = ("held", "held") if held else ("unselected", "not selected")
+        elif not self.coarser:
+            status, reason = "unchanged", "crease lines only" if creases and pairs else "no span finer than the scale"
+        elif detail <= DETAIL:
+            status, reason = "unchanged", "no detail"
+        elif self.options.amount == 0:
+            status, reason = "unchanged", "amount 0"
+        elif self.offset is None or moved == 0.0:
+            status, reason = "stuck", "no free poles" if not free else "no free poles where the detail is"
+        else:
+            status, reason = "edited", ""
+        return FaceOutcome(
+            face.index,
+            status,
+            reason,
+            detail=detail,
+            moved=moved if edited else 0.0,
+            free=free,
+            points=int(reach.sum()),
+            spans=(float(min(s.min() for s in self.spans)), float(max(s.max() for s in self.spans))),
+            scale=float(min(pairs, default=0.0)),
+            creases=creases,
+            fairing=self.fairing if status == "edited" else 0.0,
+            inserted=self.inserted,
+        )
+
+    def _detail(self, points: Array) -> bool:
+        return _largest(self.change, points) > DETAIL
+
+    def _target(self, scale: float | None) -> _Target | None:
+        """S f at the scale or level asked for; None where the knots allow no coarser space."""
+        if scale is not None:
+            coarse = tuple(
+                ladder_for_scale(k, s, scale, keep=c) for k, s, c in zip(_pair(self.net), self.spans, self.creases, strict=True)
+            )
+            return None if coarse == _pair(self.net) else self._projected(coarse, scale)
+        assert self.options.level is not None
+        ladders = [
+            rungs_by_level(k, keep=c, lengths=s) for k, s, c in zip(_pair(self.net), self.spans, self.creases, strict=True)
+        ]
+        if all(len(rungs) == 1 for rungs in ladders):
+            return None
+        whole, part = int(self.options.level), self.options.level % 1.0
+        levels = [self._rung(ladders, whole)] + ([self._rung(ladders, whole + 1)] if part else [])
+        weights = [1.0 - part, part][: len(levels)]
+        return _Target(
+            *(sum(w * getattr(t, name) for w, t in zip(weights, levels, strict=True))
+              for name in ("poles", "along_u", "along_v", "scale"))
+        )
+
+    def _rung(self, ladders: list[list[KnotVector]], level: int) -> _Target:
+        coarse = tuple(rungs[min(level, len(rungs) - 1)] for rungs in ladders)
+        spacing = [s.sum() / max(len(k.breaks) - 1, 1) for s, k in zip(self.spans, coarse, strict=True)]
+        changed = [s for s, k, fine in zip(spacing, coarse, _pair(self.net), strict=True) if k != fine]
+        return self._projected(coarse, math.sqrt(2) * min(changed, default=0.0))
+
+    def _projected(self, coarse: tuple[KnotVector, ...], scale: float) -> _Target:
+        poles = self.net.poles
+        in_u = projection(coarse[0], self.net.u).apply(poles, axis=0)
+        in_v = projection(coarse[1], self.net.v).apply(poles, axis=1)
+        both = projection(coarse[1], self.net.v).apply(in_u, axis=1)
+        return _Target(both, poles - in_u, poles - in_v, scale)
+
+    def _solve(self, net: Net, spans: tuple[Array, Array], separation: Separation, target: _Target) -> Array:
+        """x − f on the free points of ``net``, which is the surface's own net or a refinement of it."""
+        free, f = separation.free, net.poles
+        noise = border_noise(target.along_u, target.along_v, separation.visible & separation.frozen, free)
+        self.fairing = fairing_length(target.scale, noise)
+        x = target.poles
+        if self.fairing > 0:
+            try:
+                x = Fairing(net.u, net.v, spans, self.fairing).solve(target.poles, f, free)
+            except ValueError:
+                self.fairing = 0.0
+        return np.where(free[..., None], x - f, 0.0)
+
+    def _refine(
+        self, faces: list[Face], edited: Collection[int], target: _Target
+    ) -> tuple[Array, Array, Array] | None:
+        """Halve knot spans, the longer ones first, until an eighth of the visible points is free."""
+        net = self.net
+        u_knots, v_knots = np.empty(0), np.empty(0)
+        best = None
+        while net.poles.shape[0] * net.poles.shape[1] < REFINED_POINTS:
+            spans = arc_lengths(net, 0), arc_lengths(net, 1)
+            halves_u, halves_v = (
+                ((k.breaks[:-1] + k.breaks[1:]) / 2)[s > max(spans[0].max(), spans[1].max()) / 2]
+                for k, s in zip(_pair(net), spans, strict=True)
+            )
+            u_knots, v_knots = np.sort(np.r_[u_knots, halves_u]), np.sort(np.r_[v_knots, halves_v])
+            net = self.net.refined(u_knots, v_knots)
+            separation = separate(net, faces, edited, self.options.keep)
+            fine = [
+                Net(self.net.u, self.net.v, self.net.poles + part, self.net.weights).refined(u_knots, v_knots).poles
+                - net.poles
+                for part in (self.change, target.along_u, target.along_v)
+            ]
+            if _largest(fine[0], separation.free) <= DETAIL:
+                continue
+            spans = arc_lengths(net, 0), arc_lengths(net, 1)
+            best = net, spans, separation, _Target(net.poles + fine[0], fine[1], fine[2], target.scale)
+            if separation.free.sum() >= separation.visible.sum() / 8:
+                break
+        if best is None:
+            return None
+        self.separation_refined = best[2]
+        return self._solve(*best), u_knots, v_knots
+
+    def _window(self, moved: Array) -> tuple[int, int]:
+        """Points over which a bound is blended, about one wavelength of the edit in each direction."""
+        return max(moved.shape[0] // 16, 1), max(moved.shape[1] // 16, 1)
+
+
+def _pair(net: Net) -> tuple[KnotVector, KnotVector]:
+    return net.u, net.v
+
+
+def _largest(change: Array, points: Array | None = None) -> float:
+    """Length of the longest vector of ``change`` (nu, nv, 3), mm, among ``points``."""
+    vectors = change.reshape(-1, 3) if points is None else change[points]
+    return float(np.sqrt((vectors**2).sum(axis=-1).max(initial=0.0)))
+
+
+def _crease_lines(net: Net, axis: int, inside: Array) -> Array:
+    """Interior knots of full multiplicity across which the normal turns by more than the kink angle.
+
+    Parameters
+    ----------
+    axis : int
+        0 for lines u = const, 1 for v = const.
+    inside : ndarray of bool (cells_u, cells_v)
+        Cells that belong to a face; only there does a line count.
+    """
+    knots, other = _pair(net)[axis], _pair(net)[1 - axis]
+    inside = inside if axis == 0 else inside.T
+    full = np.flatnonzero(knots.multiplicities[1:-1] >= knots.degree) + 1
+    if not len(full):
+        return np.empty(0)
+    fractions = np.array([0.01, 0.25, 0.5, 0.75, 0.99])
+    across = (other.breaks[:-1, None] + np.diff(other.breaks)[:, None] * fractions).ravel()
+    creases = []
+    for line in full:
+        seen = np.repeat(inside[line - 1] | inside[line], len(fractions))
+        points = np.stack([np.full(seen.sum(), knots.breaks[line]), across[seen]], axis=1)[:, :: 1 - 2 * axis]
+        sides = [("left", "right"), ("right", "right")] if axis == 0 else [("right", "left"), ("right", "right")]
+        before, after = (net.normals(np.ascontiguousarray(points), side=side) for side in sides)
+        turn = np.arctan2(np.linalg.norm(np.cross(before, after), axis=1), (before * after).sum(axis=1))
+        if np.nanmax(turn, initial=0.0) > KINK:
+            creases.append(knots.breaks[line])
+    return np.array(creases)
+
+
+def _bounded(moved: Array, bound: float, window: tuple[int, int]) -> Array:
+    """Offsets blended back locally until none is longer than ``bound``.
+
+    Each point's share a = min(1, bound / |δ|) is replaced by the mean over a window of the least share over the
+    same window around each of its points: never more than a, and smooth.
+    """
+    from scipy.ndimage import minimum_filter, uniform_filter
+
+    size = np.linalg.norm(moved, axis=-1)
+    share = np.minimum(1.0, bound / np.maximum(size, np.finfo(float).tiny))
+    if share.min() == 1.0:
+        return moved
+    shape = (2 * window[0] + 1, 2 * window[1] + 1)
+    least = minimum_filter(share, shape, mode="nearest")
+    share = np.minimum(share, uniform_filter(least, shape, mode="nearest"))
+    return moved * share[..., None]
