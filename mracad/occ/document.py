@@ -1,0 +1,232 @@
+"""An open CAD document: the kernel's own structure, kept whole, and the parts and faces found in it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from OCP.Geom import Geom_BSplineSurface
+from OCP.Quantity import Quantity_Color
+from OCP.TCollection import TCollection_ExtendedString
+from OCP.TDataStd import TDataStd_Name
+from OCP.TDF import TDF_Label, TDF_LabelSequence
+from OCP.TDocStd import TDocStd_Document
+from OCP.TopAbs import TopAbs_FACE
+from OCP.TopExp import TopExp
+from OCP.TopLoc import TopLoc_Location
+from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Shape
+from OCP.TopTools import TopTools_IndexedMapOfShape
+from OCP.XCAFDoc import XCAFDoc_ColorTool, XCAFDoc_ColorType, XCAFDoc_DocumentTool, XCAFDoc_ShapeTool
+
+from mracad.occ.units import Units
+
+Array = np.ndarray
+
+
+@dataclass(eq=False)
+class Part:
+    """One shape definition, however often it is instanced.
+
+    Attributes
+    ----------
+    label : TDF_Label
+    shape : TopoDS_Shape
+        In the part's own frame.
+    product : str
+    first : int
+        Document-wide index of its first face.
+    faces : TopTools_IndexedMapOfShape
+        Its faces, from 1.
+    placements : list of ndarray (4, 4)
+        Where its instances stand, in memory units.
+    colour : str
+        Of the whole part (or its first coloured instance), ``"#rrggbb"`` or ``""``.
+    face_names, face_colours : dict
+        By position in the part, from 0, where the document says something of the face.
+    """
+
+    label: TDF_Label
+    shape: TopoDS_Shape
+    product: str
+    first: int
+    faces: TopTools_IndexedMapOfShape
+    placements: list[Array]
+    colour: str
+    face_names: dict[int, str]
+    face_colours: dict[int, str]
+
+
+@dataclass(eq=False)
+class Conversion:
+    """A NURBS surface that stands ready to replace the analytic one of a face (see ``convert``).
+
+    Attributes
+    ----------
+    surface : Geom_BSplineSurface
+    pcurves : list
+        For each edge use of the face, in its own order, the curve on ``surface``, over the edge's own range.
+    """
+
+    surface: Geom_BSplineSurface
+    pcurves: list
+
+
+@dataclass(eq=False)
+class Document:
+    """A CAD document.
+
+    Attributes
+    ----------
+    xcaf : TDocStd_Document
+        The kernel's document: shapes, names, colours, layers, tolerances, properties.
+    name : str
+        File name without folder.
+    units : Units
+    schema : str
+        ``"AP203"``, ``"AP214"``, ``"AP242"`` or ``""``.
+    conversions : dict
+        Surfaces made by ``view(document, convert=…)``, by face index, for ``apply``.
+    """
+
+    xcaf: TDocStd_Document
+    name: str
+    units: Units = field(default_factory=Units)
+    schema: str = ""
+    conversions: dict[int, Conversion] = field(default_factory=dict)
+
+    @property
+    def unit(self) -> str:
+        """The length unit of the file (and of what is written)."""
+        return self.units.name
+
+    @property
+    def unit_mm(self) -> float:
+        """Millimetres in one unit of the numbers in memory."""
+        return self.units.memory_mm
+
+    @property
+    def shape_tool(self) -> XCAFDoc_ShapeTool:
+        return XCAFDoc_DocumentTool.ShapeTool_s(self.xcaf.Main())
+
+    @property
+    def shape(self) -> TopoDS_Shape:
+        """Everything, placed, as one shape."""
+        return self.shape_tool.GetOneShape()
+
+    @cached_property
+    def parts(self) -> list[Part]:
+        """The shape definitions that hold geometry, in document order."""
+        placed: dict[str, list[Array]] = {}
+        tints: dict[str, str] = {}
+        for label in _labels(self.shape_tool.GetFreeShapes):
+            _walk(label, np.eye(4), "", placed, tints)
+        parts: list[Part] = []
+        first = 0
+        for label in _labels(self.shape_tool.GetShapes):
+            if not XCAFDoc_ShapeTool.IsSimpleShape_s(label):
+                continue
+            shape = XCAFDoc_ShapeTool.GetShape_s(label)
+            faces = TopTools_IndexedMapOfShape()
+            TopExp.MapShapes_s(shape, TopAbs_FACE, faces)
+            names, colours = _described(label, faces)
+            key = label_key(label)
+            parts.append(
+                Part(
+                    label, shape, label_name(label), first, faces, placed.get(key, []),
+                    label_colour(label) or tints.get(key, ""), names, colours,
+                )
+            )
+            first += faces.Extent()
+        return parts
+
+    @cached_property
+    def faces(self) -> list[TopoDS_Face]:
+        """All faces, in their part's frame, in the order of ``Model.faces``."""
+        return [TopoDS.Face_s(part.faces.FindKey(i)) for part in self.parts for i in range(1, part.faces.Extent() + 1)]
+
+
+def matrix(location: TopLoc_Location) -> Array:
+    """A location as a 4 × 4 matrix."""
+    out = np.eye(4)
+    if not location.IsIdentity():
+        transform = location.Transformation()
+        out[:3] = [[transform.Value(i, j) for j in (1, 2, 3, 4)] for i in (1, 2, 3)]
+    return out
+
+
+def label_key(label: TDF_Label) -> str:
+    """A text that names a label within its document."""
+    tags = []
+    while not label.IsRoot():
+        tags.append(label.Tag())
+        label = label.Father()
+    return ":".join(map(str, reversed(tags)))
+
+
+def label_name(label: TDF_Label) -> str:
+    """The name on a label, or ``""``."""
+    if not label.IsAttribute(TDataStd_Name.GetID_s()):
+        return ""
+    attribute = TDataStd_Name()
+    label.FindAttribute(TDataStd_Name.GetID_s(), attribute)
+    return attribute.Get().ToExtString()
+
+
+def label_colour(label: TDF_Label) -> str:
+    """The surface (or general) colour on a label as ``"#rrggbb"``, or ``""``."""
+    colour = Quantity_Color()
+    for kind in (XCAFDoc_ColorType.XCAFDoc_ColorSurf, XCAFDoc_ColorType.XCAFDoc_ColorGen):
+        if XCAFDoc_ColorTool.GetColor_s(label, kind, colour):
+            return Quantity_Color.ColorToHex_s(colour).ToCString().lower()
+    return ""
+
+
+def _labels(fill) -> Iterator[TDF_Label]:
+    """The labels that a kernel function puts in the sequence it is given."""
+    sequence = TDF_LabelSequence()
+    fill(sequence)
+    for i in range(1, sequence.Length() + 1):
+        yield sequence.Value(i)
+
+
+def _walk(label: TDF_Label, frame: Array, colour: str, placed: dict[str, list[Array]], tints: dict[str, str]) -> None:
+    """Follow an assembly down to its parts; note where each stands and the colour its instances give it."""
+    frame = frame @ matrix(XCAFDoc_ShapeTool.GetLocation_s(label))
+    colour = colour or label_colour(label)
+    if XCAFDoc_ShapeTool.IsReference_s(label):
+        referred = TDF_Label()
+        XCAFDoc_ShapeTool.GetReferredShape_s(label, referred)
+        label = referred
+    if XCAFDoc_ShapeTool.IsAssembly_s(label):
+        for component in _labels(lambda sequence: XCAFDoc_ShapeTool.GetComponents_s(label, sequence, False)):
+            _walk(component, frame, colour, placed, tints)
+        return
+    key = label_key(label)
+    placed.setdefault(key, []).append(frame)
+    if colour:
+        tints.setdefault(key, colour)
+
+
+def _described(label: TDF_Label, faces: TopTools_IndexedMapOfShape) -> tuple[dict[int, str], dict[int, str]]:
+    """Names and colours that the sub-shape labels of a part give its faces; a body's colour goes to its faces."""
+    names: dict[int, str] = {}
+    colours: dict[int, str] = {}
+    inherited: dict[int, str] = {}
+    for sub in _labels(lambda sequence: XCAFDoc_ShapeTool.GetSubShapes_s(label, sequence)):
+        shape = XCAFDoc_ShapeTool.GetShape_s(sub)
+        colour = label_colour(sub)
+        if shape.ShapeType() == TopAbs_FACE:
+            position = faces.FindIndex(shape) - 1
+            if position >= 0:
+                if name := label_name(sub):
+                    names[position] = name
+                if colour:
+                    colours[position] = colour
+        elif colour:
+            inside = TopTools_IndexedMapOfShape()
+            TopExp.MapShapes_s(shape, TopAbs_FACE, inside)
+            for i in range(1, inside.Extent() + 1):
+                inherited[faces.FindIndex(inside.FindKey(i)) - 1] = colour
+    return names, inherited | colours

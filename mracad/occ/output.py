@@ -1,0 +1,72 @@
+"""Files that appear whole or not at all."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import BinaryIO
+
+from mracad.errors import FileError
+
+
+@contextlib.contextmanager
+def beside(target: str | os.PathLike) -> Iterator[Path]:
+    """A temporary path in the target's folder, which takes the target's place when the block ends well.
+
+    Nothing is left behind when it does not.
+
+    Raises
+    ------
+    FileError
+        When the target cannot be written.
+    """
+    path = Path(target)
+    try:
+        if path.is_dir():
+            raise IsADirectoryError("it is a folder")
+        handle, name = tempfile.mkstemp(prefix=".mracad-", suffix=path.suffix, dir=path.parent)
+        os.close(handle)
+    except OSError as error:
+        raise _unwritable(path, error) from error
+    temporary = Path(name)
+    try:
+        yield temporary
+        with temporary.open("rb+") as written:
+            os.fsync(written.fileno())
+        temporary.chmod(_mode(path))
+        temporary.replace(path)
+    except FileError:
+        raise
+    except OSError as error:
+        raise _unwritable(path, error) from error
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def put(data: bytes, target: str | os.PathLike | BinaryIO) -> None:
+    """Write bytes to a path (whole or not at all) or to a binary stream; raises FileError."""
+    if isinstance(target, str | os.PathLike):
+        with beside(target) as temporary:
+            temporary.write_bytes(data)
+        return
+    try:
+        target.write(data)
+        target.flush()
+    except OSError as error:
+        raise FileError(f"cannot write the output: {error.strerror or error}", "check where it leads") from error
+
+
+def _mode(path: Path) -> int:
+    """The permissions of the file that is replaced, or those that a new file gets."""
+    if path.exists():
+        return path.stat().st_mode & 0o777
+    mask = os.umask(0)
+    os.umask(mask)
+    return 0o666 & ~mask
+
+
+def _unwritable(path: Path, error: OSError) -> FileError:
+    return FileError(f"cannot write '{path}': {error.strerror or error}", "choose another place for the output")
