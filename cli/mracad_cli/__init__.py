@@ -1,1 +1,1 @@
-"""The command line of mracad."""
+"""The command line of mracad: one module a command in ``commands``."""

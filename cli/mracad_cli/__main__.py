@@ -1,0 +1,94 @@
+"""Entry point: the group of commands, and the one place for errors and exit codes."""
+
+from __future__ import annotations
+
+import os
+import sys
+
+# Results must not depend on the number of cores, and small matrices gain nothing from threads.
+for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ.setdefault(_name, "1")
+
+import importlib
+import json
+import pkgutil
+from collections.abc import Sequence
+
+import click
+
+import mracad
+from mracad.errors import Code, MracadError
+from mracad_cli import commands
+
+
+class Commands(click.Group):
+    """A group whose commands are the modules of ``mracad_cli.commands``."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return sorted(module.name for module in pkgutil.iter_modules(commands.__path__))
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        if cmd_name not in self.list_commands(ctx):
+            return None
+        command = importlib.import_module(f"mracad_cli.commands.{cmd_name}").command
+        return command if isinstance(command, click.Command) else None
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        if args and not args[0].startswith("-") and args[0] not in self.list_commands(ctx):
+            import difflib
+
+            near = difflib.get_close_matches(args[0], self.list_commands(ctx), n=1)
+            raise click.UsageError(f"no command {args[0]!r}" + (f", did you mean {near[0]!r}?" if near else ""))
+        return super().resolve_command(ctx, args)
+
+
+@click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 120})
+@click.version_option(mracad.__version__, prog_name="mracad")
+def group() -> None:
+    """Multiresolution editing for CAD models: B-spline wavelets on STEP files."""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line and return its exit code."""
+    arguments = list(sys.argv[1:] if arguments is None else arguments)
+    try:
+        result = group.main(arguments, prog_name="mracad", standalone_mode=False)
+        sys.stdout.flush()
+        return result if isinstance(result, int) else 0
+    except click.exceptions.NoArgsIsHelpError as error:
+        click.echo(error.format_message(), err=True)
+        return int(Code.USAGE)
+    except click.exceptions.Exit as error:
+        return error.exit_code
+    except click.ClickException as error:
+        command = error.ctx.command_path if isinstance(error, click.UsageError) and error.ctx else "mracad"
+        failure = MracadError(error.format_message().rstrip("."), f"see {command} --help", Code.USAGE)
+    except MracadError as error:
+        if "--debug" in arguments:
+            raise
+        failure = error
+    except (KeyboardInterrupt, click.Abort):
+        failure = MracadError("interrupted", "nothing was written", Code.INTERRUPTED)
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        failure = MracadError("the reader of standard output went away", "", Code.FILE)
+    except MemoryError:
+        failure = MracadError("out of memory", "use a smaller model or a machine with more memory", Code.LIMIT)
+    except Exception as error:
+        if "--debug" in arguments:
+            raise
+        failure = MracadError(
+            f"internal error: {type(error).__name__}: {' '.join(str(error).split())}",
+            "please report it with the output of --debug",
+        )
+    if "--json" in arguments:
+        body = {"code": int(failure.code), "message": failure.message, "hint": failure.hint}
+        click.echo(json.dumps({"error": body}, ensure_ascii=False))
+    click.echo(f"mracad: {' '.join(str(failure).split())}", err=True)
+    return int(failure.code)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

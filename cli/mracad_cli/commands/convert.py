@@ -1,0 +1,30 @@
+"""Write a STEP file again in another schema, or as a mesh (STL)."""
+
+from __future__ import annotations
+
+import json
+import time
+from typing import Any
+
+import click
+
+from mracad_cli import options
+from mracad_cli.files import Outputs, read
+from mracad_cli.progress import Progress
+
+
+@click.command(help=__doc__)
+@options.apply(options.reading, options.writing, options.printing)
+def command(source: str, input_unit: str | None, as_json: bool, outputs: tuple[str, ...], **formats: Any) -> int:
+    start = time.perf_counter()
+    targets = Outputs(outputs, **formats)
+    with Progress() as progress:
+        progress("reading", 0, 1)
+        document = read(source, input_unit)
+        progress("writing", 0, 1)
+        targets.write(document, "convert")
+    if as_json:
+        targets.say(json.dumps({"file": document.name, "written": targets.names()}, ensure_ascii=False))
+    else:
+        targets.say(f"{document.name}: wrote {targets.sizes()}, {time.perf_counter() - start:.1f} s")
+    return 0

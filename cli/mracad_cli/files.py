@@ -1,0 +1,113 @@
+"""Files in and out of a command: checked before the work starts, written whole or not at all."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import os
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from mracad.errors import FileError, UsageError
+
+if TYPE_CHECKING:
+    from mracad.occ.document import Document
+
+STEP, STL = frozenset({".step", ".stp", ".p21"}), frozenset({".stl"})
+
+
+def read(source: str, input_unit: str | None) -> Document:
+    """Read a STEP file, or standard input for ``-``."""
+    from mracad.occ.read import read_step
+
+    if source == "-":
+        return read_step(io.BytesIO(sys.stdin.buffer.read()), input_unit)
+    return read_step(source, input_unit)
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text file whole or not at all."""
+    from mracad.occ.output import put
+
+    put(text.encode(), path)
+
+
+class Outputs:
+    """The outputs of a command, and where its text goes (standard error when the model goes to standard output)."""
+
+    def __init__(
+        self,
+        paths: tuple[str, ...],
+        *,
+        overwrite: bool,
+        schema: str,
+        chord: str | None,
+        angle: float,
+        ascii_stl: bool,
+    ) -> None:
+        self.paths, self.overwrite, self.schema = paths, overwrite, schema.upper()
+        self.chord, self.angle, self.ascii_stl = chord, angle, ascii_stl
+        self._sizes: list[str] = []
+        if len(set(paths)) < len(paths):
+            raise UsageError("the same output is named twice", "give each -o once")
+        for path in paths:
+            if path != "-":
+                self._check(Path(path))
+
+    def check_report(self, path: str) -> None:
+        """Refuse a report that could not be written."""
+        self._check(Path(path), ending=False)
+
+    def _check(self, path: Path, ending: bool = True) -> None:
+        if ending and path.suffix.lower() not in STEP | STL:
+            raise FileError(f"cannot write {path}: unknown ending {path.suffix!r}", "end it in .step, .stp or .stl")
+        if path.is_dir():
+            raise FileError(f"cannot write {path}: it is a directory", "name a file in it")
+        if not path.parent.is_dir():
+            raise FileError(f"cannot write {path}: there is no folder {path.parent}", "create it first")
+        if not os.access(path.parent, os.W_OK):
+            raise FileError(f"cannot write {path}: the folder is not writable", "choose another one")
+        if path.exists() and not self.overwrite:
+            raise UsageError(f"{path} exists", "give --overwrite to replace it")
+
+    def write(self, document: Document, title: str) -> None:
+        """Write the document to every output; none is replaced unless all could be made."""
+        from mracad.occ.mesh import write_stl
+        from mracad.occ.output import beside
+        from mracad.occ.write import write_step
+
+        made: dict[str, bytes] = {}
+        for path in self.paths:
+            stream = io.BytesIO()
+            if path == "-" or Path(path).suffix.lower() in STEP:
+                write_step(document, stream, schema=self.schema, options_text=title)
+            else:
+                write_stl(document, stream, ascii=self.ascii_stl, chord=self.chord, angle=self.angle)
+            made[path] = stream.getvalue()
+        with contextlib.ExitStack() as stack:
+            for path, data in made.items():
+                if path != "-":
+                    stack.enter_context(beside(path)).write_bytes(data)
+        if "-" in made:
+            sys.stdout.buffer.write(made["-"])
+            sys.stdout.buffer.flush()
+        self._sizes = [f"{self._name(path)}, {_size(len(data))}" for path, data in made.items()]
+
+    def say(self, line: str) -> None:
+        """Print a line of the result."""
+        print(line, file=sys.stderr if "-" in self.paths else sys.stdout)
+
+    def names(self) -> list[str]:
+        return [self._name(path) for path in self.paths]
+
+    def sizes(self) -> str:
+        return ", ".join(self._sizes)
+
+    @staticmethod
+    def _name(path: str) -> str:
+        return "standard output" if path == "-" else Path(path).name
+
+
+def _size(count: int) -> str:
+    return f"{count / 1e6:.1f} MB" if count >= 1e5 else f"{count / 1e3:.1f} kB"

@@ -1,0 +1,148 @@
+"""Reports as text and as JSON-ready dictionaries."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import TYPE_CHECKING, Any
+
+import msgspec
+
+if TYPE_CHECKING:
+    from mracad.audit.continuity import SeamMeasure, SeamSummary
+    from mracad.edit.result import FaceOutcome
+    from mracad.job import Report
+    from mracad.occ.check import Validity
+
+SHOWN = 6
+"""Most faces named in one line."""
+
+
+def mm(value: float) -> str:
+    """A length for people: three significant digits, millimetres."""
+    return f"{value:.3g} mm"
+
+
+def degrees(value: float) -> str:
+    """An angle for people: two significant digits, or 0 below what measuring can tell."""
+    return f"{value:.2g}°" if value > 1e-5 else "0°"
+
+
+def plural(count: int, noun: str) -> str:
+    """``1 face``, ``2 faces``."""
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
+def numbers(faces: list[int]) -> str:
+    """``#3 #7 …`` from face indices."""
+    return " ".join(f"#{i + 1}" for i in faces[:SHOWN]) + (" …" if len(faces) > SHOWN else "")
+
+
+def verdict(valid: bool) -> str:
+    return "yes" if valid else "no"
+
+
+def edit_lines(report: Report, done: str, quiet: str, written: str) -> list[str]:
+    """The four lines after an edit.
+
+    Parameters
+    ----------
+    report : Report
+    done : str
+        What was done to the edited faces, ``"smoothed at 5 mm"``.
+    quiet : str
+        What unchanged faces are, ``"already smooth there"``.
+    written : str
+        The end of the last line.
+    """
+    from mracad.audit.continuity import key, summary
+
+    edit, model = report.edit, report.model
+    nurbs = [o for o in edit.outcomes if o.status != "analytic"]
+    parts = [f"{len(edit.faces('edited'))} {done}"]
+    unchanged = edit.faces("unchanged")
+    if unchanged:
+        reasons = Counter("crease lines only" if o.reason == "crease lines only" else quiet for o in unchanged)
+        parts += [f"{count} {reason}" for reason, count in reasons.items()]
+    stuck = edit.faces("stuck")
+    if stuck:
+        parts.append(f"{len(stuck)} held ({numbers([o.face for o in stuck])}: {stuck[0].reason}, try --refine)")
+    if edit.faces("held"):
+        parts.append(f"{len(edit.faces('held'))} held by --hold")
+    if edit.faces("unselected"):
+        parts.append(f"{len(edit.faces('unselected'))} not selected")
+    lines = [f"{model.name}: {plural(len(nurbs), 'NURBS face')}: {', '.join(parts)}"]
+    if not edit.faces("edited"):
+        lines[0] += "; nothing changed"
+    lines += [f"note: {note}" for note in edit.notes]
+    if report.deviations:
+        worst = max(report.deviations, key=lambda d: d.largest)
+        mean = sum(d.mean for d in report.deviations) / len(report.deviations)
+        lines.append(f"deviation: max {mm(worst.largest)} on #{worst.face + 1}, mean {mm(mean)}")
+    else:
+        lines.append("deviation: none")
+    smooth = report.smooth_seams()
+    old, new = summary(report.before, smooth), summary(report.after, smooth)
+    lines.append(seam_line(new, old))
+    worse = [a for b, a in zip(report.before, report.after, strict=True) if key(b) in smooth and a.angle > b.angle + 1e-4]
+    if worse:
+        lines[-1] += f"; {len(worse)} less smooth"
+    lines.append(f"valid: {verdict(report.valid_after.valid)} (was {verdict(report.valid_before.valid)}); {written}")
+    return lines
+
+
+def seam_line(new: SeamSummary, old: SeamSummary | None = None) -> str:
+    """The seams in one line."""
+    was_angle = f" (was {degrees(old.angle)})" if old else ""
+    was_gap = f" (was {mm(old.gap)})" if old else ""
+    line = f"seams: {new.smooth} smooth of {new.seams}, angle ≤ {degrees(new.angle)}{was_angle}; gap ≤ {mm(new.gap)}{was_gap}"
+    return line + (f"; {new.unsewn} not sewn" if new.unsewn else "")
+
+
+def plain(value: Any) -> Any:
+    """Dataclasses and structs as JSON-ready values; face and edge indices count from 1 as on the command line."""
+    return msgspec.to_builtins(value)
+
+
+def outcome(value: FaceOutcome) -> dict[str, Any]:
+    """One face's outcome; lengths in millimetres."""
+    return {**plain(value), "face": value.face + 1}
+
+
+def seam(value: SeamMeasure) -> dict[str, Any]:
+    """One seam; its faces by number."""
+    return {
+        **plain(value),
+        "edge": value.edge + 1 if value.sewn else None,
+        "faces": [i + 1 for i in value.faces],
+        "smooth": value.smooth,
+    }
+
+
+def report(value: Report) -> dict[str, Any]:
+    """The full report of an edit."""
+    from mracad.audit.continuity import key, summary
+
+    smooth = value.smooth_seams()
+    after = {key(m): m for m in value.after}
+    return {
+        "file": value.model.name,
+        "diagonal": value.model.diagonal,
+        "counts": dict(Counter(o.status for o in value.edit.outcomes)),
+        "faces": [outcome(o) for o in value.edit.outcomes],
+        "notes": list(value.edit.notes),
+        "deviation": [{**plain(d), "face": d.face + 1} for d in value.deviations],
+        "seams": {
+            "before": plain(summary(value.before, smooth)),
+            "after": plain(summary(value.after, smooth)),
+            "each": [
+                {**seam(m), "after": {k: v for k, v in seam(after[key(m)]).items() if k not in ("edge", "faces", "sewn")}}
+                for m in value.before
+            ],
+        },
+        "valid": {"before": validity(value.valid_before), "after": validity(value.valid_after)},
+    }
+
+
+def validity(value: Validity) -> dict[str, Any]:
+    """The kernel's verdict."""
+    return dict(plain(value))

@@ -1,0 +1,146 @@
+"""One document on its way through the program: read, view, edit, apply, check, write; and the report of it."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from mracad.audit.continuity import SeamMeasure, key, seams
+from mracad.audit.deviation import Deviation, deviations
+from mracad.edit.result import Edit
+from mracad.errors import EditError
+from mracad.model import Model
+from mracad.options import Selection
+from mracad.select import NURBS, select
+
+if TYPE_CHECKING:
+    from mracad.occ.check import Validity
+    from mracad.occ.document import Document
+
+Progress = Callable[[str, int, int], None]
+"""Called with the name of a stage, the steps done and the steps in all."""
+
+
+@dataclass(frozen=True)
+class Report:
+    """What one edit of one file did.
+
+    Attributes
+    ----------
+    model : Model
+        The snapshot before the edit.
+    edit : Edit
+    deviations : list of Deviation
+    before, after : list of SeamMeasure
+        Seams before and after, in the same order.
+    valid_before, valid_after : Validity
+    """
+
+    model: Model
+    edit: Edit
+    deviations: list[Deviation]
+    before: list[SeamMeasure]
+    after: list[SeamMeasure]
+    valid_before: Validity
+    valid_after: Validity
+    seconds: float
+
+    def smooth_seams(self) -> frozenset[tuple[int, tuple[int, int]]]:
+        """Keys of the seams that were smooth before."""
+        return frozenset(key(m) for m in self.before if m.smooth)
+
+
+def run(
+    document: Document,
+    edit: Callable[..., Edit],
+    options: Selection,
+    *,
+    progress: Progress | None = None,
+    apply: bool = True,
+) -> Report:
+    """Edit a document in memory.
+
+    Parameters
+    ----------
+    document : Document
+        Changed in place unless ``apply`` is false.
+    edit : callable
+        ``edit(model, options, faces=…, held=…, progress=…) -> Edit``.
+    options : Selection
+        The edit's options, selectors among them.
+    apply : bool
+        False for a dry run.
+
+    Raises
+    ------
+    EditError
+        When there is something to do and no face can move, or the result would be less valid than the input.
+        The document must then not be written.
+    """
+    from mracad.occ.apply import apply as put
+    from mracad.occ.check import check
+    from mracad.occ.select import select_cq
+    from mracad.occ.view import view
+
+    def stage(name: str) -> Callable[[int, int], None]:
+        return (lambda done, total: progress(name, done, total)) if progress else (lambda done, total: None)
+
+    start = time.perf_counter()
+    stage("looking at faces")(0, 1)
+    model = view(document)
+
+    def cadquery(expression: str) -> set[int]:
+        return select_cq(document, model, expression)
+
+    nurbs = [face.index for face in model.faces if face.kind in NURBS]
+    chosen = select(model, options.faces, nurbs, cadquery).faces if options.faces else frozenset(nurbs)
+    held = select(model, options.hold, nurbs, cadquery).faces if options.hold else frozenset()
+    convertible = {i for i in chosen - held if model.faces[i].surface is None}
+    if convertible:
+        model = view(document, convert=convertible)
+    before = seams(model)
+    stage("checking the input")(0, 1)
+    valid_before = check(document)
+    result = edit(model, options, faces=chosen, held=held, progress=stage("editing"))
+    _refuse_if_stuck(model, result)
+    after = seams(result.displacement.applied(model))
+    moved = deviations(model, result.displacement)
+    valid_after = valid_before
+    if apply and result.displacement.offsets:
+        put(document, model, result.displacement)
+        stage("checking the result")(0, 1)
+        touched = {f for i in result.displacement.offsets for f in model.surfaces[i].faces}
+        valid_after = check(document, faces=touched, model=model, before=valid_before)
+        _refuse_if_worse(model, valid_before, valid_after)
+    return Report(
+        model, result, moved, before, after, valid_before, valid_after, time.perf_counter() - start
+    )
+
+
+def _refuse_if_stuck(model: Model, result: Edit) -> None:
+    stuck = result.faces("stuck")
+    if stuck and not result.faces("edited"):
+        names = " ".join(f"#{o.face + 1}" for o in stuck[:6]) + (" …" if len(stuck) > 6 else "")
+        raise EditError(
+            f"{model.name}: {len(stuck)} faces have detail to remove and none can move ({names}: {stuck[0].reason})",
+            "try --refine, --keep g0 or a smaller scale",
+        )
+
+
+def _refuse_if_worse(model: Model, before: Validity, after: Validity) -> None:
+    if before.valid and not after.valid:
+        first = after.failures[0] if after.failures else None
+        raise EditError(
+            f"{model.name}: the result would not be valid" + (f" ({first})" if first else ""),
+            "leave that face out with --faces '!#N', or use --amount 0.5 or a smaller scale",
+        )
+
+
+def write(document: Document, targets: Sequence[Path], *, schema: str, title: str, **stl: object) -> None:
+    """Write a document to every target, by its ending: all of them, or none where one cannot be written."""
+    from mracad.occ.write import write_all
+
+    write_all(document, targets, schema=schema, title=title, **stl)

@@ -1,0 +1,116 @@
+"""Face selectors: the words by which users name faces and edges of a model."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from mracad.errors import UsageError
+from mracad.model import Face, Model
+
+HINT = "select by #3, a product or face name, type:bspline, colour:#ff0000, near:X,Y,Z or cq:'>Z'; see mracad info"
+NURBS = frozenset({"bspline", "bezier"})
+
+CadQuery = Callable[[str], "set[int]"]
+
+
+@dataclass(frozen=True)
+class Selected:
+    """Faces and edges that a list of selectors names (indices)."""
+
+    faces: frozenset[int]
+    edges: frozenset[int]
+
+
+def select(model: Model, selectors: Iterable[str], everything: Iterable[int], cadquery: CadQuery | None = None) -> Selected:
+    """Union of the selectors, less those that start with ``!``; only exclusions start from ``everything``.
+
+    Parameters
+    ----------
+    model : Model
+    selectors : iterable of str
+    everything : iterable of int
+        Faces that stand for "all".
+    cadquery : callable, optional
+        Resolves ``cq:`` selectors to face indices.
+
+    Raises
+    ------
+    UsageError
+        For a selector that is malformed or matches nothing.
+    """
+    chosen: set[int] = set()
+    dropped: set[int] = set()
+    edges: set[int] = set()
+    words = list(selectors)
+    for word in words:
+        exclude = word.startswith("!")
+        text = word.removeprefix("!")
+        if text.startswith("edge#"):
+            edges.add(_number(text, text[5:], len(model.edges), "edges"))
+            continue
+        found = _faces(model, text, cadquery)
+        if not found:
+            raise UsageError(f"no face matches {word!r} in {model.name}", HINT)
+        (dropped if exclude else chosen).update(found)
+    if not any(not w.startswith(("!", "edge#")) for w in words):
+        chosen = set(everything) if any(w.startswith("!") for w in words) else set()
+    return Selected(frozenset(chosen - dropped), frozenset(edges))
+
+
+def _faces(model: Model, text: str, cadquery: CadQuery | None) -> set[int]:
+    if text.startswith("#") and text[1:].isdigit():
+        return {_number(text, text[1:], len(model.faces), "faces")}
+    if text.startswith("#"):
+        raise UsageError(f"{text!r} is not a face number", HINT)
+    if text.startswith("type:"):
+        kind = text[5:].lower()
+        return _where(model, lambda face: face.kind == kind or (kind == "nurbs" and face.kind in NURBS))
+    if text.startswith(("colour:", "color:")):
+        colour = text.split(":", 1)[1].lower()
+        return _where(model, lambda face: face.colour.lower() == colour)
+    if text.startswith("near:"):
+        return {_nearest(model, text)}
+    if text.startswith("cq:"):
+        if cadquery is None:
+            raise UsageError(f"{text!r} needs the document, not just the model", HINT)
+        return cadquery(text[3:])
+    return _where(model, lambda face: text in {face.name, face.product})
+
+
+def _where(model: Model, test: Callable[[Face], bool]) -> set[int]:
+    return {face.index for face in model.faces if test(face)}
+
+
+def _number(word: str, digits: str, count: int, what: str) -> int:
+    if not digits.isdigit() or not 1 <= int(digits) <= count:
+        raise UsageError(f"{word!r}: the model has {what} #1 to #{count}" if count else f"{word!r}: the model has no {what}", HINT)
+    return int(digits) - 1
+
+
+def _nearest(model: Model, text: str) -> int:
+    """The face whose surface sample (or box, when it is not NURBS) is nearest to the point."""
+    try:
+        point = np.array([float(x) for x in text[5:].split(",")])
+    except ValueError:
+        point = np.empty(0)
+    if point.shape != (3,) or not np.isfinite(point).all():
+        raise UsageError(f"{text!r} is not a point", "write near:X,Y,Z in millimetres, near:10,0,5.5")
+    if not model.faces:
+        raise UsageError(f"{model.name} has no faces", HINT)
+    return min(model.faces, key=lambda face: _distance(model, face, point)).index
+
+
+def _distance(model: Model, face: Face, point: np.ndarray) -> float:
+    if face.surface is None:
+        return float(np.linalg.norm(np.maximum(np.maximum(face.box[0] - point, point - face.box[1]), 0.0)))
+    net = model.surfaces[face.surface].net
+    uv = np.concatenate([trim.curve.poles for trim in face.trims]) if face.trims else None
+    domains = [np.array(k.domain) for k in (net.u, net.v)]
+    if uv is not None:
+        domains = [np.clip([uv[:, i].min(), uv[:, i].max()], *domains[i]) for i in (0, 1)]
+    local = face.frame[:3, :3].T @ (point - face.frame[:3, 3])
+    grid = net.grid(*(np.linspace(*d, 40) for d in domains))
+    return float(np.linalg.norm(grid - local, axis=-1).min())
