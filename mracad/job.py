@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mracad.audit.continuity import SeamMeasure, key, seams
@@ -115,9 +114,7 @@ def run(
         touched = {f for i in result.displacement.offsets for f in model.surfaces[i].faces}
         valid_after = check(document, faces=touched, model=model, before=valid_before)
         _refuse_if_worse(model, valid_before, valid_after)
-    return Report(
-        model, result, moved, before, after, valid_before, valid_after, time.perf_counter() - start
-    )
+    return Report(model, result, moved, before, after, valid_before, valid_after, time.perf_counter() - start)
 
 
 def _refuse_if_stuck(model: Model, result: Edit) -> None:
@@ -138,9 +135,3 @@ def _refuse_if_worse(model: Model, before: Validity, after: Validity) -> None:
             "leave that face out with --faces '!#N', or use --amount 0.5 or a smaller scale",
         )
 
-
-def write(document: Document, targets: Sequence[Path], *, schema: str, title: str, **stl: object) -> None:
-    """Write a document to every target, by its ending: all of them, or none where one cannot be written."""
-    from mracad.occ.write import write_all
-
-    write_all(document, targets, schema=schema, title=title, **stl)

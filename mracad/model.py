@@ -221,6 +221,12 @@ class Displacement:
                 index, Net(net.u, net.v, net.poles + offset.poles, net.weights), old.faces, old.origin
             )
         return Model(
-            model.name, tuple(surfaces), model.faces, model.edges, model.diagonal, model.unit, model.schema,
+            model.name,
+            tuple(surfaces),
+            model.faces,
+            model.edges,
+            model.diagonal,
+            model.unit,
+            model.schema,
             model.products,
         )

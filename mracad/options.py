@@ -43,8 +43,10 @@ class Selection(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
     faces: Annotated[
         tuple[str, ...],
-        Meta(description="Faces to edit: #3, a product or face name, type:bspline, colour:#ff0000, near:X,Y,Z, "
-             "cq:'>Z'; !SEL excludes. Default: all NURBS faces."),
+        Meta(
+            description="Faces to edit: #3, a product or face name, type:bspline, colour:#ff0000, near:X,Y,Z, "
+            "cq:'>Z'; !SEL excludes. Default: all NURBS faces."
+        ),
     ] = ()
     hold: Annotated[
         tuple[str, ...],
@@ -73,13 +75,18 @@ class Smooth(Selection, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
     scale: Annotated[
         str | None,
-        Meta(description="Wavelength (5mm, 0.2in, or 2% of the model's diagonal): ripples up to half of it go, "
-             "ripples of three times it stay."),
+        Meta(
+            description="Wavelength (5mm, 0.2in, or 2% of the model's diagonal): ripples up to half of it go, "
+            "ripples of three times it stay."
+        ),
     ] = None
     level: Annotated[
         float | None,
-        Meta(description="Instead of --scale: how many levels of the face's own knot ladder to remove, 2.5 for two "
-             "and a half.", gt=0.0),
+        Meta(
+            description="Instead of --scale: how many levels of the face's own knot ladder to remove, 2.5 for two "
+            "and a half.",
+            gt=0.0,
+        ),
     ] = None
 
     def __post_init__(self) -> None:

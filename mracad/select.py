@@ -24,7 +24,9 @@ class Selected:
     edges: frozenset[int]
 
 
-def select(model: Model, selectors: Iterable[str], everything: Iterable[int], cadquery: CadQuery | None = None) -> Selected:
+def select(
+    model: Model, selectors: Iterable[str], everything: Iterable[int], cadquery: CadQuery | None = None
+) -> Selected:
     """Union of the selectors, less those that start with ``!``; only exclusions start from ``everything``.
 
     Parameters
@@ -86,7 +88,9 @@ def _where(model: Model, test: Callable[[Face], bool]) -> set[int]:
 
 def _number(word: str, digits: str, count: int, what: str) -> int:
     if not digits.isdigit() or not 1 <= int(digits) <= count:
-        raise UsageError(f"{word!r}: the model has {what} #1 to #{count}" if count else f"{word!r}: the model has no {what}", HINT)
+        raise UsageError(
+            f"{word!r}: the model has {what} #1 to #{count}" if count else f"{word!r}: the model has no {what}", HINT
+        )
     return int(digits) - 1
 
 
@@ -107,10 +111,10 @@ def _distance(model: Model, face: Face, point: np.ndarray) -> float:
     if face.surface is None:
         return float(np.linalg.norm(np.maximum(np.maximum(face.box[0] - point, point - face.box[1]), 0.0)))
     net = model.surfaces[face.surface].net
-    uv = np.concatenate([trim.curve.poles for trim in face.trims]) if face.trims else None
-    domains = [np.array(k.domain) for k in (net.u, net.v)]
-    if uv is not None:
-        domains = [np.clip([uv[:, i].min(), uv[:, i].max()], *domains[i]) for i in (0, 1)]
+    corners = np.array([k.domain for k in (net.u, net.v)]).T
+    if face.trims:
+        uv = np.concatenate([trim.curve.poles for trim in face.trims])
+        corners = np.clip([uv.min(axis=0), uv.max(axis=0)], *corners)
     local = face.frame[:3, :3].T @ (point - face.frame[:3, 3])
-    grid = net.grid(*(np.linspace(*d, 40) for d in domains))
+    grid = net.grid(*np.linspace(*corners, 40).T)
     return float(np.linalg.norm(grid - local, axis=-1).min())

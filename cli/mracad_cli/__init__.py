@@ -1,1 +1,7 @@
 """The command line of mracad: one module a command in ``commands``."""
+
+import os
+
+# Results must not depend on the number of cores, and small matrices gain nothing from threads.
+for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ.setdefault(_name, "1")

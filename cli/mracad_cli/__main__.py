@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-import os
-import sys
-
-# Results must not depend on the number of cores, and small matrices gain nothing from threads.
-for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
-    os.environ.setdefault(_name, "1")
-
 import importlib
 import json
+import os
 import pkgutil
+import sys
 from collections.abc import Sequence
 
 import click

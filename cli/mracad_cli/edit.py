@@ -45,7 +45,11 @@ def run_edit(
         if not dry_run:
             progress("writing", 0, 1)
             targets.write(document, title(words))
-    body = {**render.report(result), "options": msgspec.to_builtins(words), "written": [] if dry_run else targets.names()}
+    body = {
+        **render.report(result),
+        "options": msgspec.to_builtins(words),
+        "written": [] if dry_run else targets.names(),
+    }
     if report:
         write_text(Path(report), json.dumps(body, indent=1, ensure_ascii=False) + "\n")
     if as_json:
@@ -65,5 +69,3 @@ def title(words: Selection) -> str:
         if value not in (None, (), [], False)
     ]
     return f"{type(words).__name__.lower()} {' '.join(given)}"
-
-

@@ -21,8 +21,10 @@ def of(struct: type[Struct]) -> Callable[[Command], Command]:
 
     def decorate(command: Command) -> Command:
         hints = typing.get_type_hints(struct, include_extras=True)
-        inherited = {name for base in struct.__mro__[1:-1] for name in getattr(base, "__struct_fields__", ())}
-        for field in sorted(structs.fields(struct), key=lambda f: f.name not in inherited):
+        base = struct.__base__
+        shared = len(structs.fields(base)) if base is not None and base is not Struct else 0
+        fields = structs.fields(struct)
+        for field in reversed(fields[shared:] + fields[:shared]):
             command = _option(field.name, hints[field.name], field.default)(command)
         return command
 
@@ -60,19 +62,35 @@ def apply(*decorators: Callable[[Command], Command]) -> Callable[[Command], Comm
 
 source = click.argument("source", metavar="IN", type=click.Path(allow_dash=True))
 outputs = click.option(
-    "-o", "--output", "outputs", metavar="OUT", multiple=True, required=True, type=click.Path(allow_dash=True),
+    "-o",
+    "--output",
+    "outputs",
+    metavar="OUT",
+    multiple=True,
+    required=True,
+    type=click.Path(allow_dash=True),
     help="File to write; its ending says the format (.step .stp .stl); repeatable; - for STEP on standard output.",
 )
 input_unit = click.option(
-    "--input-unit", metavar="UNIT", help="Length unit of the numbers in IN, where the file names a wrong one: mm, m, in …"
+    "--input-unit",
+    metavar="UNIT",
+    help="Length unit of the numbers in IN, where the file names a wrong one: mm, m, in …",
 )
 schema = click.option(
-    "--schema", type=click.Choice(["AP203", "AP214", "AP242"], case_sensitive=False), default="AP214", show_default=True,
+    "--schema",
+    type=click.Choice(["AP203", "AP214", "AP242"], case_sensitive=False),
+    default="AP214",
+    show_default=True,
     help="STEP schema to write.",
 )
 chord = click.option("--chord", metavar="LENGTH", help="STL: largest distance of triangles from the surface. [0.1%]")
 angle = click.option(
-    "--angle", type=float, default=20.0, show_default=True, metavar="DEG", help="STL: largest turn along a triangle's edge."
+    "--angle",
+    type=float,
+    default=20.0,
+    show_default=True,
+    metavar="DEG",
+    help="STL: largest turn along a triangle's edge.",
 )
 ascii_stl = click.option("--ascii", "ascii_stl", is_flag=True, help="STL: write text instead of binary.")
 overwrite = click.option("--overwrite", is_flag=True, help="Replace an existing output.")

@@ -83,7 +83,9 @@ def edit_lines(report: Report, done: str, quiet: str, written: str) -> list[str]
     smooth = report.smooth_seams()
     old, new = summary(report.before, smooth), summary(report.after, smooth)
     lines.append(seam_line(new, old))
-    worse = [a for b, a in zip(report.before, report.after, strict=True) if key(b) in smooth and a.angle > b.angle + 1e-4]
+    worse = [
+        a for b, a in zip(report.before, report.after, strict=True) if key(b) in smooth and a.angle > b.angle + 1e-4
+    ]
     if worse:
         lines[-1] += f"; {len(worse)} less smooth"
     lines.append(f"valid: {verdict(report.valid_after.valid)} (was {verdict(report.valid_before.valid)}); {written}")
@@ -92,9 +94,10 @@ def edit_lines(report: Report, done: str, quiet: str, written: str) -> list[str]
 
 def seam_line(new: SeamSummary, old: SeamSummary | None = None) -> str:
     """The seams in one line."""
-    was_angle = f" (was {degrees(old.angle)})" if old else ""
-    was_gap = f" (was {mm(old.gap)})" if old else ""
-    line = f"seams: {new.smooth} smooth of {new.seams}, angle ≤ {degrees(new.angle)}{was_angle}; gap ≤ {mm(new.gap)}{was_gap}"
+    angle, gap = degrees(new.angle), mm(new.gap)
+    if old:
+        angle, gap = f"{angle} (was {degrees(old.angle)})", f"{gap} (was {mm(old.gap)})"
+    line = f"seams: {new.smooth} smooth of {new.seams}, angle ≤ {angle}; gap ≤ {gap}"
     return line + (f"; {new.unsewn} not sewn" if new.unsewn else "")
 
 
@@ -135,7 +138,10 @@ def report(value: Report) -> dict[str, Any]:
             "before": plain(summary(value.before, smooth)),
             "after": plain(summary(value.after, smooth)),
             "each": [
-                {**seam(m), "after": {k: v for k, v in seam(after[key(m)]).items() if k not in ("edge", "faces", "sewn")}}
+                {
+                    **seam(m),
+                    "after": {k: v for k, v in seam(after[key(m)]).items() if k not in ("edge", "faces", "sewn")},
+                }
                 for m in value.before
             ],
         },

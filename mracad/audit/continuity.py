@@ -74,9 +74,7 @@ def seams(model: Model) -> list[SeamMeasure]:
     found = [_measure(edge, edge.index, (a, b), jets[2 * i], jets[2 * i + 1]) for i, (edge, a, b) in enumerate(pairs)]
     matched = [m for m in coinciding(model) if _nurbs((m[0], m[1], m[2]))]
     jets = _evaluate(model, [side for _, *sides in matched for side in sides])
-    return found + [
-        _measure(edge, -1, (a, b), jets[2 * i], jets[2 * i + 1]) for i, (edge, a, b) in enumerate(matched)
-    ]
+    return found + [_measure(edge, -1, (a, b), jets[2 * i], jets[2 * i + 1]) for i, (edge, a, b) in enumerate(matched)]
 
 
 def summary(measures: list[SeamMeasure], smooth: frozenset[tuple[int, tuple[int, int]]] | None = None) -> SeamSummary:

@@ -41,7 +41,11 @@ def coinciding(model: Model) -> list[tuple[Edge, Side, Side]]:
                 continue
             distance, uv = _carried(edge.points, other)
             if distance.max() <= tolerance:
-                found[i, j] = (edge, edge.sides[0], Side(other.sides[0].face, uv=uv) if uv is not None else _baked(edge, other))
+                found[i, j] = (
+                    edge,
+                    edge.sides[0],
+                    Side(other.sides[0].face, uv=uv) if uv is not None else _baked(edge, other),
+                )
     return list(found.values())
 
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mracad.bspline.basis import basis
-from mracad.bspline.knots import KnotVector
+from mracad.bspline.knots import KnotVector, Side
 from mracad.bspline.net import Curve, Net
 from mracad.constraint.region import crossed_cells, face_region, supported
 from mracad.model import Face
@@ -102,7 +102,7 @@ def jet_support(knots: KnotVector, at: float, highest: int) -> Array:
         at = float(nearest)
     at = min(max(at, start), end)
     touched = np.zeros(knots.count, bool)
-    places = {(at, "left"), (at, "right")}
+    places: set[tuple[float, Side]] = {(at, "left"), (at, "right")}
     if knots.periodic and at in (start, end):
         places = {(start, "right"), (end, "left")}
     for place, side in places:

@@ -184,12 +184,14 @@ def _covered(net: Net, chords: Array) -> Array:
     last = np.searchsorted(lines, np.maximum(v0, v1))
     crossings = last - first
     chord = np.repeat(np.arange(len(chords)), crossings)
-    line = np.arange(crossings.sum()) - np.repeat(crossings.cumsum() - crossings, crossings) + np.repeat(first, crossings)
+    line = (
+        np.arange(crossings.sum()) - np.repeat(crossings.cumsum() - crossings, crossings) + np.repeat(first, crossings)
+    )
     at = u0[chord] + (u1 - u0)[chord] * (lines[line] - v0[chord]) / (v1 - v0)[chord]
     toggles = np.zeros((len(columns) + 1, len(lines)), dtype=np.int64)
     np.add.at(toggles, (np.searchsorted(columns, at), line), 1)
     odd = toggles[:-1].cumsum(axis=0) % 2 == 1
-    return odd.reshape(copies[0], -1, copies[1], len(net.v.breaks) - 1).any(axis=(0, 2))
+    return np.asarray(odd.reshape(copies[0], -1, copies[1], len(net.v.breaks) - 1).any(axis=(0, 2)))
 
 
 def face_region(net: Net, face: Face) -> Region:

@@ -181,12 +181,14 @@ class _SurfaceSmoothing:
         """S f at the scale or level asked for; None where the knots allow no coarser space."""
         if scale is not None:
             coarse = tuple(
-                ladder_for_scale(k, s, scale, keep=c) for k, s, c in zip(_pair(self.net), self.spans, self.creases, strict=True)
+                ladder_for_scale(k, s, scale, keep=c)
+                for k, s, c in zip(_pair(self.net), self.spans, self.creases, strict=True)
             )
             return None if coarse == _pair(self.net) else self._projected(coarse, scale)
         assert self.options.level is not None
         ladders = [
-            rungs_by_level(k, keep=c, lengths=s) for k, s, c in zip(_pair(self.net), self.spans, self.creases, strict=True)
+            rungs_by_level(k, keep=c, lengths=s)
+            for k, s, c in zip(_pair(self.net), self.spans, self.creases, strict=True)
         ]
         if all(len(rungs) == 1 for rungs in ladders):
             return None
@@ -194,8 +196,10 @@ class _SurfaceSmoothing:
         levels = [self._rung(ladders, whole)] + ([self._rung(ladders, whole + 1)] if part else [])
         weights = [1.0 - part, part][: len(levels)]
         return _Target(
-            *(sum(w * getattr(t, name) for w, t in zip(weights, levels, strict=True))
-              for name in ("poles", "along_u", "along_v", "scale"))
+            *(
+                sum(w * getattr(t, name) for w, t in zip(weights, levels, strict=True))
+                for name in ("poles", "along_u", "along_v", "scale")
+            )
         )
 
     def _rung(self, ladders: list[list[KnotVector]], level: int) -> _Target:
@@ -224,9 +228,7 @@ class _SurfaceSmoothing:
                 self.fairing = 0.0
         return np.where(free[..., None], x - f, 0.0)
 
-    def _refine(
-        self, faces: list[Face], edited: Collection[int], target: _Target
-    ) -> tuple[Array, Array, Array] | None:
+    def _refine(self, faces: list[Face], edited: Collection[int], target: _Target) -> tuple[Array, Array, Array] | None:
         """Halve knot spans, the longer ones first, until an eighth of the visible points is free."""
         net = self.net
         u_knots, v_knots = np.empty(0), np.empty(0)
@@ -292,8 +294,8 @@ def _crease_lines(net: Net, axis: int, inside: Array) -> Array:
     for line in full:
         seen = np.repeat(inside[line - 1] | inside[line], len(fractions))
         points = np.stack([np.full(seen.sum(), knots.breaks[line]), across[seen]], axis=1)[:, :: 1 - 2 * axis]
-        sides = [("left", "right"), ("right", "right")] if axis == 0 else [("right", "left"), ("right", "right")]
-        before, after = (net.normals(np.ascontiguousarray(points), side=side) for side in sides)
+        before = net.normals(np.ascontiguousarray(points), side=("left", "right") if axis == 0 else ("right", "left"))
+        after = net.normals(np.ascontiguousarray(points))
         turn = np.arctan2(np.linalg.norm(np.cross(before, after), axis=1), (before * after).sum(axis=1))
         if np.nanmax(turn, initial=0.0) > KINK:
             creases.append(knots.breaks[line])

@@ -15,17 +15,38 @@ from mracad_cli.progress import Progress
 @options.apply(
     options.reading,
     click.option("--max-gap", metavar="LENGTH", help="Largest gap along any seam of a NURBS face."),
-    click.option("--max-angle", metavar="DEG", type=click.FloatRange(min=0.0),
-                 help="Largest angle along seams that are meant to be smooth."),
-    click.option("--kink", metavar="DEG", type=click.FloatRange(min=0.0), default=1.0, show_default=True,
-                 help="A seam with a smaller angle is meant to be smooth."),
-    click.option("--fail-on", multiple=True, type=click.Choice(["invalid", "free-edges", "unsewn", "nothing"]),
-                 default=["invalid"], show_default=True, help="What else fails the check; repeatable."),
+    click.option(
+        "--max-angle",
+        metavar="DEG",
+        type=click.FloatRange(min=0.0),
+        help="Largest angle along seams that are meant to be smooth.",
+    ),
+    click.option(
+        "--kink",
+        metavar="DEG",
+        type=click.FloatRange(min=0.0),
+        default=1.0,
+        show_default=True,
+        help="A seam with a smaller angle is meant to be smooth.",
+    ),
+    click.option(
+        "--fail-on",
+        multiple=True,
+        type=click.Choice(["invalid", "free-edges", "unsewn", "nothing"]),
+        default=["invalid"],
+        show_default=True,
+        help="What else fails the check; repeatable.",
+    ),
     options.printing,
 )
 def command(
-    source: str, input_unit: str | None, max_gap: str | None, max_angle: float | None, kink: float,
-    fail_on: tuple[str, ...], as_json: bool,
+    source: str,
+    input_unit: str | None,
+    max_gap: str | None,
+    max_angle: float | None,
+    kink: float,
+    fail_on: tuple[str, ...],
+    as_json: bool,
 ) -> int:
     from mracad.audit.continuity import key, seams, summary
     from mracad.occ.check import check
@@ -51,21 +72,28 @@ def command(
         failures.append(f"{render.plural(totals.unsewn, 'seam')} not sewn")
     failures += [
         f"gap {render.mm(m.gap)} between #{m.faces[0] + 1} and #{m.faces[1] + 1}"
-        for m in measures if widest is not None and m.gap > widest
+        for m in measures
+        if widest is not None and m.gap > widest
     ]
     failures += [
         f"angle {render.degrees(m.angle)} between #{m.faces[0] + 1} and #{m.faces[1] + 1}"
-        for m in meant if max_angle is not None and m.angle > max_angle
+        for m in meant
+        if max_angle is not None and m.angle > max_angle
     ]
     if as_json:
         body = {
-            "file": model.name, "passed": not failures, "failures": failures, "valid": render.validity(valid),
+            "file": model.name,
+            "passed": not failures,
+            "failures": failures,
+            "valid": render.validity(valid),
             "seams": {**render.plain(totals), "each": [render.seam(m) for m in measures]},
         }
         print(json.dumps(body, ensure_ascii=False))
         return 1 if failures else 0
-    print(f"{model.name}: {render.plural(valid.solids, 'solid')}, {render.plural(valid.shells, 'shell')}, "
-          f"{render.plural(valid.faces, 'face')}, {render.plural(valid.free_edges, 'free edge')}")
+    print(
+        f"{model.name}: {render.plural(valid.solids, 'solid')}, {render.plural(valid.shells, 'shell')}, "
+        f"{render.plural(valid.faces, 'face')}, {render.plural(valid.free_edges, 'free edge')}"
+    )
     print(f"valid: {render.verdict(valid.valid)}; largest tolerance {render.mm(valid.max_tolerance)}")
     print(render.seam_line(totals))
     for failure in failures:

@@ -21,9 +21,16 @@ if TYPE_CHECKING:
 @click.command(help=__doc__)
 @options.apply(
     options.reading,
-    click.option("--scale", metavar="LENGTH", default="2%", show_default=True, help="Scale at which to judge smoothing."),
-    click.option("--keep", type=click.Choice(["g0", "g1", "g2"]), default="g1", show_default=True,
-                 help="Continuity that smoothing would keep; it decides which poles are free."),
+    click.option(
+        "--scale", metavar="LENGTH", default="2%", show_default=True, help="Scale at which to judge smoothing."
+    ),
+    click.option(
+        "--keep",
+        type=click.Choice(["g0", "g1", "g2"]),
+        default="g1",
+        show_default=True,
+        help="Continuity that smoothing would keep; it decides which poles are free.",
+    ),
     click.option("--all", "everything", is_flag=True, help="List the faces that are not NURBS and every seam too."),
     options.printing,
 )
@@ -39,7 +46,9 @@ def command(source: str, input_unit: str | None, scale: str, keep: Any, everythi
         document = read(source, input_unit)
         model = view(document)
         outcomes = smooth(
-            model, Smooth(scale=scale, keep=keep), progress=lambda done, total: progress("looking at faces", done, total)
+            model,
+            Smooth(scale=scale, keep=keep),
+            progress=lambda done, total: progress("looking at faces", done, total),
         ).outcomes
         measures = seams(model)
         progress("checking", 0, 1)
@@ -78,8 +87,13 @@ def command(source: str, input_unit: str | None, scale: str, keep: Any, everythi
         _table(
             ["edge", "faces", "gap mm", "angle °", "at"],
             [
-                (f"edge#{m.edge + 1}" if m.sewn else "not sewn", "#{} #{}".format(*(i + 1 for i in m.faces)),
-                 f"{m.gap:.2g}", f"{m.angle:.3g}", " ".join(f"{x:.4g}" for x in m.where))
+                (
+                    f"edge#{m.edge + 1}" if m.sewn else "not sewn",
+                    "#{} #{}".format(*(i + 1 for i in m.faces)),
+                    f"{m.gap:.2g}",
+                    f"{m.angle:.3g}",
+                    " ".join(f"{x:.4g}" for x in m.where),
+                )
                 for m in measures
             ],
         )
@@ -89,8 +103,13 @@ def command(source: str, input_unit: str | None, scale: str, keep: Any, everythi
 def _facts(model: Model, face: Face) -> dict[str, Any]:
     """What a face is; lengths in millimetres."""
     facts: dict[str, Any] = {
-        "face": face.index + 1, "name": face.name, "product": face.product, "colour": face.colour, "kind": face.kind,
-        "instances": face.instances, "box": face.box.tolist(),
+        "face": face.index + 1,
+        "name": face.name,
+        "product": face.product,
+        "colour": face.colour,
+        "kind": face.kind,
+        "instances": face.instances,
+        "box": face.box.tolist(),
     }
     if face.surface is not None:
         net = model.surfaces[face.surface].net
@@ -123,15 +142,27 @@ def _row(model: Model, face: Face, outcome: FaceOutcome) -> Sequence[str]:
     if face.surface is None:
         return f"#{face.index + 1}", face.kind, "", "", "", "", "", outcome.reason, "", name
     net = model.surfaces[face.surface].net
-    shape = [word for word, true in (
-        ("rational", net.weights is not None), ("periodic", net.u.periodic or net.v.periodic),
-        (f"{outcome.creases} crease lines", outcome.creases),
-    ) if true]
+    shape = [
+        word
+        for word, true in (
+            ("rational", net.weights is not None),
+            ("periodic", net.u.periodic or net.v.periodic),
+            (f"{outcome.creases} crease lines", outcome.creases),
+        )
+        if true
+    ]
     verdict = f"changes by {outcome.moved:.2g} mm" if outcome.status == "edited" else outcome.reason
     return (
-        f"#{face.index + 1}", face.kind, f"{net.u.degree}x{net.v.degree}", "x".join(map(str, net.poles.shape[:2])),
-        " ".join(shape), f"{outcome.free}/{outcome.points}", f"{outcome.spans[0]:.3g}–{outcome.spans[1]:.3g}", verdict,
-        f"{outcome.scale:.3g} mm" if outcome.scale else "never", name,
+        f"#{face.index + 1}",
+        face.kind,
+        f"{net.u.degree}x{net.v.degree}",
+        "x".join(map(str, net.poles.shape[:2])),
+        " ".join(shape),
+        f"{outcome.free}/{outcome.points}",
+        f"{outcome.spans[0]:.3g}–{outcome.spans[1]:.3g}",
+        verdict,
+        f"{outcome.scale:.3g} mm" if outcome.scale else "never",
+        name,
     )
 
 

@@ -1,0 +1,67 @@
+# mracad: multiresolution editing for CAD models.
+#
+#   make demo    set everything up and smooth a sample
+#   make test    set everything up and run the tests
+#
+# The pattern rule below is the use the tool is for: copy it into a Makefile beside your own models.
+
+PYTHON ?= python3
+VENV   ?= .venv
+BIN    := $(VENV)/bin
+SCALE  ?= 5%
+
+export PIP_CONSTRAINT := $(abspath constraints.txt)
+export PIP_DISABLE_PIP_VERSION_CHECK := 1
+export SOURCE_DATE_EPOCH ?= 0
+
+SAMPLES := $(wildcard samples/*.step)
+
+.PHONY: demo test lint bench samples smooth wheel clean
+
+demo: $(VENV)/ready
+	@mkdir -p build
+	@echo 'mracad smooth samples/panel.step --scale 25mm -o build/panel.smooth.step -o build/panel.smooth.stl'
+	@$(BIN)/mracad smooth samples/panel.step --scale 25mm --overwrite -o build/panel.smooth.step -o build/panel.smooth.stl
+	@echo 'The result lies in build/panel.smooth.step (and .stl); compare it with samples/panel.step.'
+
+test: $(VENV)/dev
+	$(BIN)/python -m pytest -n 2
+
+lint: $(VENV)/dev
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+bench: $(VENV)/dev
+	$(BIN)/python benchmarks/transform.py
+	$(BIN)/python benchmarks/command.py
+
+samples: $(VENV)/ready
+	$(BIN)/python samples/make.py samples
+
+# All samples smoothed: make smooth SCALE=2% -j2
+smooth: $(SAMPLES:samples/%.step=build/%.smooth.step)
+
+build/%.smooth.step: samples/%.step $(VENV)/ready
+	@mkdir -p $(@D)
+	$(BIN)/mracad smooth $< --scale $(SCALE) --overwrite -o $@
+
+build/%.stl: build/%.step
+	$(BIN)/mracad convert $< --overwrite -o $@
+
+wheel: $(VENV)/dev
+	$(BIN)/python -m build --wheel
+
+$(VENV)/ready: pyproject.toml constraints.txt
+	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "mracad needs Python 3.11 or newer: make PYTHON=python3.11")'
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/pip install --quiet --editable .
+	@touch $@
+
+$(VENV)/dev: $(VENV)/ready
+	$(BIN)/pip install --quiet --editable '.[dev]'
+	@touch $@
+
+clean:
+	rm -rf build dist .pytest_cache .mypy_cache .ruff_cache .import_linter_cache
