@@ -6,10 +6,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 
-import numpy as np
 from OCP.Geom import Geom_BSplineSurface
+from OCP.Geom2d import Geom2d_Curve
 from OCP.Quantity import Quantity_Color
-from OCP.TCollection import TCollection_ExtendedString
 from OCP.TDataStd import TDataStd_Name
 from OCP.TDF import TDF_Label, TDF_LabelSequence
 from OCP.TDocStd import TDocStd_Document
@@ -21,8 +20,6 @@ from OCP.TopTools import TopTools_IndexedMapOfShape
 from OCP.XCAFDoc import XCAFDoc_ColorTool, XCAFDoc_ColorType, XCAFDoc_DocumentTool, XCAFDoc_ShapeTool
 
 from mracad.occ.units import Units
-
-Array = np.ndarray
 
 
 @dataclass(eq=False)
@@ -39,8 +36,8 @@ class Part:
         Document-wide index of its first face.
     faces : TopTools_IndexedMapOfShape
         Its faces, from 1.
-    placements : list of ndarray (4, 4)
-        Where its instances stand, in memory units.
+    placements : list of TopLoc_Location
+        Where its instances stand.
     colour : str
         Of the whole part (or its first coloured instance), ``"#rrggbb"`` or ``""``.
     face_names, face_colours : dict
@@ -52,7 +49,7 @@ class Part:
     product: str
     first: int
     faces: TopTools_IndexedMapOfShape
-    placements: list[Array]
+    placements: list[TopLoc_Location]
     colour: str
     face_names: dict[int, str]
     face_colours: dict[int, str]
@@ -65,12 +62,15 @@ class Conversion:
     Attributes
     ----------
     surface : Geom_BSplineSurface
-    pcurves : list
+    pcurves : list of Geom2d_Curve
         For each edge use of the face, in its own order, the curve on ``surface``, over the edge's own range.
+    tolerances : list of float
+        What each edge needs at least, memory units.
     """
 
     surface: Geom_BSplineSurface
-    pcurves: list
+    pcurves: list[Geom2d_Curve]
+    tolerances: list[float]
 
 
 @dataclass(eq=False)
@@ -118,10 +118,10 @@ class Document:
     @cached_property
     def parts(self) -> list[Part]:
         """The shape definitions that hold geometry, in document order."""
-        placed: dict[str, list[Array]] = {}
+        placed: dict[str, list[TopLoc_Location]] = {}
         tints: dict[str, str] = {}
         for label in _labels(self.shape_tool.GetFreeShapes):
-            _walk(label, np.eye(4), "", placed, tints)
+            _walk(label, TopLoc_Location(), "", placed, tints)
         parts: list[Part] = []
         first = 0
         for label in _labels(self.shape_tool.GetShapes):
@@ -145,15 +145,6 @@ class Document:
     def faces(self) -> list[TopoDS_Face]:
         """All faces, in their part's frame, in the order of ``Model.faces``."""
         return [TopoDS.Face_s(part.faces.FindKey(i)) for part in self.parts for i in range(1, part.faces.Extent() + 1)]
-
-
-def matrix(location: TopLoc_Location) -> Array:
-    """A location as a 4 × 4 matrix."""
-    out = np.eye(4)
-    if not location.IsIdentity():
-        transform = location.Transformation()
-        out[:3] = [[transform.Value(i, j) for j in (1, 2, 3, 4)] for i in (1, 2, 3)]
-    return out
 
 
 def label_key(label: TDF_Label) -> str:
@@ -191,9 +182,15 @@ def _labels(fill) -> Iterator[TDF_Label]:
         yield sequence.Value(i)
 
 
-def _walk(label: TDF_Label, frame: Array, colour: str, placed: dict[str, list[Array]], tints: dict[str, str]) -> None:
+def _walk(
+    label: TDF_Label,
+    frame: TopLoc_Location,
+    colour: str,
+    placed: dict[str, list[TopLoc_Location]],
+    tints: dict[str, str],
+) -> None:
     """Follow an assembly down to its parts; note where each stands and the colour its instances give it."""
-    frame = frame @ matrix(XCAFDoc_ShapeTool.GetLocation_s(label))
+    frame = frame * XCAFDoc_ShapeTool.GetLocation_s(label)
     colour = colour or label_colour(label)
     if XCAFDoc_ShapeTool.IsReference_s(label):
         referred = TDF_Label()

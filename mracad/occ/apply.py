@@ -1,0 +1,104 @@
+"""Put an edit into the document: control points move in place, everything else stays."""
+
+from __future__ import annotations
+
+import numpy as np
+from OCP.BRep import BRep_Tool
+from OCP.BRepTools import BRepTools
+from OCP.Geom import Geom_BezierSurface, Geom_BSplineSurface
+from OCP.GeomConvert import GeomConvert
+from OCP.gp import gp_Pnt
+from OCP.TColStd import TColStd_Array1OfInteger, TColStd_Array1OfReal
+from OCP.TDF import TDF_ChildIterator
+from OCP.TopAbs import TopAbs_FORWARD
+from OCP.TopLoc import TopLoc_Location
+from OCP.TopoDS import TopoDS
+from OCP.XCAFDoc import XCAFDoc_Area, XCAFDoc_Centroid, XCAFDoc_Volume
+
+from mracad.errors import MracadError
+from mracad.model import Displacement, Model, Offset, Surface
+from mracad.occ.convert import lay
+from mracad.occ.document import Document
+from mracad.occ.geometry import basis, nets
+from mracad.occ.settings import quiet
+from mracad.occ.topology import edge_uses
+
+Array = np.ndarray
+
+
+def apply(document: Document, model: Model, displacement: Displacement) -> None:
+    """Displace the surfaces of a document, in place.
+
+    Knots are inserted exactly; then only those control points move whose offset is not zero, all others keep every
+    bit.  Faces that were seen as NURBS by ``view(document, convert=…)`` are put on their new surfaces first.
+    Triangulations, and the areas, volumes and centroids that the file states, are dropped.
+
+    Parameters
+    ----------
+    document : Document
+    model : Model
+        The view of the document that the displacement was made for.
+    displacement : Displacement
+    """
+    with quiet():
+        for index, offset in sorted(displacement.offsets.items()):
+            surface = model.surfaces[index]
+            handle = _handle(document, surface, refined=bool(offset.u_knots.size or offset.v_knots.size))
+            if isinstance(handle, Geom_BSplineSurface):
+                _refine(handle, offset)
+            _move(handle, offset, document.unit_mm)
+        if displacement.offsets:
+            _forget(document)
+
+
+def _handle(document: Document, surface: Surface, refined: bool) -> Geom_BSplineSurface | Geom_BezierSurface:
+    """The kernel's surface to be moved, put on its faces where it is new to them."""
+    first = surface.faces[0]
+    if first in document.conversions:
+        made = document.conversions.pop(first)
+        lay(TopoDS.Face_s(document.faces[first].Oriented(TopAbs_FORWARD)), made.surface, made.pcurves, made.tolerances)
+        return made.surface
+    handle = basis(BRep_Tool.Surface_s(document.faces[first], TopLoc_Location()))
+    if not (refined and isinstance(handle, Geom_BezierSurface)):
+        return handle
+    spline = GeomConvert.SurfaceToBSplineSurface_s(handle)
+    for face in (TopoDS.Face_s(document.faces[index].Oriented(TopAbs_FORWARD)) for index in surface.faces):
+        edges = list(edge_uses(face))
+        pcurves = [BRep_Tool.CurveOnSurface_s(edge, face, 0.0, 0.0) for edge in edges]
+        lay(face, spline, pcurves, [BRep_Tool.Tolerance_s(edge) for edge in edges])
+    return spline
+
+
+def _refine(surface: Geom_BSplineSurface, offset: Offset) -> None:
+    """Insert the knots that an offset brings."""
+    for knots, insert in ((offset.u_knots, surface.InsertUKnots), (offset.v_knots, surface.InsertVKnots)):
+        if knots.size:
+            values, counts = np.unique(knots, return_counts=True)
+            places = TColStd_Array1OfReal(1, len(values))
+            times = TColStd_Array1OfInteger(1, len(values))
+            for i, (value, count) in enumerate(zip(values.tolist(), counts.tolist(), strict=True), 1):
+                places.SetValue(i, value)
+                times.SetValue(i, count)
+            insert(places, times, 0.0, True)
+
+
+def _move(surface: Geom_BSplineSurface | Geom_BezierSurface, offset: Offset, unit_mm: float) -> None:
+    """Add an offset to the control points of a surface."""
+    poles = nets([surface])[0].poles
+    if poles.shape != offset.poles.shape:
+        raise MracadError(f"offsets of shape {offset.poles.shape} for a surface of {poles.shape} control points")
+    moved = np.argwhere(offset.poles.any(axis=2))
+    new = poles[tuple(moved.T)] + offset.poles[tuple(moved.T)] / unit_mm
+    for (i, j), pole in zip((moved + 1).tolist(), new.tolist(), strict=True):
+        surface.SetPole(i, j, gp_Pnt(*pole))
+
+
+def _forget(document: Document) -> None:
+    """Drop what is no longer true of the moved geometry."""
+    for part in document.parts:
+        BRepTools.Clean_s(part.shape)
+    labels = TDF_ChildIterator(document.shape_tool.Label(), True)
+    while labels.More():
+        for property_of in (XCAFDoc_Area, XCAFDoc_Volume, XCAFDoc_Centroid):
+            labels.Value().ForgetAttribute(property_of.GetID_s())
+        labels.Next()

@@ -1,0 +1,188 @@
+"""The kernel's verdict on a document, as plain data."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+from OCP.Adaptor3d import Adaptor3d_CurveOnSurface
+from OCP.BRep import BRep_Builder, BRep_Tool
+from OCP.BRepAdaptor import BRepAdaptor_Curve, BRepAdaptor_Curve2d, BRepAdaptor_Surface
+from OCP.BRepCheck import BRepCheck_Analyzer, BRepCheck_NoError
+from OCP.BRepLib import BRepLib_ValidateEdge
+from OCP.ShapeAnalysis import ShapeAnalysis_ShapeTolerance
+from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_FORWARD, TopAbs_SHELL, TopAbs_SOLID, TopAbs_VERTEX, TopAbs_WIRE
+from OCP.TopExp import TopExp
+from OCP.TopoDS import TopoDS, TopoDS_Compound, TopoDS_Face, TopoDS_Shape
+from OCP.TopTools import TopTools_IndexedMapOfShape
+
+from mracad.occ.document import Document
+from mracad.occ.settings import quiet
+from mracad.occ.topology import edge_uses
+
+_KINDS = {
+    TopAbs_SOLID: "solid", TopAbs_SHELL: "shell", TopAbs_FACE: "face", TopAbs_WIRE: "wire", TopAbs_EDGE: "edge",
+    TopAbs_VERTEX: "vertex",
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Failure:
+    """One finding of the kernel's check.
+
+    Attributes
+    ----------
+    kind : str
+        ``"face"``, ``"wire"``, ``"edge"``, ``"vertex"``, ``"shell"`` or ``"solid"``.
+    status : str
+        The kernel's name for it, as ``"SelfIntersectingWire"``.
+    face : int or None
+        Index of the face in which it was found; None for shells and solids.
+    """
+
+    kind: str
+    status: str
+    face: int | None
+
+
+@dataclass(frozen=True)
+class Validity:
+    """What the kernel says of a document; a part that is instanced counts once.
+
+    Attributes
+    ----------
+    valid : bool
+    failures : tuple of Failure
+    solids, shells, faces, open_shells : int
+        Of the whole document.
+    free_edges : int
+        Edges that one face uses once.
+    edge_tolerance, vertex_tolerance : float
+        The largest among the faces that were checked, mm.
+    curve_distance : float or None
+        Largest distance between an edge's 3D curve and its curve on a face that was checked, at equal parameters, mm.
+    """
+
+    valid: bool
+    failures: tuple[Failure, ...]
+    solids: int
+    shells: int
+    faces: int
+    open_shells: int
+    free_edges: int
+    edge_tolerance: float
+    vertex_tolerance: float
+    curve_distance: float | None = None
+
+
+def check(document: Document, faces: Iterable[int] | None = None, distances: bool = False) -> Validity:
+    """Check the geometry of a document.
+
+    Parameters
+    ----------
+    document : Document
+    faces : iterable of int, optional
+        Check only these (with their edges and vertices): what an edit in place can have spoiled.  By default all, and
+        shells and solids too.
+    distances : bool
+        Measure ``curve_distance``, too.
+    """
+    chosen = range(len(document.faces)) if faces is None else sorted(set(faces))
+    members = [document.faces[index] for index in chosen]
+    subject = _compound(members if faces is not None else [part.shape for part in document.parts])
+    with quiet():
+        analyzer = BRepCheck_Analyzer(subject, True, True)
+        failures = () if analyzer.IsValid() else tuple(_failures(analyzer, subject, chosen, members))
+        tolerance = ShapeAnalysis_ShapeTolerance()
+        unit = document.unit_mm
+        shells = [shell for part in document.parts for shell in _inside(part.shape, TopAbs_SHELL)]
+        return Validity(
+            valid=not failures,
+            failures=failures,
+            solids=sum(1 for part in document.parts for _ in _inside(part.shape, TopAbs_SOLID)),
+            shells=len(shells),
+            faces=len(document.faces),
+            open_shells=sum(not BRep_Tool.IsClosed_s(shell) for shell in shells),
+            free_edges=_free_edges(document),
+            edge_tolerance=tolerance.Tolerance(subject, 1, TopAbs_EDGE) * unit,
+            vertex_tolerance=tolerance.Tolerance(subject, 1, TopAbs_VERTEX) * unit,
+            curve_distance=max(map(_distance, members), default=0.0) * unit if distances else None,
+        )
+
+
+def _compound(shapes: Iterable[TopoDS_Shape]) -> TopoDS_Compound:
+    compound = TopoDS_Compound()
+    builder = BRep_Builder()
+    builder.MakeCompound(compound)
+    for shape in shapes:
+        builder.Add(compound, shape)
+    return compound
+
+
+def _inside(shape: TopoDS_Shape, kind) -> Iterator[TopoDS_Shape]:
+    """The distinct sub-shapes of one kind."""
+    found = TopTools_IndexedMapOfShape()
+    TopExp.MapShapes_s(shape, kind, found)
+    return (found.FindKey(i) for i in range(1, found.Extent() + 1))
+
+
+def _failures(
+    analyzer: BRepCheck_Analyzer, subject: TopoDS_Shape, chosen: Iterable[int], members: list[TopoDS_Face]
+) -> Iterator[Failure]:
+    """Everything that the analyzer holds against the subject."""
+    for kind in (TopAbs_SOLID, TopAbs_SHELL):
+        for shape in _inside(subject, kind):
+            for status in _statuses(analyzer, shape, shape):
+                yield Failure(_KINDS[kind], status, None)
+    for index, face in zip(chosen, members, strict=True):
+        if analyzer.IsValid(face):
+            continue
+        for kind in (TopAbs_FACE, TopAbs_WIRE, TopAbs_EDGE, TopAbs_VERTEX):
+            for shape in _inside(face, kind):
+                for status in _statuses(analyzer, shape, face):
+                    yield Failure(_KINDS[kind], status, index)
+
+
+def _statuses(analyzer: BRepCheck_Analyzer, shape: TopoDS_Shape, context: TopoDS_Shape) -> list[str]:
+    """What is wrong with a shape by itself and within another, by name."""
+    result = analyzer.Result(shape)
+    found = list(result.Status())
+    result.InitContextIterator()
+    while result.MoreShapeInContext():
+        if result.ContextualShape().IsSame(context):
+            found += list(result.StatusOnShape())
+        result.NextShapeInContext()
+    names = (status.name.removeprefix("BRepCheck_") for status in found if status != BRepCheck_NoError)
+    return list(dict.fromkeys(names))
+
+
+def _free_edges(document: Document) -> int:
+    """Edges that one face uses once, degenerate ones left out."""
+    free = 0
+    for part in document.parts:
+        edges = TopTools_IndexedMapOfShape()
+        counts: dict[int, int] = {}
+        for face in document.faces[part.first : part.first + part.faces.Extent()]:
+            for edge in edge_uses(face):
+                place = edges.Add(edge)
+                counts[place] = counts.get(place, 0) + 1
+        free += sum(
+            not BRep_Tool.Degenerated_s(TopoDS.Edge_s(edges.FindKey(place)))
+            for place, count in counts.items()
+            if count == 1
+        )
+    return free
+
+
+def _distance(face: TopoDS_Face) -> float:
+    """Largest distance between the 3D curves of a face's edges and their curves on it, memory units."""
+    forward = TopoDS.Face_s(face.Oriented(TopAbs_FORWARD))
+    surface = BRepAdaptor_Surface(forward, False)
+    worst = 0.0
+    for edge in edge_uses(forward):
+        if not BRep_Tool.Degenerated_s(edge):
+            on_face = Adaptor3d_CurveOnSurface(BRepAdaptor_Curve2d(edge, forward), surface)
+            validate = BRepLib_ValidateEdge(BRepAdaptor_Curve(edge), on_face, True)
+            validate.Process()
+            worst = max(worst, validate.GetMaxDistance())
+    return worst

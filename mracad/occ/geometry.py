@@ -1,0 +1,142 @@
+"""Curves and surfaces out of the kernel in bulk.
+
+Asking for poles one at a time costs a microsecond each; the kernel's binary writer hands over the same numbers at a
+fraction of that, and numpy reads them where they lie.
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+
+import numpy as np
+from OCP.BinTools import BinTools_Curve2dSet, BinTools_SurfaceSet
+from OCP.Geom import Geom_BezierSurface, Geom_BSplineSurface, Geom_RectangularTrimmedSurface, Geom_Surface
+from OCP.Geom2d import Geom2d_BSplineCurve, Geom2d_Curve, Geom2d_Line, Geom2d_TrimmedCurve
+from OCP.Geom2dConvert import Geom2dConvert
+
+from mracad.bspline.knots import KnotVector
+from mracad.bspline.net import Curve, Net
+
+Array = np.ndarray
+_KNOTS = np.dtype([("knot", "<f8"), ("mult", "<i4")])
+_SAME_RANGE = 1e-9  # relative to the range: a curve whose domain differs by less is used as it is
+
+
+def basis(surface: Geom_Surface) -> Geom_Surface:
+    """The surface under any rectangular trimming."""
+    while isinstance(surface, Geom_RectangularTrimmedSurface):
+        surface = surface.BasisSurface()
+    return surface
+
+
+def is_nurbs(surface: Geom_Surface) -> bool:
+    """Whether an (untrimmed) surface is a B-spline or Bézier surface."""
+    return isinstance(surface, Geom_BSplineSurface | Geom_BezierSurface)
+
+
+def nets(surfaces: Sequence[Geom_Surface], scale: float = 1.0) -> list[Net]:
+    """The control nets of B-spline and Bézier surfaces.
+
+    Parameters
+    ----------
+    surfaces : sequence of Geom_BSplineSurface or Geom_BezierSurface
+        All different.
+    scale : float
+        Factor on the poles (memory unit to mm).
+    """
+    collection = BinTools_SurfaceSet()
+    for surface in surfaces:
+        collection.Add(surface)
+    stream = _Stream(collection)
+    return [_net(stream, isinstance(surface, Geom_BezierSurface), scale) for surface in surfaces]
+
+
+def curves(pieces: Sequence[tuple[Geom2d_Curve, float, float]]) -> list[Curve]:
+    """Plane curves as NURBS, each over its own range.
+
+    Parameters
+    ----------
+    pieces : sequence of (curve, first, last)
+        A conic keeps its trace and its ends, but inside the range its parameter runs differently.
+    """
+    splines: list[Geom2d_BSplineCurve | None] = [_spline(*piece) for piece in pieces]
+    collection = BinTools_Curve2dSet()
+    places = [collection.Add(spline) if spline is not None else 0 for spline in splines]
+    stream = _Stream(collection)
+    read = [_curve(stream) for _ in range(max(places, default=0))]
+    return [read[place - 1] if place else _segment(*piece) for piece, place in zip(pieces, places, strict=True)]
+
+
+class _Stream:
+    """What the kernel's binary writer wrote, read from the front: little-endian on every machine."""
+
+    def __init__(self, collection: BinTools_SurfaceSet | BinTools_Curve2dSet) -> None:
+        buffer = io.BytesIO()
+        collection.Write(buffer)
+        self.data = buffer.getvalue()
+        self.at = self.data.index(b"\n") + 1
+
+    def take(self, dtype: str | np.dtype, count: int) -> Array:
+        """The next ``count`` values."""
+        values = np.frombuffer(self.data, dtype, count, self.at)
+        self.at += values.nbytes
+        return values
+
+
+def _net(stream: _Stream, bezier: bool, scale: float) -> Net:
+    """The next surface."""
+    if bezier:
+        _, u_rational, v_rational = stream.take("u1", 3).tolist()
+        p, q = stream.take("<u2", 2).tolist()
+        poles, weights = _poles(stream, (p + 1, q + 1), 3, u_rational or v_rational)
+        u, v = KnotVector.clamped([0.0, 1.0], p), KnotVector.clamped([0.0, 1.0], q)
+    else:
+        _, u_rational, v_rational, u_periodic, v_periodic = stream.take("u1", 5).tolist()
+        p, q = stream.take("<u2", 2).tolist()
+        nu, nv, mu, mv = stream.take("<i4", 4).tolist()
+        poles, weights = _poles(stream, (nu, nv), 3, u_rational or v_rational)
+        u = _knots(stream, mu, p, bool(u_periodic))
+        v = _knots(stream, mv, q, bool(v_periodic))
+    return Net(u, v, poles if scale == 1.0 else poles * scale, weights)
+
+
+def _curve(stream: _Stream) -> Curve:
+    """The next B-spline curve."""
+    _, rational, periodic = stream.take("u1", 3).tolist()
+    (degree,) = stream.take("<u2", 1).tolist()
+    count, knots = stream.take("<i4", 2).tolist()
+    poles, weights = _poles(stream, (count,), 2, rational)
+    return Curve(_knots(stream, knots, degree, bool(periodic)), poles, weights)
+
+
+def _poles(stream: _Stream, shape: tuple[int, ...], dimension: int, rational: int) -> tuple[Array, Array | None]:
+    """Poles, and weights where the kernel interleaves them."""
+    width = dimension + bool(rational)
+    values = stream.take("<f8", int(np.prod(shape)) * width).reshape(*shape, width)
+    poles = np.ascontiguousarray(values[..., :dimension])
+    return poles, np.ascontiguousarray(values[..., dimension]) if rational else None
+
+
+def _knots(stream: _Stream, count: int, degree: int, periodic: bool) -> KnotVector:
+    table = stream.take(_KNOTS, count)
+    return KnotVector.from_multiplicities(table["knot"], table["mult"], degree, periodic)
+
+
+def _spline(curve: Geom2d_Curve, first: float, last: float) -> Geom2d_BSplineCurve | None:
+    """A plane curve over its range as a B-spline; None for a line, which needs none."""
+    if isinstance(curve, Geom2d_Line):
+        return None
+    slack = _SAME_RANGE * (last - first)
+    whole = abs(curve.FirstParameter() - first) <= slack and abs(curve.LastParameter() - last) <= slack
+    if isinstance(curve, Geom2d_BSplineCurve) and whole and not curve.IsPeriodic():
+        return curve
+    if whole and not curve.IsPeriodic():
+        return Geom2dConvert.CurveToBSplineCurve_s(curve)
+    return Geom2dConvert.CurveToBSplineCurve_s(Geom2d_TrimmedCurve(curve, first, last))
+
+
+def _segment(line: Geom2d_Curve, first: float, last: float) -> Curve:
+    """A straight line over its range."""
+    ends = (line.Value(first), line.Value(last))
+    return Curve(KnotVector.clamped([first, last], 1), np.array([[p.X(), p.Y()] for p in ends]), None)

@@ -1,0 +1,42 @@
+"""Faces chosen by a CadQuery selector."""
+
+from __future__ import annotations
+
+from mracad.errors import UsageError
+from mracad.occ.document import Document
+
+
+def select_cq(document: Document, expression: str) -> set[int]:
+    """The faces that a CadQuery string selector such as ``">Z"`` picks among all placed faces.
+
+    A face of an instanced part is picked when any of its instances is.
+
+    Parameters
+    ----------
+    document : Document
+    expression : str
+
+    Returns
+    -------
+    set of int
+        Face indices.
+
+    Raises
+    ------
+    UsageError
+        For an expression that CadQuery does not understand.
+    """
+    from cadquery import Face, StringSyntaxSelector  # takes seconds to import
+    from pyparsing import ParseException
+
+    placed = [
+        (Face(face.Moved(placement)), index)
+        for part in document.parts
+        for index, face in enumerate(document.faces[part.first : part.first + part.faces.Extent()], part.first)
+        for placement in part.placements
+    ]
+    try:
+        picked = {id(face) for face in StringSyntaxSelector(expression).filter([face for face, _ in placed])}
+    except (ParseException, ValueError, IndexError) as error:
+        raise UsageError(f"'{expression}' is not a CadQuery face selector", "write it as '>Z' or '%Plane'") from error
+    return {index for face, index in placed if id(face) in picked}

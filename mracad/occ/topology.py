@@ -1,0 +1,40 @@
+"""Small walks over shapes, and their places and boxes as arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from OCP.Bnd import Bnd_Box
+from OCP.BRepBndLib import BRepBndLib
+from OCP.TopAbs import TopAbs_EDGE
+from OCP.TopExp import TopExp_Explorer
+from OCP.TopLoc import TopLoc_Location
+from OCP.TopoDS import TopoDS, TopoDS_Edge, TopoDS_Face, TopoDS_Shape
+
+Array = np.ndarray
+
+
+def edge_uses(face: TopoDS_Face) -> Iterator[TopoDS_Edge]:
+    """The edges of a forward face as it uses them; a closing edge comes twice."""
+    explorer = TopExp_Explorer(face, TopAbs_EDGE)
+    while explorer.More():
+        yield TopoDS.Edge_s(explorer.Current())
+        explorer.Next()
+
+
+def matrix(location: TopLoc_Location) -> Array:
+    """A location as a 4 × 4 matrix."""
+    out = np.eye(4)
+    if not location.IsIdentity():
+        transform = location.Transformation()
+        out[:3] = [[transform.Value(i, j) for j in (1, 2, 3, 4)] for i in (1, 2, 3)]
+    return out
+
+
+def box(shape: TopoDS_Shape) -> Array:
+    """Lowest and highest corner of a shape, ``(2, 3)``, memory units: never too small, at most that of its poles."""
+    bounds = Bnd_Box()
+    BRepBndLib.Add_s(shape, bounds, False)
+    low, high = bounds.CornerMin(), bounds.CornerMax()
+    return np.array([[low.X(), low.Y(), low.Z()], [high.X(), high.Y(), high.Z()]])

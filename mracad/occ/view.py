@@ -1,0 +1,274 @@
+"""A document as a kernel-free Model."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+from OCP.BRep import BRep_Tool
+from OCP.BRepAdaptor import BRepAdaptor_Curve, BRepAdaptor_Surface
+from OCP.Geom import Geom_Plane, Geom_Surface
+from OCP.Geom2d import Geom2d_Curve, Geom2d_Line
+from OCP.GeomAbs import GeomAbs_Line
+from OCP.gp import gp_Dir, gp_Pnt, gp_Vec
+from OCP.ShapeFix import ShapeFix_Edge
+from OCP.TopAbs import TopAbs_FORWARD, TopAbs_REVERSED
+from OCP.TopLoc import TopLoc_Location
+from OCP.TopoDS import TopoDS, TopoDS_Edge, TopoDS_Face
+from OCP.TopTools import TopTools_IndexedMapOfShape
+
+from mracad.errors import UsageError
+from mracad.model import Edge, Face, Model, Side, Surface, Trim
+from mracad.occ.convert import conversion
+from mracad.occ.document import Document
+from mracad.occ.geometry import basis, curves, is_nurbs, nets
+from mracad.occ.settings import quiet
+from mracad.occ.topology import box, edge_uses, matrix
+
+Array = np.ndarray
+
+_KINDS = {
+    "Geom_BSplineSurface": "bspline",
+    "Geom_BezierSurface": "bezier",
+    "Geom_Plane": "plane",
+    "Geom_CylindricalSurface": "cylinder",
+    "Geom_ConicalSurface": "cone",
+    "Geom_SphericalSurface": "sphere",
+    "Geom_ToroidalSurface": "torus",
+    "Geom_SurfaceOfLinearExtrusion": "extrusion",
+    "Geom_SurfaceOfRevolution": "revolution",
+    "Geom_OffsetSurface": "offset",
+}
+_SAMPLES = 25
+# fractions of an edge's range: Chebyshev points, close to the ends but never on them
+_SPREAD = 0.5 - 0.5 * np.cos(np.pi * (np.arange(_SAMPLES) + 0.5) / _SAMPLES)
+_NONE = np.empty((0, 3))
+
+
+@dataclass(eq=False)
+class _Use:
+    """An edge as one face has it: the curve in the parameter plane, over ``[first, last]``."""
+
+    face: int
+    edge: int
+    pcurve: Geom2d_Curve
+    first: float
+    last: float
+
+
+@dataclass(eq=False)
+class _Found:
+    """What a walk over the document finds, in order."""
+
+    faces: list[TopoDS_Face]
+    grounds: list[Geom_Surface] = field(default_factory=list)  # the untrimmed surface of each face
+    frames: list[Array] = field(default_factory=list)
+    surface_of: list[int | None] = field(default_factory=list)
+    surfaces: dict[Geom_Surface, list[int]] = field(default_factory=dict)  # each NURBS surface and its faces
+    uses: list[_Use] = field(default_factory=list)
+    edges: list[TopoDS_Edge] = field(default_factory=list)
+    part_of_edge: list[int] = field(default_factory=list)
+
+
+def view(document: Document, convert: Iterable[int] = ()) -> Model:
+    """The geometry of a document as plain arrays, in mm.
+
+    Parameters
+    ----------
+    document : Document
+    convert : iterable of int
+        Faces on analytic, swept or offset surfaces that are to be seen as NURBS faces as well.  Their surfaces are
+        put on them only by ``apply``, where they move.
+
+    Raises
+    ------
+    UsageError
+        For a face that does not exist.
+    MracadError
+        For a face that the kernel cannot convert.
+    """
+    chosen = frozenset(convert)
+    for face in sorted(chosen):
+        if not 0 <= face < len(document.faces):
+            raise UsageError(f"there is no face #{face + 1}", f"the faces are #1 to #{len(document.faces)}")
+    with quiet():
+        found = _walk(document, chosen)
+        scale = document.unit_mm
+        kinds = [_KINDS.get(type(surface).__name__, "other") for surface in found.grounds]
+        control = nets(list(found.surfaces), scale)
+        boxes = [box(face) * scale for face in found.faces]
+        trims = _trims(found)
+        faces = tuple(
+            Face(
+                index, kinds[index], found.surface_of[index], trims.get(index, ()),
+                face.Orientation() == TopAbs_REVERSED, _scaled(found.frames[index], scale), boxes[index],
+                part.face_names.get(index - part.first, ""), part.product,
+                part.face_colours.get(index - part.first, part.colour), len(part.placements),
+            )
+            for part in document.parts
+            for index, face in enumerate(found.faces[part.first : part.first + part.faces.Extent()], part.first)
+        )  # fmt: skip
+        surfaces = tuple(
+            Surface(index, net, tuple(members), kinds[members[0]])
+            for index, (net, members) in enumerate(zip(control, found.surfaces.values(), strict=True))
+        )
+        edges = tuple(_edges(found, scale))
+    products = tuple(part.product for part in document.parts)
+    diagonal = _diagonal(document, boxes)
+    return Model(document.name, surfaces, faces, edges, diagonal, document.unit, document.schema, products)
+
+
+def _walk(document: Document, chosen: frozenset[int]) -> _Found:
+    """Go through all faces and their edges."""
+    found = _Found(document.faces)
+    for number, part in enumerate(document.parts):
+        local = TopTools_IndexedMapOfShape()
+        offset = len(found.edges) - 1
+        for index in range(part.first, part.first + part.faces.Extent()):
+            face = TopoDS.Face_s(found.faces[index].Oriented(TopAbs_FORWARD))
+            location = TopLoc_Location()
+            ground = basis(BRep_Tool.Surface_s(face, location))
+            replaced = conversion(document, index) if index in chosen and not is_nurbs(ground) else None
+            handle = replaced.surface if replaced else ground
+            members = found.surfaces.setdefault(handle, []) if is_nurbs(handle) else []
+            members.append(index)
+            found.grounds.append(ground)
+            found.frames.append(matrix(location))
+            found.surface_of.append(list(found.surfaces).index(handle) if handle in found.surfaces else None)
+            for position, edge in enumerate(edge_uses(face)):
+                place = offset + local.Add(edge)
+                pcurve = replaced.pcurves[position] if replaced else _pcurve(edge, face)
+                found.uses.append(_Use(index, place, pcurve, *BRep_Tool.Range_s(edge, face)))
+        found.edges += [TopoDS.Edge_s(local.FindKey(i)) for i in range(1, local.Extent() + 1)]
+        found.part_of_edge += [number] * local.Extent()
+    return found
+
+
+def _pcurve(edge: TopoDS_Edge, face: TopoDS_Face) -> Geom2d_Curve:
+    """The edge's curve in the parameter plane of a face; made by projection where the file lacks it."""
+    curve = BRep_Tool.CurveOnSurface_s(edge, face, 0.0, 0.0)
+    if curve is None:
+        ShapeFix_Edge().FixAddPCurve(edge, face, False)
+        curve = BRep_Tool.CurveOnSurface_s(edge, face, 0.0, 0.0)
+    return curve
+
+
+def _trims(found: _Found) -> dict[int, tuple[Trim, ...]]:
+    """The boundaries of the NURBS faces, by face."""
+    uses = [use for use in found.uses if found.surface_of[use.face] is not None]
+    trims: dict[int, tuple[Trim, ...]] = {}
+    for use, curve in zip(uses, curves([(u.pcurve, u.first, u.last) for u in uses]), strict=True):
+        trims[use.face] = (*trims.get(use.face, ()), Trim(use.edge, curve))
+    return trims
+
+
+def _edges(found: _Found, scale: float) -> Iterator[Edge]:
+    """All edges with their samples."""
+    by_edge: list[list[_Use]] = [[] for _ in found.edges]
+    for use in found.uses:
+        by_edge[use.edge].append(use)
+    walls = {use.face: _wall(found, use.face) for use in found.uses if found.surface_of[use.face] is None}
+    for index, (edge, uses) in enumerate(zip(found.edges, by_edge, strict=True)):
+        degenerate = BRep_Tool.Degenerated_s(edge)
+        points, tangents = (_NONE, _NONE) if degenerate else _along(edge)
+        sides = []
+        for use in uses:
+            if use.face not in walls:
+                sides.append(Side(use.face, uv=_parameters(use)))
+            elif degenerate:
+                sides.append(Side(use.face, points=_NONE, normals=_NONE))
+            else:
+                feet, normals = walls[use.face](use, points)
+                sides.append(Side(use.face, points=feet * scale, normals=normals))
+        yield Edge(
+            index, points * scale, tangents, tuple(sides), BRep_Tool.Tolerance_s(edge) * scale, degenerate,
+            found.part_of_edge[index],
+        )  # fmt: skip
+
+
+def _along(edge: TopoDS_Edge) -> tuple[Array, Array]:
+    """Points (memory units) and unit tangents along an edge."""
+    curve = BRepAdaptor_Curve(edge)
+    first, last = curve.FirstParameter(), curve.LastParameter()
+    place = first + (last - first) * _SPREAD
+    if curve.GetType() == GeomAbs_Line:
+        line = curve.Line()
+        direction = _triple(line.Direction())
+        return _triple(line.Location()) + place[:, None] * direction, np.tile(direction, (_SAMPLES, 1))
+    point, tangent = gp_Pnt(), gp_Vec()
+    rows = []
+    for t in place.tolist():
+        curve.D1(t, point, tangent)
+        rows.append((point.X(), point.Y(), point.Z(), tangent.X(), tangent.Y(), tangent.Z()))
+    table = np.array(rows)
+    return table[:, :3], _unit(table[:, 3:])
+
+
+def _wall(found: _Found, index: int) -> Callable[[_Use, Array], tuple[Array, Array]]:
+    """How a face that does not move gives its points (memory units) and outward normals along an edge."""
+    face = found.faces[index]
+    sign = -1.0 if face.Orientation() == TopAbs_REVERSED else 1.0
+    surface = BRepAdaptor_Surface(face, False)
+    if isinstance(found.grounds[index], Geom_Plane):
+        plane = surface.Plane()
+        origin = _triple(plane.Location())
+        normal = _triple(plane.Axis().Direction()) * (sign if plane.Direct() else -sign)
+        return lambda use, points: (
+            points - ((points - origin) @ normal)[:, None] * normal, np.tile(normal, (_SAMPLES, 1))
+        )  # fmt: skip
+
+    def on_surface(use: _Use, _: Array) -> tuple[Array, Array]:
+        point, du, dv = gp_Pnt(), gp_Vec(), gp_Vec()
+        rows = []
+        for u, v in _parameters(use).tolist():
+            surface.D1(u, v, point, du, dv)
+            normal = du.Crossed(dv)
+            rows.append((point.X(), point.Y(), point.Z(), normal.X(), normal.Y(), normal.Z()))
+        table = np.array(rows)
+        return table[:, :3], sign * _unit(table[:, 3:])
+
+    return on_surface
+
+
+def _parameters(use: _Use) -> Array:
+    """Surface parameters at the edge's samples, ``(k, 2)``."""
+    place = use.first + (use.last - use.first) * _SPREAD
+    if isinstance(use.pcurve, Geom2d_Line):
+        line = use.pcurve.Lin2d()
+        start, way = line.Location(), line.Direction()
+        return np.array([start.X(), start.Y()]) + place[:, None] * np.array([way.X(), way.Y()])
+    return np.array([(point.X(), point.Y()) for point in map(use.pcurve.Value, place.tolist())])
+
+
+def _triple(of: gp_Pnt | gp_Dir) -> Array:
+    return np.array([of.X(), of.Y(), of.Z()])
+
+
+def _unit(vectors: Array) -> Array:
+    """Vectors of length 1; a vanishing one stays zero."""
+    lengths = np.linalg.norm(vectors, axis=1, keepdims=True)
+    return vectors / np.where(lengths > 0, lengths, 1.0)
+
+
+def _scaled(frame: Array, scale: float) -> Array:
+    """A frame whose translation is in memory units, in mm."""
+    out = frame.copy()
+    out[:3, 3] *= scale
+    return out
+
+
+def _diagonal(document: Document, boxes: list[Array]) -> float:
+    """Diagonal of the box around all placed face boxes, mm."""
+    corners = []
+    for part in document.parts:
+        own = np.array(boxes[part.first : part.first + part.faces.Extent()])
+        if not len(own):
+            continue
+        # the eight corners of every box: each axis low or high
+        grid = np.stack([own[:, [a, b, c], [0, 1, 2]] for a in (0, 1) for b in (0, 1) for c in (0, 1)])
+        for placement in part.placements:
+            frame = _scaled(matrix(placement), document.unit_mm)
+            corners.append(grid.reshape(-1, 3) @ frame[:3, :3].T + frame[:3, 3])
+    everything = np.concatenate(corners)
+    return float(np.linalg.norm(everything.max(axis=0) - everything.min(axis=0)))
