@@ -1,0 +1,1 @@
+"""Multiresolution on any nested knots: knot ladders, wavelets, analysis and synthesis, projections."""

@@ -1,0 +1,1 @@
+"""Knot vectors, B-spline bases, Gram and refinement matrices, NURBS curves and nets."""

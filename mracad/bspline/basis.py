@@ -1,0 +1,76 @@
+"""B-spline basis functions, their derivatives and blossoms, by the Cox–de Boor recursion."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mracad.bspline.knots import Array, KnotVector, Side
+
+
+def basis(kv: KnotVector, x: Array, derivative: int = 0, side: Side = "right") -> tuple[Array, Array]:
+    """The functions that are not zero at ``x``, or their derivatives.
+
+    Parameters
+    ----------
+    kv : KnotVector
+    x : array_like (q,)
+        Parameters; wrapped where the vector is periodic, otherwise the end polynomials serve beyond the domain.
+    derivative : int
+        Order of the derivative, with respect to the parameter.
+    side : {"right", "left"}
+        Which limit is taken at a knot.
+
+    Returns
+    -------
+    first : ndarray (q,) of int
+    values : ndarray (q, d + 1)
+        ``values[:, k]`` belongs to pole ``(first + k) mod count``.
+
+    Notes
+    -----
+    de Boor, *A Practical Guide to Splines*, ch. X: every term of the recursion is non-negative, hence stable at any
+    degree.
+    """
+    span, offset = kv.locate(np.atleast_1d(np.asarray(x, dtype=float)), side)
+    return span - kv.degree, local_values(kv, span, offset, derivative).T
+
+
+def local_values(kv: KnotVector, span: Array, offset: Array, derivative: int = 0) -> Array:
+    """Values of functions ``span - d … span`` at ``t_span + offset``, ``(d + 1, q)``.
+
+    ``offset`` has shape ``(q,)``, or ``(d - derivative, q)`` for the polar form (blossom) of the functions' polynomial
+    pieces on the span, one argument a row.
+    """
+    d = kv.degree
+    if derivative > d:
+        return np.zeros((d + 1, len(span)))
+    around = kv.knots[span + np.arange(1 - d, d + 1)[:, None]] - kv.knots[span]
+    left, right = around[:d], around[d:]
+    arguments = np.broadcast_to(offset, (d - derivative, len(span)))
+    values = np.ones((1, len(span)))
+    for k in range(1, d + 1):
+        low, high = left[d - k :], right[:k]
+        share = values / (high - low)
+        values = np.zeros((k + 1, len(span)))
+        if k <= d - derivative:
+            values[:-1] = (high - arguments[k - 1]) * share
+            values[1:] += (arguments[k - 1] - low) * share
+        else:
+            values[:-1] = -k * share
+            values[1:] += k * share
+    return values
+
+
+def gauss(kv: KnotVector, points: int) -> tuple[Array, Array, Array]:
+    """Gauss–Legendre points on every span of the domain.
+
+    Returns
+    -------
+    span : ndarray (s,) of int
+        Index of each span in ``kv.knots``.
+    offset, weight : ndarray (s, points)
+        Parameters relative to the span's first knot, and quadrature weights in parameter units.
+    """
+    nodes, weights = np.polynomial.legendre.leggauss(points)
+    lengths = np.diff(kv.breaks)[:, None]
+    return kv.span_index, 0.5 * lengths * (nodes + 1), 0.5 * lengths * weights

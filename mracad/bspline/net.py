@@ -1,0 +1,303 @@
+"""NURBS curves and surfaces as plain arrays: evaluation, normals, exact knot insertion."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mracad.bspline.basis import basis
+from mracad.bspline.knots import Array, KnotVector, Side
+from mracad.bspline.refine import refinement
+from mracad.bspline.rows import Rows
+from mracad.errors import UsageError
+
+_BLOCK = 1 << 19
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """A NURBS curve.
+
+    Attributes
+    ----------
+    knots : KnotVector
+    poles : ndarray (n, k)
+        Euclidean control points.
+    weights : ndarray (n,) or None
+        None where the curve is polynomial.
+    """
+
+    knots: KnotVector
+    poles: Array
+    weights: Array | None = None
+
+    def __post_init__(self) -> None:
+        if self.poles.ndim != 2 or len(self.poles) != self.knots.count:
+            raise UsageError(f"poles of shape {self.poles.shape} for a knot vector of {self.knots.count} poles")
+        _check_weights(self.weights, self.poles.shape[:1])
+
+    def evaluate(self, t: Array, derivatives: int = 0, side: Side = "right") -> Array:
+        """Points and derivatives.
+
+        Parameters
+        ----------
+        t : array_like (q,)
+            Parameters; wrapped where periodic, otherwise the end polynomials serve beyond the domain.
+        derivatives : int
+            Highest derivative wanted.
+        side : {"right", "left"}
+            Which limit is taken at a knot.
+
+        Returns
+        -------
+        ndarray (derivatives + 1, q, k)
+            ``[r]`` is the r-th derivative with respect to the parameter.
+        """
+        poles = _homogeneous(self.poles, self.weights)
+        stack = []
+        for r in range(derivatives + 1):
+            first, values = basis(self.knots, t, r, side)
+            index = (first[:, None] + np.arange(self.knots.degree + 1)) % self.knots.count
+            stack.append(np.einsum("qa,qak->qk", values, poles[index]))
+        return np.array(stack) if self.weights is None else _curve_quotient(np.array(stack))
+
+    def refined(self, extra_knots: Array | Sequence[float]) -> Curve:
+        """The same curve with more knots, exactly; itself when there is nothing to insert."""
+        fine = self.knots.refined(extra_knots)
+        return self if fine == self.knots else self.over(fine)
+
+    def over(self, fine: KnotVector) -> Curve:
+        """The same curve over a finer knot vector."""
+        poles = refinement(self.knots, fine).apply(_homogeneous(self.poles, self.weights))
+        return Curve(fine, *_euclidean(poles, self.weights is not None))
+
+    def bezier(self) -> tuple[Array, Array, Array | None]:
+        """The curve's polynomial (or rational) pieces in Bézier form.
+
+        Returns
+        -------
+        breaks : ndarray (s + 1,)
+        poles : ndarray (s, d + 1, k)
+        weights : ndarray (s, d + 1) or None
+        """
+        knots, d = self.knots.unrolled(), self.knots.degree
+        index = np.arange(knots.count) % self.knots.count
+        open_curve = Curve(knots, self.poles[index], None if self.weights is None else self.weights[index])
+        pieces = open_curve.over(KnotVector(np.repeat(self.knots.breaks, d + 1), d))
+        shape = (self.knots.spans, d + 1)
+        return (
+            self.knots.breaks,
+            pieces.poles.reshape(*shape, -1),
+            None if pieces.weights is None else pieces.weights.reshape(shape),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Net:
+    """A NURBS surface: the control net over two knot vectors.
+
+    Attributes
+    ----------
+    u, v : KnotVector
+    poles : ndarray (nu, nv, k)
+        Euclidean control points.
+    weights : ndarray (nu, nv) or None
+        None where the surface is polynomial.
+    """
+
+    u: KnotVector
+    v: KnotVector
+    poles: Array
+    weights: Array | None = None
+
+    def __post_init__(self) -> None:
+        if self.poles.ndim != 3 or self.poles.shape[:2] != (self.u.count, self.v.count):
+            raise UsageError(f"poles of shape {self.poles.shape} for a net of {self.u.count} × {self.v.count} poles")
+        _check_weights(self.weights, self.poles.shape[:2])
+
+    def evaluate(
+        self, uv: Array, derivatives: int = 0, side: tuple[Side, Side] = ("right", "right")
+    ) -> Array | tuple[Array, ...]:
+        """Points and derivatives at scattered parameters.
+
+        Parameters
+        ----------
+        uv : array_like (q, 2)
+            Parameters; wrapped where periodic, otherwise the end polynomials serve beyond the domain.
+        derivatives : {0, 1, 2}
+        side : pair of {"right", "left"}
+            Which limit is taken at a knot of u and of v.
+
+        Returns
+        -------
+        ndarray (q, k), or a tuple of such
+            ``S``; ``(S, Su, Sv)``; or ``(S, Su, Sv, Suu, Suv, Svv)``.
+        """
+        uv = np.asarray(uv, dtype=float).reshape(-1, 2)
+        poles = _homogeneous(self.poles, self.weights)
+        orders = [(a, b) for total in range(derivatives + 1) for a, b in _pairs(total)]
+        out = np.empty((len(orders), len(uv), poles.shape[2]))
+        step = max(_BLOCK // ((self.u.degree + 1) * (self.v.degree + 1) * poles.shape[2]), 1)
+        for begin in range(0, len(uv), step):
+            block = slice(begin, begin + step)
+            out[:, block] = self._sums(poles, uv[block], derivatives, orders, side)
+        stack = tuple(out)
+        if self.weights is not None:
+            stack = _surface_quotient(stack)
+        return stack if derivatives else stack[0]
+
+    def _sums(
+        self, poles: Array, uv: Array, derivatives: int, orders: list[tuple[int, int]], side: tuple[Side, Side]
+    ) -> Array:
+        first_u, in_u = _stacked(self.u, uv[:, 0], derivatives, side[0])
+        first_v, in_v = _stacked(self.v, uv[:, 1], derivatives, side[1])
+        row = (first_u[:, None] + np.arange(self.u.degree + 1)) % self.u.count
+        column = (first_v[:, None] + np.arange(self.v.degree + 1)) % self.v.count
+        local = poles.reshape(-1, poles.shape[2])[row[:, :, None] * self.v.count + column[:, None, :]]
+        q, a, b, k = local.shape
+        partial = np.matmul(in_u, local.reshape(q, a, b * k)).reshape(q, derivatives + 1, b, k)
+        full = np.matmul(in_v[:, None], partial)
+        return np.array([full[:, r, s] for r, s in orders])
+
+    def grid(self, us: Array, vs: Array, derivatives: int = 0, side: tuple[Side, Side] = ("right", "right")):
+        """Points and first derivatives on the tensor product of two lists of parameters.
+
+        Returns
+        -------
+        ndarray (qu, qv, k), or a tuple of such
+            ``S``; or ``(S, Su, Sv)`` for ``derivatives=1``.
+        """
+        poles = _homogeneous(self.poles, self.weights)
+        in_u = [_collocation(self.u, us, r, side[0]) for r in range(derivatives + 1)]
+        in_v = [_collocation(self.v, vs, r, side[1]) for r in range(derivatives + 1)]
+        along_u = [rows.apply(poles, 0) for rows in in_u]
+        stack = tuple(in_v[s].apply(along_u[r], 1) for total in range(derivatives + 1) for r, s in _pairs(total))
+        if self.weights is not None:
+            stack = _surface_quotient(stack)
+        return stack if derivatives else stack[0]
+
+    def normals(self, uv: Array, side: tuple[Side, Side] = ("right", "right")) -> Array:
+        """Unit normals ``S_u × S_v / |…|``, ``(q, 3)``.
+
+        Where the surface is degenerate (a collapsed side, a cusp) the limit from the middle of the domain is taken, by
+        the second derivatives or, where those say nothing either, from a point nearby; NaN where there is none.
+        """
+        uv = np.asarray(uv, dtype=float).reshape(-1, 2)
+        _, su, sv = self.evaluate(uv, 1, side)
+        lengths = [np.linalg.norm(x, axis=1) for x in (su, sv)]
+        floor = [1e-9 * (self._extent / kv.period) for kv in (self.u, self.v)]
+        normal = np.cross(su, sv)
+        bad = ~(np.linalg.norm(normal, axis=1) > 1e-9 * lengths[0] * lengths[1])
+        bad |= (lengths[0] < floor[0]) | (lengths[1] < floor[1])
+        if bad.any():
+            normal[bad] = self._limits(uv[bad], side)
+        return _unit(normal)
+
+    @property
+    def _extent(self) -> float:
+        flat = self.poles.reshape(-1, self.poles.shape[2])
+        return float(np.linalg.norm(flat.max(axis=0) - flat.min(axis=0)))
+
+    def _limits(self, uv: Array, side: tuple[Side, Side]) -> Array:
+        """Directions of the normal next to ``uv`` on the way to the middle of the domain."""
+        low, high = np.array([self.u.domain, self.v.domain]).T
+        inward = (np.clip(uv, low, high) - 0.5 * (low + high)) * -1.0
+        inward = np.where(inward == 0, high - low, inward)
+        _, su, sv, suu, suv, svv = self.evaluate(uv, 2, side)
+        e, f = inward[:, :1], inward[:, 1:]
+        normal = e * (np.cross(suu, sv) + np.cross(su, suv)) + f * (np.cross(suv, sv) + np.cross(su, svv))
+        size = self._extent**2 / ((high - low).prod())
+        bad = ~(np.linalg.norm(normal, axis=1) > 1e-6 * size)
+        if bad.any():
+            _, su, sv = self.evaluate(uv[bad] + 1e-4 * inward[bad], 1)
+            near = np.cross(su, sv)
+            near[~(np.linalg.norm(near, axis=1) > 1e-13 * size)] = np.nan
+            normal[bad] = near
+        return normal
+
+    def refined(self, u_knots: Array | Sequence[float], v_knots: Array | Sequence[float]) -> Net:
+        """The same surface with more knots, exactly; itself when there is nothing to insert."""
+        u, v = self.u.refined(u_knots), self.v.refined(v_knots)
+        return self if u == self.u and v == self.v else self.over(u, v)
+
+    def over(self, u: KnotVector, v: KnotVector) -> Net:
+        """The same surface over finer knot vectors."""
+        poles = _homogeneous(self.poles, self.weights)
+        if u != self.u:
+            poles = refinement(self.u, u).apply(poles, 0)
+        if v != self.v:
+            poles = refinement(self.v, v).apply(poles, 1)
+        return Net(u, v, *_euclidean(poles, self.weights is not None))
+
+
+def _check_weights(weights: Array | None, shape: tuple[int, ...]) -> None:
+    if weights is None:
+        return
+    if weights.shape != shape:
+        raise UsageError(f"weights of shape {weights.shape} for poles of shape {shape}")
+    if not (weights > 0).all():
+        raise UsageError("a weight is not positive")
+
+
+def _pairs(total: int) -> list[tuple[int, int]]:
+    """Derivative orders (in u, in v) of the given sum, u first."""
+    return [(total - b, b) for b in range(total + 1)]
+
+
+def _stacked(kv: KnotVector, x: Array, derivatives: int, side: Side) -> tuple[Array, Array]:
+    """First function and ``(q, derivatives + 1, d + 1)`` values of functions and derivatives."""
+    parts = [basis(kv, x, r, side) for r in range(derivatives + 1)]
+    return parts[0][0], np.stack([values for _, values in parts], axis=1)
+
+
+def _collocation(kv: KnotVector, x: Array, derivative: int, side: Side) -> Rows:
+    first, values = basis(kv, x, derivative, side)
+    return Rows(first, np.ascontiguousarray(values), kv.count, kv.periodic)
+
+
+def _homogeneous(poles: Array, weights: Array | None) -> Array:
+    """``(w P, w)``, or the poles themselves."""
+    if weights is None:
+        return poles
+    return np.concatenate([poles * weights[..., None], weights[..., None]], axis=-1)
+
+
+def _euclidean(poles: Array, rational: bool) -> tuple[Array, Array | None]:
+    if not rational:
+        return poles, None
+    weights = poles[..., -1]
+    return poles[..., :-1] / weights[..., None], np.ascontiguousarray(weights)
+
+
+def _curve_quotient(stack: Array) -> Array:
+    """Derivatives of ``A / w`` from those of ``(A, w)``, by Leibniz' rule."""
+    from math import comb
+
+    top, w = stack[..., :-1].copy(), stack[..., -1:]
+    for r in range(len(stack)):
+        for i in range(1, r + 1):
+            top[r] -= comb(r, i) * w[i] * top[r - i]
+        top[r] /= w[0]
+    return top
+
+
+def _surface_quotient(stack: tuple[Array, ...]) -> tuple[Array, ...]:
+    """Derivatives of ``A / w`` from those of ``(A, w)``, up to the second."""
+    top, w = [x[..., :-1] for x in stack], [x[..., -1:] for x in stack]
+    s = top[0] / w[0]
+    if len(stack) == 1:
+        return (s,)
+    su, sv = (top[1] - w[1] * s) / w[0], (top[2] - w[2] * s) / w[0]
+    if len(stack) == 3:
+        return s, su, sv
+    suu = (top[3] - 2 * w[1] * su - w[3] * s) / w[0]
+    suv = (top[4] - w[1] * sv - w[2] * su - w[4] * s) / w[0]
+    svv = (top[5] - 2 * w[2] * sv - w[5] * s) / w[0]
+    return s, su, sv, suu, suv, svv
+
+
+def _unit(vectors: Array) -> Array:
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)

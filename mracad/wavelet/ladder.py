@@ -1,0 +1,224 @@
+"""Knot ladders: which knots a coarser level keeps, by level or by scale."""
+
+from __future__ import annotations
+
+from collections.abc import Set as AbstractSet
+
+import numpy as np
+
+from mracad.bspline.basis import gauss
+from mracad.bspline.knots import Array, KnotVector
+from mracad.bspline.net import Net
+from mracad.errors import UsageError
+
+_RESOLUTION = 1_000_000
+_POSITIONS = 16
+_GAUSS_POINTS = 4
+
+
+def rungs_by_level(
+    kv: KnotVector,
+    keep: AbstractSet[float] | Array = frozenset(),
+    lengths: Array | None = None,
+    tolerance: float = 1e-4,
+) -> list[KnotVector]:
+    """Nested knot vectors from ``kv`` to the coarsest, each without every second interior knot of the one before.
+
+    Parameters
+    ----------
+    kv : KnotVector
+    keep : set of float, or boolean mask (spans + 1,)
+        Breaks that stay on every rung with all their multiplicity.
+    lengths : array_like (spans,), optional
+        Arc length of each span, mm; where not given, parameters serve and ``tolerance`` does not apply.
+    tolerance : float
+        Breaks closer than this (mm), or than 1e-6 of the whole, count as one knot.
+
+    Returns
+    -------
+    list of KnotVector
+        ``kv`` first.  Where there are multiple knots or clusters, the second rung makes all of them simple.
+        The last has no free interior knots; a periodic one keeps its end knot and at least ``max(d + 1, 3)`` spans.
+    """
+    if lengths is None:
+        lengths, tolerance = np.diff(kv.breaks), 0.0
+    ladder = _Ladder(kv, keep, lengths, tolerance, float(np.sum(lengths)) / _RESOLUTION)
+    rungs = [kv]
+    if ladder.sensible(len(ladder.alive)):
+        simple = ladder.thinned(np.ones(len(ladder.alive), dtype=int))
+        if simple != kv:
+            rungs.append(simple)
+    while ladder.drop(np.ones(len(ladder.alive), dtype=bool)):
+        rungs.append(ladder.thinned(np.ones(len(ladder.alive), dtype=int)))
+    return rungs
+
+
+def ladder_for_scale(
+    kv: KnotVector,
+    lengths: Array,
+    scale: float,
+    keep: AbstractSet[float] | Array = frozenset(),
+    tolerance: float = 1e-4,
+) -> KnotVector:
+    """The coarse knot vector for a scale, which is a wavelength: ripples of up to half of it go, those of three times
+    it stay.
+
+    Alternate knots are dropped, sweep by sweep, wherever the span that is left stays shorter than ``scale``, so that
+    knots end up ``scale / 2`` to ``scale`` apart: the projection onto spacing H removes wavelengths below 1.5 H and
+    keeps those above 2.5 H.  A knot of multiplicity r is as fine as r knots: where the spans beside it are on average
+    below ``scale`` it becomes simple, elsewhere it keeps at most three copies a ``scale``.
+
+    Parameters
+    ----------
+    kv : KnotVector
+    lengths : array_like (spans,)
+        Arc length of each span, mm.
+    scale : float
+        mm.
+    keep : set of float, or boolean mask (spans + 1,)
+        Breaks that stay with all their multiplicity.
+    tolerance : float
+        Breaks closer than this (mm), or than 1e-6 of the whole, count as one knot.
+
+    Returns
+    -------
+    KnotVector
+        ``kv`` itself where nothing in it is finer than the scale.
+
+    Notes
+    -----
+    Lengths are compared in whole millionths of the scale and ties go by the place counted from both ends, so that
+    neither rotating, scaling nor reversing the model selects other knots.
+    """
+    if not scale > 0:
+        raise UsageError(f"scale {scale} is not positive")
+    ladder = _Ladder(kv, keep, lengths, tolerance, scale)
+    while ladder.drop(ladder.beside() < _RESOLUTION):
+        pass
+    beside = ladder.beside()
+    copies = np.where(beside < 2 * _RESOLUTION, 1, 3 * beside // (2 * _RESOLUTION))
+    if not ladder.sensible(len(ladder.alive)):
+        return kv
+    thinned = ladder.thinned(copies)
+    return kv if thinned == kv else thinned
+
+
+def arc_lengths(net: Net, direction: int) -> Array:
+    """Mean length of the iso-curves on each knot span.
+
+    Parameters
+    ----------
+    net : Net
+    direction : {0, 1}
+        0 for the spans of ``net.u``, 1 for those of ``net.v``.
+
+    Returns
+    -------
+    ndarray (spans,)
+        ``∫ |S_u| du`` over each span (mm), by four Gauss points a span, averaged over 16 places across.
+    """
+    along, across = (net.u, net.v) if direction == 0 else (net.v, net.u)
+    span, offset, weight = gauss(along, _GAUSS_POINTS)
+    places = (along.knots[span][:, None] + offset).ravel()
+    low, _ = across.domain
+    others = low + across.period * (np.arange(_POSITIONS) + 0.5) / _POSITIONS
+    if direction == 0:
+        speed = np.linalg.norm(net.grid(places, others, 1)[1], axis=2).mean(axis=1)
+    else:
+        speed = np.linalg.norm(net.grid(others, places, 1)[2], axis=2).mean(axis=0)
+    return (speed.reshape(weight.shape) * weight).sum(axis=1)
+
+
+class _Ladder:
+    """Clusters of breaks that are still there.
+
+    Attributes
+    ----------
+    first, last : ndarray (clusters,)
+        Range of breaks of each cluster; the first and the last hold the ends of the domain.
+    alive : ndarray of int
+        Clusters still there.
+    spans : ndarray (len(alive) - 1,) of int
+        Length from each cluster to the next, in millionths of ``unit``.
+    """
+
+    def __init__(
+        self, kv: KnotVector, keep: AbstractSet[float] | Array, lengths: Array, tolerance: float, unit: float
+    ) -> None:
+        lengths = np.asarray(lengths, dtype=float)
+        if lengths.shape != (kv.spans,):
+            raise UsageError(f"{lengths.size} lengths for {kv.spans} spans")
+        if not (np.isfinite(lengths).all() and (lengths >= 0).all()):
+            raise UsageError("a span has no length")
+        self.kv = kv
+        self.kept = np.isin(kv.breaks, list(keep)) if isinstance(keep, AbstractSet) else np.array(keep, dtype=bool)
+        if self.kept.shape != kv.breaks.shape:
+            raise UsageError(f"{self.kept.size} marks of kept knots for {len(kv.breaks)} breaks")
+        apart = lengths >= max(tolerance, 1e-6 * lengths.sum())
+        self.last = np.append(np.flatnonzero(apart), kv.spans)
+        self.first = np.append(0, self.last[:-1] + 1)
+        self.alive = np.arange(len(self.first))
+        self.fixed = np.logical_or.reduceat(self.kept, self.first)
+        self.fixed[[0, -1]] = True
+        ratio = np.minimum(lengths[apart] / (unit or 1.0), 1e6)
+        self.spans = np.rint(ratio * _RESOLUTION).astype(np.int64)
+
+    def sensible(self, clusters: int) -> bool:
+        """Whether a space with so many clusters is worth having: a loop needs some spans."""
+        return not self.kv.periodic or clusters > max(self.kv.degree + 1, 3)
+
+    def beside(self) -> Array:
+        """Sum of the spans before and after each cluster; at the ends twice the one there is (a loop goes on)."""
+        before, after = self.spans[[0, *range(len(self.spans))]], self.spans[[*range(len(self.spans)), -1]]
+        if self.kv.periodic:
+            before[0], after[-1] = self.spans[-1], self.spans[0]
+        return before + after
+
+    def drop(self, candidate: Array) -> bool:
+        """Remove alternate clusters of each run of candidates; say whether any went."""
+        gone = _alternate(candidate & ~self.fixed[self.alive], np.append(0, np.cumsum(self.spans)))
+        if len(self.alive) < 2 or not gone.any() or not self.sensible(int(np.count_nonzero(~gone))):
+            return False
+        self.spans = np.add.reduceat(self.spans, np.flatnonzero(~gone)[:-1])
+        self.alive = self.alive[~gone]
+        return True
+
+    def thinned(self, copies: Array) -> KnotVector:
+        """The knot vector with the clusters that are left, those of more than ``copies`` knots cut down to that."""
+        mults = np.zeros_like(self.kv.multiplicities)
+        for cluster, limit in zip(self.alive.tolist(), copies.tolist(), strict=True):
+            inside = slice(self.first[cluster], self.last[cluster] + 1)
+            mults[inside] = self._cut(inside, limit)
+        return self.kv.with_multiplicities(mults)
+
+    def _cut(self, inside: slice, limit: int) -> Array:
+        mults, kept = self.kv.multiplicities[inside].copy(), self.kept[inside].copy()
+        ends = np.arange(inside.start, inside.stop) % self.kv.spans == 0
+        if not self.kv.periodic:
+            kept |= ends
+        if mults[~kept].sum() <= limit:
+            return mults
+        chief = ends if ends.any() else kept
+        if not chief.any():
+            middle = np.abs(2 * np.arange(len(mults)) - (len(mults) - 1))
+            chief = np.arange(len(mults)) == np.lexsort((middle, -mults))[0]
+        mults[~kept] = np.where(chief, np.minimum(mults, limit), 0)[~kept]
+        return mults
+
+
+def _alternate(candidate: Array, place: Array) -> Array:
+    """Every second candidate of each run of them, never two neighbours.
+
+    Counted from both ends of the run towards its middle; where two would meet there, the one nearer to the middle of
+    the whole (``place`` in the domain) is taken.
+    """
+    change = np.diff(np.concatenate([[0], candidate.astype(int), [0]]))
+    begin, end = np.flatnonzero(change == 1), np.flatnonzero(change == -1)
+    index = np.flatnonzero(candidate)
+    run = np.repeat(np.arange(len(begin)), end - begin)
+    gone = np.zeros(len(candidate), dtype=bool)
+    gone[index[np.minimum(index - begin[run], end[run] - 1 - index) % 2 == 0]] = True
+    left = np.flatnonzero(gone[:-1] & gone[1:])
+    offset = np.abs(2 * place - place[-1])
+    gone[np.where(offset[left + 1] < offset[left], left, left + 1)] = False
+    return gone

@@ -1,0 +1,191 @@
+"""The L2 projection onto a coarser spline space: the smoothing operator."""
+
+from __future__ import annotations
+
+from functools import cached_property, lru_cache
+from itertools import pairwise
+
+import numpy as np
+
+from mracad.bspline.basis import gauss, local_values
+from mracad.bspline.gram import Gram, assembled, checked_weights, gram
+from mracad.bspline.knots import Array, KnotVector
+from mracad.bspline.refine import refinement
+from mracad.bspline.rows import Rows
+from mracad.bspline.solve import BandSolver, folded
+from mracad.errors import UsageError
+
+_TAME = 1e3
+_LOW_DEGREE = 5
+
+
+class Projection:
+    """``c' = argmin ∫ (B c − B' c')² w dt``.  Get it from :func:`projection`, which keeps it factored.
+
+    Attributes
+    ----------
+    coarse_knots, fine_knots : KnotVector
+    """
+
+    def __init__(self, coarse: KnotVector, fine: KnotVector, weights: Array | None) -> None:
+        self.coarse_knots, self.fine_knots = coarse, fine
+        self._p = refinement(coarse, fine)
+        # Some functions of an unclamped vector may be all but zero within the domain: take their whole support.
+        self._coarse, self._extra = coarse.closed()
+        self._fine, _ = fine.closed()
+        self._own = slice(self._extra[0], self._extra[0] + coarse.count)
+        if weights is not None:
+            low, high = np.searchsorted(self._fine.breaks, fine.domain)
+            weights = np.pad(weights, (low, self._fine.spans - high), "edge")
+        self._weights = weights
+
+    @cached_property
+    def _normal(self) -> tuple[BandSolver, Array] | None:
+        """Factored normal equations ``PᵀGP`` and their scaling, or None where they would lose too many digits."""
+        if self._fine.degree > _LOW_DEGREE:
+            return None
+        span, values, weight = self._coarse_at_fine()
+        begin = np.flatnonzero(np.diff(span, prepend=-1))
+        local = np.add.reduceat(np.einsum("asg,bsg,sg->sab", values, values, weight, optimize=True), begin)
+        g = assembled(span[begin] - self._coarse.degree, local, self._coarse.count, self._coarse.periodic)
+        scale = 1.0 / np.sqrt(g.diagonal()[self._own])
+        row, column, value = g.rows.coo()
+        n, before = len(scale), self._extra[0]
+        own = (row >= before) & (row < before + n) & (column >= before) & (column < before + n)
+        row, column, value = row[own] - before, column[own] - before, value[own]
+        order = folded(n) if self._coarse.periodic else np.arange(n)
+        solver = BandSolver(row, column, scale[row] * value * scale[column], order, order)
+        return (solver, scale) if solver.pivots.max() < _TAME * solver.pivots.min() else None
+
+    @cached_property
+    def _moments(self) -> tuple[Gram, Rows]:
+        return gram(self._fine, weights=self._weights), refinement(self._coarse, self._fine)
+
+    @cached_property
+    def _operator(self) -> Array:
+        """The whole ``(m, n)`` matrix, by orthogonal triangularisation of the weighted bases at the Gauss points."""
+        span, values, weight = self._coarse_at_fine()
+        root = np.sqrt(weight)
+        fine_span, offset, _ = gauss(self._fine, self._fine.degree + 1)
+        points = np.repeat(fine_span, offset.shape[1])
+        fine_values = local_values(self._fine, points, offset.ravel()).reshape(-1, *offset.shape) * root
+        first, fine_first = span - self._coarse.degree, fine_span - self._fine.degree
+        if self._coarse.periodic or any(self._extra):
+            own_fine = slice(self._extra[0], self._extra[0] + self.fine_knots.count)
+            a = _collocation(first, values * root, self._coarse.count)[:, self._own]
+            q, r = np.linalg.qr(a)
+            return np.linalg.solve(r, q.T @ _collocation(fine_first, fine_values, self._fine.count)[:, own_fine])
+        width = len(values)
+        triangle: list[Array] = []
+        done: list[Array] = []
+        carried, image, column = np.zeros((0, width)), np.zeros((0, self._fine.count)), 0
+        begin = np.flatnonzero(np.diff(first, prepend=-1)).tolist()
+        for low, high in pairwise([*begin, len(first)]):
+            shift, column = first[low] - column, first[low]
+            triangle += _leading(carried[:shift])
+            done.append(image[:shift])
+            kept = np.pad(carried[shift:, shift:], ((0, 0), (0, shift)))
+            block = (values[:, low:high] * root[low:high]).reshape(width, -1).T
+            target = _collocation(fine_first[low:high], fine_values[:, low:high], self._fine.count)
+            q, carried = np.linalg.qr(np.concatenate([kept, block]))
+            image = q.T @ np.concatenate([image[shift:], target])
+        return _back_substituted(np.array(triangle + _leading(carried)), np.concatenate([*done, image]))
+
+    def _coarse_at_fine(self) -> tuple[Array, Array, Array]:
+        """Coarse spans ``(s,)``, functions ``(d + 1, s, g)`` and weights ``(s, g)`` at the fine Gauss points."""
+        _, offset, weight = gauss(self._fine, self._fine.degree + 1)
+        if self._weights is not None:
+            weight = weight * self._weights[:, None]
+        span, begin = self._coarse.locate(self._fine.breaks[:-1])
+        points = np.repeat(span, offset.shape[1])
+        values = local_values(self._coarse, points, (begin[:, None] + offset).ravel())
+        return span, values.reshape(-1, *offset.shape), weight
+
+    def coarse(self, c: Array, axis: int = 0) -> Array:
+        """Coarse poles of the projection of poles ``c`` along ``axis``; ``c`` itself where the spaces are the same."""
+        c = np.asarray(c, dtype=float)
+        if c.shape[axis] != self.fine_knots.count:
+            raise UsageError(f"{c.shape[axis]} poles along axis {axis} where the knots want {self.fine_knots.count}")
+        if self.coarse_knots == self.fine_knots:
+            return c
+        middle = c.mean(axis=axis, keepdims=True)
+        return self._solved(c - middle, axis) + middle
+
+    def apply(self, c: Array, axis: int = 0) -> Array:
+        """Poles, over the fine knots, of the projection of poles ``c`` along ``axis``."""
+        if self.coarse_knots == self.fine_knots:
+            return self.coarse(c, axis)
+        return self._p.apply(self.coarse(c, axis), axis)
+
+    def _solved(self, c: Array, axis: int) -> Array:
+        moved = np.moveaxis(c, axis, 0)
+        flat = moved.reshape(len(moved), -1)
+        if self._normal is None:
+            out = self._operator @ flat
+        else:
+            solver, scale = self._normal
+            g, p = self._moments
+            if any(self._extra):
+                flat = np.pad(flat, (self._extra, (0, 0)))
+            right = p.apply_transposed(g.apply(flat))[self._own]
+            out = scale[:, None] * solver.solve(scale[:, None] * right)
+        return np.moveaxis(out.reshape(-1, *moved.shape[1:]), 0, axis)
+
+
+def projection(coarse: KnotVector, fine: KnotVector, weights: Array | None = None) -> Projection:
+    """The L2 projection of splines over ``fine`` onto those over ``coarse``, factored once and kept.
+
+    ``S = P (PᵀGP)⁻¹ PᵀG``: idempotent, reproduces coarse splines, and its rows sum to 1.
+
+    Parameters
+    ----------
+    coarse, fine : KnotVector
+        Nested.
+    weights : array_like (spans,), optional
+        Positive factor in the inner product on each span of ``fine`` (``|S_u|``, where the parameter runs unevenly).
+
+    Returns
+    -------
+    Projection
+
+    Raises
+    ------
+    UsageError
+        Knots not nested, or weights that do not fit.
+
+    Notes
+    -----
+    Normal equations up to degree 5 on tame knots; beyond, where they square a large condition number, orthogonal
+    triangularisation (QR) of ``√W B'`` block by block, with ``B'`` the coarse basis at the Gauss points.
+    """
+    key = None if weights is None else tuple(checked_weights(fine, weights).tolist())
+    return _cached(coarse, fine, key)
+
+
+@lru_cache(maxsize=128)
+def _cached(coarse: KnotVector, fine: KnotVector, weights: tuple[float, ...] | None) -> Projection:
+    return Projection(coarse, fine, None if weights is None else np.array(weights))
+
+
+def _collocation(first: Array, values: Array, count: int) -> Array:
+    """Dense ``(s g, count)`` matrix of local values ``(d + 1, s, g)``."""
+    width, spans, points = values.shape
+    dense = np.zeros((spans, points, count))
+    for k in range(width):
+        dense[np.arange(spans), :, (first + k) % count] += values[k]
+    return dense.reshape(-1, count)
+
+
+def _leading(triangle: Array) -> list[Array]:
+    """Rows of an upper triangle moved left to begin with their diagonal."""
+    return [np.append(row[i:], np.zeros(i)) for i, row in enumerate(triangle)]
+
+
+def _back_substituted(r: Array, x: Array) -> Array:
+    """Solution of ``R y = x`` for a banded upper triangle, ``r[i, k]`` at row ``i``, column ``i + k``."""
+    y = np.empty_like(x)
+    width = r.shape[1]
+    for i in range(len(r) - 1, -1, -1):
+        reach = min(width, len(r) - i)
+        y[i] = (x[i] - r[i, 1:reach] @ y[i + 1 : i + reach]) / r[i, 0]
+    return y

@@ -1,0 +1,317 @@
+"""Analysis and synthesis of curves and nets on nested knots, exactly.
+
+Coefficient order.  A *step* turns ``n`` poles into ``m`` coarse poles followed by ``n − m`` details.  A *pyramid* holds
+the coarsest poles and its levels from the finest to the coarsest; a level has the bands ``LH`` (coarse in u, detail in
+v), ``HL`` (detail in u, coarse in v) and ``HH``, and lacks those of a direction that does not change there; of a curve,
+or where v does not change, the one band ``HL``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
+from itertools import pairwise, zip_longest
+
+import numpy as np
+
+from mracad.bspline.knots import Array, KnotVector
+from mracad.bspline.refine import refinement
+from mracad.bspline.rows import LARGE, Rows
+from mracad.bspline.solve import BandSolver, folded
+from mracad.errors import UsageError
+from mracad.wavelet.filters import wavelets
+
+_EXACT = 1e-13
+
+
+class Step:
+    """One analysis and synthesis step between two nested spaces: ``c = P c' + Q d``.  Get it from :func:`step`.
+
+    Attributes
+    ----------
+    coarse, fine : KnotVector
+    exact : bool
+        Whether analysis and synthesis give a signal back to rounding; where not, :func:`decompose` keeps a residual.
+    """
+
+    def __init__(self, coarse: KnotVector, fine: KnotVector) -> None:
+        self.coarse, self.fine = coarse, fine
+        self._m, n = coarse.count, fine.count
+        # Some functions of an unclamped vector may be all but zero within the domain: take their whole support.
+        q_matrix = wavelets(coarse.closed()[0], *fine.closed())
+        p, q = refinement(coarse, fine).coo(), q_matrix.coo()
+        row, column, value = (np.concatenate(pair) for pair in zip(p, q, strict=True))
+        column[len(p[0]) :] += self._m
+        row_order, column_order = _orders(row, column, n, fine.periodic)
+        self._row_order, self._column_order = row_order, column_order
+        self._entries = row, column, value
+
+    @cached_property
+    def _solver(self) -> BandSolver:
+        return BandSolver(*self._entries, self._row_order, self._column_order)
+
+    @cached_property
+    def _matrix(self) -> Rows:
+        """[P|Q] with rows and columns in band order."""
+        row, column, value = self._entries
+        n = len(self._row_order)
+        return Rows.from_coo(_inverse(self._row_order)[row], _inverse(self._column_order)[column], value, (n, n))
+
+    @cached_property
+    def exact(self) -> bool:
+        probe = np.cos(np.arange(len(self._row_order)) ** 2.0)
+        return bool(np.abs(probe - self.synthesise(*self.analyse(probe))).max() < 0.1 * _EXACT)
+
+    def analyse(self, c: Array, axis: int = 0) -> tuple[Array, Array]:
+        """Coarse poles and details of poles ``c`` along ``axis``."""
+        c = np.asarray(c, dtype=float)
+        if c.shape[axis] != self.fine.count:
+            raise UsageError(f"{c.shape[axis]} poles along axis {axis} where the knots want {self.fine.count}")
+        both = self._solver.solve(c, axis)
+        return _part(both, axis, slice(None, self._m)), _part(both, axis, slice(self._m, None))
+
+    def synthesise(self, coarse: Array, detail: Array, axis: int = 0) -> Array:
+        """The poles with the given coarse poles and details along ``axis``."""
+        if (coarse.shape[axis], detail.shape[axis]) != (self._m, self.fine.count - self._m):
+            raise UsageError(
+                f"{coarse.shape[axis]} coarse poles and {detail.shape[axis]} details along axis {axis} where the "
+                f"knots want {self._m} and {self.fine.count - self._m}"
+            )
+        if coarse.size + detail.size >= LARGE:
+            from mracad.bspline import sweeps
+
+            axis %= coarse.ndim
+            return sweeps.combine(self._matrix, self._column_order, self._row_order, coarse, detail, axis)
+        both = np.concatenate([coarse, detail], axis=axis)
+        mixed = self._matrix.apply(np.take(both, self._column_order, axis=axis), axis)
+        return np.take(mixed, _inverse(self._row_order), axis=axis)
+
+
+class Chain:
+    """Several steps in a row, presented as one: ``details`` of the steps follow each other, the finest first."""
+
+    def __init__(self, steps: Sequence[Step]) -> None:
+        self.steps = tuple(steps)
+        self.fine, self.coarse = self.steps[0].fine, self.steps[-1].coarse
+
+    @property
+    def exact(self) -> bool:
+        return all(each.exact for each in self.steps)
+
+    def analyse(self, c: Array, axis: int = 0) -> tuple[Array, Array]:
+        """Coarse poles and details of poles ``c`` along ``axis``."""
+        details = []
+        for each in self.steps:
+            c, detail = each.analyse(c, axis)
+            details.append(detail)
+        return c, np.concatenate(details, axis=axis)
+
+    def synthesise(self, coarse: Array, detail: Array, axis: int = 0) -> Array:
+        """The poles with the given coarse poles and details along ``axis``."""
+        end = detail.shape[axis]
+        for each in reversed(self.steps):
+            begin = end - (each.fine.count - each.coarse.count)
+            coarse = each.synthesise(coarse, _part(detail, axis, slice(begin, end)), axis)
+            end = begin
+        return coarse
+
+
+@lru_cache(maxsize=128)
+def step(coarse: KnotVector, fine: KnotVector) -> Step | Chain:
+    """The step between two nested spaces, factored once.
+
+    Where neighbouring knots are to go, or several copies of one, the step is a chain of steps that each remove
+    alternate ones: a single step would be badly conditioned.
+    """
+    between = _between(coarse, fine)
+    return Chain([Step(b, a) for a, b in pairwise(between)]) if len(between) > 2 else Step(coarse, fine)
+
+
+def _between(coarse: KnotVector, fine: KnotVector) -> list[KnotVector]:
+    """Knot vectors from fine to coarse, each without alternate ones of the knots that are still to go."""
+    refinement(coarse, fine)  # raises where not nested
+    wanted = np.zeros(len(fine.breaks), dtype=int)
+    wanted[np.searchsorted(fine.breaks, coarse.breaks)] = coarse.multiplicities
+    chain = [fine]
+    left = fine.multiplicities.copy()
+    last = len(left) - 1
+    while True:
+        owner = np.repeat(np.arange(last if fine.periodic else last - 1), left[:-1] if fine.periodic else left[1:-1])
+        owner += 0 if fine.periodic else 1
+        copy = np.arange(len(owner)) - np.searchsorted(owner, owner)
+        doomed = copy >= wanted[owner]
+        if not doomed.any():
+            return chain if len(chain) > 1 else [fine, coarse]
+        count = np.cumsum(doomed)
+        before = np.maximum.accumulate(np.where(doomed, 0, count))
+        gone = doomed & ((count - before) % 2 == 1)
+        left -= np.bincount(owner[gone], minlength=last + 1)
+        if fine.periodic:
+            left[-1] = left[0]
+        chain.append(fine.with_multiplicities(left))
+
+
+@dataclass(frozen=True, eq=False)
+class Level:
+    """What one level adds to the next coarser surface.
+
+    Attributes
+    ----------
+    u, v : Step or Chain or None
+        The steps taken; None where a direction does not change.
+    bands : dict
+        ``"LH"``, ``"HL"``, ``"HH"``: details (see the module).
+    residual : ndarray or None
+        What rounding left over, in poles of the finer net, where it is more than 1e-13 of them.
+    """
+
+    u: Step | Chain | None
+    v: Step | Chain | None
+    bands: dict[str, Array]
+    residual: Array | None = None
+
+    def scaled(self, gain: float) -> Level:
+        """The level with its details times ``gain``."""
+        bands = {name: gain * band for name, band in self.bands.items()}
+        return replace(self, bands=bands, residual=None if self.residual is None else gain * self.residual)
+
+    def synthesise(self, coarse: Array) -> Array:
+        """Poles of the finer net from those of the coarser one."""
+        poles = coarse
+        if self.v is not None:
+            poles = self.v.synthesise(coarse, self.bands["LH"], 1)
+        if self.u is not None:
+            high = self.bands["HL"]
+            if self.v is not None:
+                high = self.v.synthesise(high, self.bands["HH"], 1)
+            poles = self.u.synthesise(poles, high, 0)
+        return poles if self.residual is None else poles + self.residual
+
+
+@dataclass(frozen=True, eq=False)
+class Pyramid:
+    """A curve or net in wavelet space.
+
+    Attributes
+    ----------
+    coarse : ndarray
+        Poles of the coarsest net, centroid subtracted.
+    levels : tuple of Level
+        From the finest to the coarsest.
+    centroid : ndarray (k,)
+    """
+
+    coarse: Array
+    levels: tuple[Level, ...]
+    centroid: Array
+
+    def scaled(self, gains: Sequence[float]) -> Pyramid:
+        """The pyramid with the details of each level (the finest first) times a gain."""
+        if len(gains) != len(self.levels):
+            raise UsageError(f"{len(gains)} gains for {len(self.levels)} levels")
+        return replace(self, levels=tuple(level.scaled(g) for level, g in zip(self.levels, gains, strict=True)))
+
+
+def decompose(poles: Array, ladder_u: Sequence[KnotVector], ladder_v: Sequence[KnotVector] | None = None) -> Pyramid:
+    """Nonstandard decomposition of the poles of a net, or of a curve.
+
+    Parameters
+    ----------
+    poles : ndarray (nu, nv, k), or (n, k) for a curve
+    ladder_u, ladder_v : sequence of KnotVector
+        Nested, from the poles' own knots to the coarsest.  One level is one step in u and one in v; the shorter ladder
+        just stops.
+
+    Returns
+    -------
+    Pyramid
+
+    Raises
+    ------
+    UsageError
+        Ladders that do not fit the poles or are not nested.
+    """
+    poles = np.asarray(poles, dtype=float)
+    ladders = [ladder_u] if ladder_v is None else [ladder_u, ladder_v]
+    if poles.shape[:-1] != tuple(ladder[0].count for ladder in ladders):
+        raise UsageError(f"poles of shape {poles.shape} do not fit the finest knots of the ladders")
+    steps = [[step(b, a) for a, b in pairwise(ladder)] for ladder in ladders]
+    centroid = poles.mean(axis=tuple(range(poles.ndim - 1)))
+    c = poles - centroid
+    levels = []
+    for pair in zip_longest(*steps):
+        c, level = _analysed(c, pair[0], pair[1] if len(pair) > 1 else None)
+        levels.append(level)
+    return Pyramid(c, tuple(levels), centroid)
+
+
+def reconstruct(pyramid: Pyramid, level: float = 0.0) -> Array:
+    """The poles of a pyramid, without its finest ``level`` levels.
+
+    ``level = k + t`` leaves out the ``k`` finest levels and a share ``t`` of the next one's details, which blends the two
+    surfaces between which it lies: ``t f^j + (1 − t) f^{j+1}``.
+    The result always has the finest net's poles.
+
+    Raises
+    ------
+    UsageError
+        ``level`` outside 0 … number of levels.
+    """
+    if not 0 <= level <= len(pyramid.levels):
+        raise UsageError(f"level {level} is outside 0 … {len(pyramid.levels)}")
+    poles = pyramid.coarse
+    for index in reversed(range(len(pyramid.levels))):
+        gain = min(max(index + 1 - level, 0.0), 1.0)
+        each = pyramid.levels[index]
+        poles = (each if gain == 1.0 else each.scaled(gain)).synthesise(poles)
+    return poles + pyramid.centroid
+
+
+def _analysed(c: Array, u: Step | Chain | None, v: Step | Chain | None) -> tuple[Array, Level]:
+    """One level; where the steps are not exact the remainder is folded in once, and kept where it still counts."""
+    coarse, bands = _bands(c, u, v)
+    level = Level(u, v, bands)
+    if all(each is None or each.exact for each in (u, v)):
+        return coarse, level
+    more, extra = _bands(c - level.synthesise(coarse), u, v)
+    coarse = coarse + more
+    level = Level(u, v, {name: band + extra[name] for name, band in bands.items()})
+    residual = c - level.synthesise(coarse)
+    counts = np.abs(residual).max(initial=0) > _EXACT * np.abs(c).max(initial=0)
+    return coarse, replace(level, residual=residual if counts else None)
+
+
+def _bands(c: Array, u: Step | Chain | None, v: Step | Chain | None) -> tuple[Array, dict[str, Array]]:
+    bands = {}
+    if u is not None:
+        c, bands["HL"] = u.analyse(c, 0)
+    if v is not None:
+        c, bands["LH"] = v.analyse(c, 1)
+        if u is not None:
+            bands["HL"], bands["HH"] = v.analyse(bands["HL"], 1)
+    return c, bands
+
+
+def _orders(row: Array, column: Array, n: int, periodic: bool) -> tuple[Array, Array]:
+    """Orders of rows and columns in which the matrix has a narrow band: columns by the middle of their supports."""
+    if not periodic:
+        first, last = np.full(n, n), np.zeros(n, dtype=int)
+        np.minimum.at(first, column, row)
+        np.maximum.at(last, column, row)
+        return np.arange(n), np.lexsort((np.arange(n), first + last))
+    angle = np.exp(2j * np.pi * row / n)
+    middle = np.zeros(n, dtype=complex)
+    np.add.at(middle, column, angle)
+    around = np.argsort(np.round(np.angle(middle) % (2 * np.pi), 9), kind="stable")
+    return folded(n), around[folded(n)]
+
+
+def _inverse(order: Array) -> Array:
+    inverse = np.empty_like(order)
+    inverse[order] = np.arange(len(order))
+    return inverse
+
+
+def _part(c: Array, axis: int, part: slice) -> Array:
+    return np.moveaxis(np.moveaxis(c, axis, 0)[part], 0, axis)
