@@ -27,25 +27,26 @@ def coinciding(model: Model) -> list[tuple[Edge, Side, Side]]:
     from scipy.spatial import cKDTree
 
     tolerance = max(GAP, 1e-6 * model.diagonal)
-    steps = np.array([np.linalg.norm(np.diff(e.points, axis=0), axis=1).max() for e in free])
+    points = np.concatenate([e.points for e in free])
     owners = np.repeat(np.arange(len(free)), [len(e.points) for e in free])
-    tree = cKDTree(np.concatenate([e.points for e in free]))
+    reach = np.array([np.linalg.norm(np.diff(e.points, axis=0), axis=1).max() for e in free])[owners] + tolerance
+    tree = cKDTree(points)
     found: dict[tuple[int, int], tuple[Edge, Side, Side]] = {}
     for i, edge in enumerate(free):
-        middle = edge.points[len(edge.points) // 2]
-        for j in sorted({int(owners[k]) for k in tree.query_ball_point(middle, steps.max() + tolerance)}):
+        probes = edge.points[[0, len(edge.points) // 2, -1]]
+        near = [np.array(tree.query_ball_point(probe, reach.max()), dtype=int) for probe in probes]
+        hit = [
+            np.unique(owners[k[np.linalg.norm(points[k] - p, axis=1) <= reach[k]]])
+            for k, p in zip(near, probes, strict=True)
+        ]
+        for j in map(int, np.intersect1d(np.intersect1d(hit[0], hit[1]), hit[2])):
             other = free[j]
             if other.part != edge.part or other.sides[0].face == edge.sides[0].face or (j, i) in found:
                 continue
-            if np.linalg.norm(middle - other.points, axis=1).min() > steps[j] + tolerance:
-                continue
             distance, uv = _carried(edge.points, other)
             if distance.max() <= tolerance:
-                found[i, j] = (
-                    edge,
-                    edge.sides[0],
-                    Side(other.sides[0].face, uv=uv) if uv is not None else _baked(edge, other),
-                )
+                side = Side(other.sides[0].face, uv=uv) if uv is not None else _baked(edge, other)
+                found[i, j] = (edge, edge.sides[0], side)
     return list(found.values())
 
 

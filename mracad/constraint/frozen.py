@@ -11,13 +11,14 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
 from mracad.bspline.basis import basis
 from mracad.bspline.knots import KnotVector, Side
 from mracad.bspline.net import Curve, Net
-from mracad.constraint.region import crossed_cells, face_region, supported
+from mracad.constraint.region import Region, face_region, supported
 from mracad.model import Face
 
 Array = np.ndarray
@@ -40,10 +41,13 @@ class Separation:
         Some part of an edited face depends on the point.
     frozen : ndarray of bool (nu, nv)
         The point must stay for the sake of an edge or of a face that is not edited.
+    reach : dict of int to ndarray of bool (nu, nv)
+        For each face by index, the points that some part of it depends on.
     """
 
     visible: Array
     frozen: Array
+    reach: dict[int, Array]
 
     @property
     def free(self) -> Array:
@@ -67,31 +71,47 @@ def separate(net: Net, faces: Sequence[Face], edited: Collection[int], keep: str
     """
     visible = np.zeros(net.poles.shape[:2], bool)
     frozen = np.zeros_like(visible)
+    reach = {}
     for face in faces:
-        reach = supported(net, face_region(net, face).inside)
+        region = face_region(net, face)
+        reach[face.index] = supported(net, region.inside)
         if face.index in edited:
-            visible |= reach
-            for trim in face.trims:
-                frozen |= frozen_along(net, trim.curve, keep)
+            visible |= reach[face.index]
+            frozen |= frozen_along(net, [trim.curve for trim in face.trims], region, keep)
         else:
-            frozen |= reach
-    return Separation(visible, frozen)
+            frozen |= reach[face.index]
+    return Separation(visible, frozen, reach)
 
 
-def frozen_along(net: Net, curve: Curve, keep: str = "g1") -> Array:
-    """Control points ``(nu, nv)`` that must stay so that ``net`` keeps its ``keep`` continuity along a pcurve."""
-    for axis, knots in enumerate((net.u, net.v)):
-        at = curve.poles[:, axis]
-        position = float(at.mean())
-        if np.ptp(at) <= 2 * ISO * _span(knots, position):
-            rows = jet_support(knots, position, CONTINUITY[keep])
-            other = (net.u, net.v)[1 - axis]
-            across = curve.poles[:, 1 - axis]
-            columns = _meeting(other, float(across.min()), float(across.max()))
-            return rows[:, None] & columns[None, :] if axis == 0 else columns[:, None] & rows[None, :]
-    return supported(net, crossed_cells(net, curve))
+def frozen_along(net: Net, curves: Sequence[Curve], region: Region, keep: str = "g1") -> Array:
+    """Control points ``(nu, nv)`` that must stay so that ``net`` keeps its ``keep`` continuity along pcurves.
+
+    Parameters
+    ----------
+    net : Net
+    curves : sequence of Curve
+    region : Region
+        Of the face that the curves bound; its ``crossed`` cells are theirs.
+    keep : {"g0", "g1", "g2"}
+    """
+    frozen = np.zeros(net.poles.shape[:2], bool)
+    trimmed = np.zeros_like(region.inside)
+    for curve, crossed in zip(curves, region.crossed, strict=True):
+        for axis, knots in enumerate((net.u, net.v)):
+            at = curve.poles[:, axis]
+            position = float(at.mean())
+            if np.ptp(at) <= 2 * ISO * _span(knots, position):
+                rows = jet_support(knots, position, CONTINUITY[keep])
+                across = curve.poles[:, 1 - axis]
+                columns = _meeting((net.u, net.v)[1 - axis], float(across.min()), float(across.max()))
+                frozen |= rows[:, None] & columns if axis == 0 else columns[:, None] & rows
+                break
+        else:
+            trimmed |= crossed
+    return frozen | supported(net, trimmed)
 
 
+@lru_cache(maxsize=4096)
 def jet_support(knots: KnotVector, at: float, highest: int) -> Array:
     """Basis functions ``(n,)`` with a non-zero derivative of order ≤ ``highest`` at ``at``, from either side."""
     start, end = knots.domain

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,39 +27,31 @@ class Region:
 
     Attributes
     ----------
-    crossed : ndarray of bool (cells_u, cells_v)
-        Cells that a boundary curve of the face may pass through (never too few).
     inside : ndarray of bool (cells_u, cells_v)
-        Cells of which some part belongs to the face, the crossed ones among them.
+        Cells of which some part belongs to the face, those that its boundary crosses among them.
+    crossed : tuple of ndarray of bool (cells_u, cells_v)
+        Per boundary curve, the cells that it may pass through, never too few; both sides of a knot line it lies on.
     """
 
-    crossed: Array
     inside: Array
+    crossed: tuple[Array, ...]
 
 
-def region(net: Net, curves: Iterable[Curve]) -> Region:
+def region(net: Net, curves: Sequence[Curve]) -> Region:
     """Cells of the knot grid that a face bounded by ``curves`` crosses and covers.
 
     Parameters
     ----------
     net : Net
         The surface.
-    curves : iterable of Curve
+    curves : sequence of Curve
         The pcurves of all its edges, closed loops in the parameter plane.  None: the whole surface.
     """
-    cells = (len(net.u.breaks) - 1, len(net.v.breaks) - 1)
-    pieces = [piece for curve in curves for piece in _pieces(net, curve)]
-    if not pieces:
-        return Region(np.zeros(cells, bool), np.ones(cells, bool))
-    boxes = np.concatenate([box for box, _ in pieces])
-    chords = np.concatenate([chord for _, chord in pieces])
-    crossed = _mark(net, boxes)
-    return Region(crossed, crossed | _covered(net, chords))
-
-
-def crossed_cells(net: Net, curve: Curve) -> Array:
-    """Cells ``(cells_u, cells_v)`` that one curve may pass through, both sides of a knot line it lies on."""
-    return _mark(net, np.concatenate([box for box, _ in _pieces(net, curve)]))
+    if not curves:
+        return Region(np.ones((net.u.spans, net.v.spans), bool), ())
+    boxes, chords, owners = _pieces(net, curves)
+    crossed = tuple(_mark(net, boxes[owners == i]) for i in range(len(curves)))
+    return Region(np.logical_or.reduce(crossed) | _covered(net, chords), crossed)
 
 
 def supported(net: Net, cells: Array) -> Array:
@@ -91,33 +84,52 @@ def _supports(knots: KnotVector) -> tuple[Array, Array]:
     return first, first + count
 
 
-def _pieces(net: Net, curve: Curve) -> Iterable[tuple[Array, Array]]:
-    """Bounding boxes ``(q, 2, 2)`` and chords ``(q, 2, 2)`` of short pieces of the curve.
+def _pieces(net: Net, curves: Sequence[Curve]) -> tuple[Array, Array, Array]:
+    """Bounding boxes ``(q, 2, 2)`` and chords ``(q, 2, 2)`` of short pieces of the curves, and whose they are ``(q,)``.
 
     A Bézier piece lies in the hull of its control points (weights are positive); it is halved until its box
     meets at most two cells or is a negligible part of one.
     """
-    _, poles, weights = curve.bezier()
+    by_degree: dict[int, list[tuple[Array, Array]]] = defaultdict(list)
+    for i, curve in enumerate(curves):
+        points = _bezier(curve)
+        by_degree[curve.knots.degree].append((points, np.full(len(points), i)))
+    found = []
+    for parts in by_degree.values():
+        points, owners = (np.concatenate(column) for column in zip(*parts, strict=True))
+        found += list(_short(net, points, owners))
+    boxes, chords, owners = (np.concatenate(column) for column in zip(*found, strict=True))
+    return boxes, chords, owners
+
+
+def _bezier(curve: Curve) -> Array:
+    """Homogeneous Bézier points ``(q, p + 1, 3)`` of a curve."""
+    if curve.knots.spans == 1 and curve.knots.multiplicities[0] == curve.knots.degree + 1:
+        poles, weights = curve.poles[None], None if curve.weights is None else curve.weights[None]
+    else:
+        _, poles, weights = curve.bezier()
     if weights is None:
-        weights = np.ones(poles.shape[:2])
-    points = np.concatenate([poles * weights[..., None], weights[..., None]], axis=-1)
+        return np.concatenate([poles, np.ones((*poles.shape[:2], 1))], axis=-1)
+    return np.concatenate([poles * weights[..., None], weights[..., None]], axis=-1)
+
+
+def _short(net: Net, points: Array, owners: Array) -> Iterator[tuple[Array, Array, Array]]:
+    """Boxes, chords and owners of Bézier pieces, halved as :func:`_pieces` says."""
     smallest = np.array([np.diff(k.breaks).min() for k in (net.u, net.v)]) / 64
     for depth in range(DEPTH):
         plane = points[..., :2] / points[..., 2:]
         low, high = plane.min(axis=1), plane.max(axis=1)
-        crossings = [
-            np.searchsorted(k.breaks, _wrapped(k, low[:, i])[0] + (high[:, i] - low[:, i]))
-            - np.searchsorted(k.breaks, _wrapped(k, low[:, i])[0])
-            for i, k in enumerate((net.u, net.v))
-        ]
-        done = (crossings[0] + crossings[1] <= 1) | np.all(high - low <= smallest, axis=1) | (depth == DEPTH - 1)
-        done |= (high - low).min(axis=1) == 0
+        size = high - low
+        crossings = np.zeros(len(points), dtype=np.int64)
+        for i, knots in enumerate((net.u, net.v)):
+            start = _wrapped(knots, low[:, i])[0]
+            crossings += np.searchsorted(knots.breaks, start + size[:, i]) - np.searchsorted(knots.breaks, start)
+        done = (crossings <= 1) | (size <= smallest).all(axis=1) | (size.min(axis=1) == 0) | (depth == DEPTH - 1)
         if done.any():
-            yield np.stack([low[done], high[done]], axis=1), plane[done][:, [0, -1]]
-        points = points[~done]
-        if not len(points):
+            yield np.stack([low[done], high[done]], axis=1), plane[done][:, [0, -1]], owners[done]
+        if done.all():
             return
-        points = _halved(points)
+        points, owners = _halved(points[~done]), np.tile(owners[~done], 2)
 
 
 def _halved(points: Array) -> Array:
@@ -195,5 +207,5 @@ def _covered(net: Net, chords: Array) -> Array:
 
 
 def face_region(net: Net, face: Face) -> Region:
-    """The :class:`Region` of a face on its surface ``net``."""
+    """The :class:`Region` of a face on its surface ``net``; its crossed cells are in the order of the trims."""
     return region(net, [trim.curve for trim in face.trims])

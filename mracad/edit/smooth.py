@@ -15,11 +15,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mracad.bspline.basis import basis
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.net import Net
 from mracad.constraint.fairing import Fairing, border_noise, fairing_length
 from mracad.constraint.frozen import Separation, separate
-from mracad.constraint.region import face_region, supported
 from mracad.edit.result import Edit, FaceOutcome, Status
 from mracad.model import Displacement, Face, Model, Offset, Surface
 from mracad.options import Smooth, length
@@ -106,11 +106,9 @@ class _SurfaceSmoothing:
         net = surface.net
         self.net, self.options = net, options
         self.spans = (arc_lengths(net, 0), arc_lengths(net, 1))
-        regions = [face_region(net, face) for face in faces]
-        self.reach = {face.index: supported(net, r.inside) for face, r in zip(faces, regions, strict=True)}
-        inside = np.logical_or.reduce([r.inside for r in regions])
-        self.creases = (_crease_lines(net, 0, inside), _crease_lines(net, 1, inside))
         self.separation = separate(net, faces, edited, options.keep)
+        inside = np.logical_or.reduce(list(self.separation.reach.values()))
+        self.creases = (_crease_lines(net, 0, inside), _crease_lines(net, 1, inside))
         self.fairing, self.inserted, self.offset = 0.0, 0, None
         self.change = self.moved = np.zeros(net.poles.shape)
         target = self._target(scale)
@@ -140,7 +138,7 @@ class _SurfaceSmoothing:
 
     def outcome(self, face: Face, edited: bool, held: bool) -> FaceOutcome:
         """What became of one face."""
-        reach = self.reach[face.index]
+        reach = self.separation.reach[face.index]
         detail = _largest(self.change, reach)
         free = int((reach & self.separation.free).sum())
         moved = _largest(self.moved, reach) if self.moved.shape == self.net.poles.shape else _largest(self.moved)
@@ -273,33 +271,29 @@ def _largest(change: Array, points: Array | None = None) -> float:
     return float(np.sqrt((vectors**2).sum(axis=-1).max(initial=0.0)))
 
 
-def _crease_lines(net: Net, axis: int, inside: Array) -> Array:
+def _crease_lines(net: Net, axis: int, visible: Array) -> frozenset[float]:
     """Interior knots of full multiplicity across which the normal turns by more than the kink angle.
 
     Parameters
     ----------
     axis : int
         0 for lines u = const, 1 for v = const.
-    inside : ndarray of bool (cells_u, cells_v)
-        Cells that belong to a face; only there does a line count.
+    visible : ndarray of bool (nu, nv)
+        Control points that some face depends on; a line counts only where one of those on it is visible.
     """
     knots, other = _pair(net)[axis], _pair(net)[1 - axis]
-    inside = inside if axis == 0 else inside.T
     full = np.flatnonzero(knots.multiplicities[1:-1] >= knots.degree) + 1
     if not len(full):
-        return np.empty(0)
-    fractions = np.array([0.01, 0.25, 0.5, 0.75, 0.99])
-    across = (other.breaks[:-1, None] + np.diff(other.breaks)[:, None] * fractions).ravel()
-    creases = []
-    for line in full:
-        seen = np.repeat(inside[line - 1] | inside[line], len(fractions))
-        points = np.stack([np.full(seen.sum(), knots.breaks[line]), across[seen]], axis=1)[:, :: 1 - 2 * axis]
-        before = net.normals(np.ascontiguousarray(points), side=("left", "right") if axis == 0 else ("right", "left"))
-        after = net.normals(np.ascontiguousarray(points))
-        turn = np.arctan2(np.linalg.norm(np.cross(before, after), axis=1), (before * after).sum(axis=1))
-        if np.nanmax(turn, initial=0.0) > KINK:
-            creases.append(knots.breaks[line])
-    return np.array(creases)
+        return frozenset()
+    lines, across = knots.breaks[full], other.greville()
+    first, values = basis(knots, lines)
+    on = (first + values.argmax(axis=1)) % knots.count
+    line, place = np.nonzero((visible if axis == 0 else visible.T)[on])
+    points = np.ascontiguousarray(np.stack([lines[line], across[place]], axis=1)[:, :: 1 - 2 * axis])
+    before = net.normals(points, side=("left", "right") if axis == 0 else ("right", "left"))
+    after = net.normals(points)
+    turn = np.arctan2(np.linalg.norm(np.cross(before, after), axis=1), (before * after).sum(axis=1))
+    return frozenset(float(x) for x in lines[np.unique(line[turn > KINK])])
 
 
 def _bounded(moved: Array, bound: float, window: tuple[int, int]) -> Array:

@@ -7,7 +7,7 @@ from mracad.bspline.gram import gram
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.net import Net
 from mracad.constraint.fairing import Fairing, border_noise, fairing_length
-from mracad.constraint.frozen import frozen_along
+from tests.constraint.test_frozen import along
 from tests.constraint.test_region import circle
 
 
@@ -24,7 +24,7 @@ def masks(u, v):
     frame[2:-2, 2:-2] = True
     unit = KnotVector.clamped(np.linspace(0, 1, u.spans + 1), 3), KnotVector.clamped(np.linspace(0, 1, v.spans + 1), 3)
     if not u.periodic:
-        hole = frozen_along(Net(*unit, np.zeros((u.count, v.count, 3))), circle([0.5, 0.5], 0.2))
+        hole = along(Net(*unit, np.zeros((u.count, v.count, 3))), circle([0.5, 0.5], 0.2))
         return {"frame": frame, "hole": frame & ~hole}
     return {"frame": frame}
 

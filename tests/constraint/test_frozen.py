@@ -6,6 +6,7 @@ import pytest
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.net import Net
 from mracad.constraint.frozen import frozen_along, jet_support, separate
+from mracad.constraint.region import region
 from mracad.model import Face, Trim
 from tests.constraint.test_region import circle, segment, square
 
@@ -18,6 +19,11 @@ TRIMS = {
     "circle": (circle([0.5, 0.5], 0.3), None),
     "nearly natural": (segment((1e-5, 0), (0, 1)), None),
 }
+
+
+def along(net, curve, keep="g1"):
+    """Points frozen by one curve."""
+    return frozen_along(net, [curve], region(net, [curve]), keep)
 
 
 def random_net(degrees, seed=0):
@@ -33,7 +39,7 @@ def random_net(degrees, seed=0):
 def test_a_displacement_of_the_free_points_leaves_the_jet_along_the_edge(degrees, keep, name):
     curve, _ = TRIMS[name]
     net = random_net(degrees)
-    frozen = frozen_along(net, curve, keep)
+    frozen = along(net, curve, keep)
     assert frozen.any() and not frozen.all()
     delta = Net(net.u, net.v, np.where(frozen[..., None], 0.0, net.poles))
     uv = curve.evaluate(np.linspace(0, 1, 300))[0]
@@ -50,9 +56,9 @@ def test_a_displacement_of_the_free_points_leaves_the_jet_along_the_edge(degrees
 def test_rows_of_a_natural_edge():
     net = random_net((3, 3))
     for keep, rows in (("g0", 1), ("g1", 2), ("g2", 3)):
-        frozen = frozen_along(net, segment((0, 0), (0, 1)), keep)
+        frozen = along(net, segment((0, 0), (0, 1)), keep)
         assert frozen[:rows].all() and not frozen[rows:].any()
-        frozen = frozen_along(net, segment((0, 1), (1, 1)), keep)
+        frozen = along(net, segment((0, 1), (1, 1)), keep)
         assert frozen[:, -rows:].all() and not frozen[:, :-rows].any()
 
 
@@ -63,7 +69,7 @@ def test_the_closing_edge_of_a_periodic_direction_freezes_the_functions_around_i
     assert np.array_equal(touched, jet_support(knots, 12.0, 1))
     rng = np.random.default_rng(1)
     v = KnotVector.clamped(np.linspace(0, 1, 6), 3)
-    frozen = frozen_along(Net(knots, v, np.zeros((12, 8, 3))), segment((12, 0), (12, 1)), "g1")
+    frozen = along(Net(knots, v, np.zeros((12, 8, 3))), segment((12, 0), (12, 1)), "g1")
     delta = Net(knots, v, np.where(frozen[..., None], 0, rng.standard_normal((12, 8, 3))))
     at = np.stack([np.zeros(9), np.linspace(0, 1, 9)], axis=1)
     assert max(np.abs(x).max() for x in delta.evaluate(at, 1)) < 1e-14
@@ -76,8 +82,12 @@ def face(index, curves):
 
 def test_a_face_that_is_not_edited_freezes_its_whole_region():
     net = random_net((3, 3))
-    left = face(0, [segment((0, 0), (0.5, 0)), segment((0.5, 0), (0.5, 1)), segment((0.5, 1), (0, 1)), segment((0, 1), (0, 0))])
-    right = face(1, [segment((0.5, 0), (1, 0)), segment((1, 0), (1, 1)), segment((1, 1), (0.5, 1)), segment((0.5, 1), (0.5, 0))])
+    left = face(
+        0, [segment((0, 0), (0.5, 0)), segment((0.5, 0), (0.5, 1)), segment((0.5, 1), (0, 1)), segment((0, 1), (0, 0))]
+    )
+    right = face(
+        1, [segment((0.5, 0), (1, 0)), segment((1, 0), (1, 1)), segment((1, 1), (0.5, 1)), segment((0.5, 1), (0.5, 0))]
+    )
     both = separate(net, [left, right], {0, 1})
     one = separate(net, [left, right], {0})
     delta = Net(net.u, net.v, np.where(one.free[..., None], net.poles, 0.0))
