@@ -15,23 +15,27 @@ from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS
 from OCP.XCAFDoc import XCAFDoc_Area, XCAFDoc_Centroid, XCAFDoc_Volume
 
+from mracad.bspline.net import Net
 from mracad.errors import MracadError
 from mracad.model import Displacement, Model, Offset, Surface
 from mracad.occ.convert import lay
 from mracad.occ.document import Document
+from mracad.occ.follow import follow
 from mracad.occ.geometry import basis, nets
 from mracad.occ.settings import quiet
 from mracad.occ.topology import edge_uses
 
 Array = np.ndarray
+_STILL = 1e-9  # mm: an edge that moves by less keeps its curve
 
 
 def apply(document: Document, model: Model, displacement: Displacement) -> None:
     """Displace the surfaces of a document, in place.
 
     Knots are inserted exactly; then only those control points move whose offset is not zero, all others keep every
-    bit.  Faces that were seen as NURBS by ``view(document, convert=…)`` are put on their new surfaces first.
-    Triangulations, and the areas, volumes and centroids that the file states, are dropped.
+    bit.  Faces that were seen as NURBS by ``view(document, convert=…)`` are put on their new surfaces first.  Edges
+    that move get new 3D curves and vertices.  Triangulations, and the areas, volumes and centroids that the file
+    states, are dropped.
 
     Parameters
     ----------
@@ -49,6 +53,7 @@ def apply(document: Document, model: Model, displacement: Displacement) -> None:
             _move(handle, offset, document.unit_mm)
         if displacement.offsets:
             _forget(document)
+            follow(document, _moved_edges(model, displacement))
 
 
 def _handle(document: Document, surface: Surface, refined: bool) -> Geom_BSplineSurface | Geom_BezierSurface:
@@ -93,10 +98,31 @@ def _move(surface: Geom_BSplineSurface | Geom_BezierSurface, offset: Offset, uni
         surface.SetPole(i, j, gp_Pnt(*pole))
 
 
+def _moved_edges(model: Model, displacement: Displacement) -> list[int]:
+    """The edges along which some side moves."""
+    sides: dict[int, list[tuple[int, Array]]] = {index: [] for index in displacement.offsets}
+    for edge in model.edges:
+        for side in edge.sides:
+            index = model.faces[side.face].surface
+            if index in sides and side.uv is not None and not edge.degenerate:
+                sides[index].append((edge.index, side.uv))
+    moved: set[int] = set()
+    for index, offset in displacement.offsets.items():
+        if sides[index]:
+            net = model.surfaces[index].net.refined(offset.u_knots, offset.v_knots)
+            change = Net(net.u, net.v, offset.poles, net.weights)
+            along = change.evaluate(np.concatenate([uv for _, uv in sides[index]]))
+            far = np.linalg.norm(along, axis=1) > _STILL
+            which = np.repeat([edge for edge, _ in sides[index]], [len(uv) for _, uv in sides[index]])
+            moved.update(which[far].tolist())
+    return sorted(moved)
+
+
 def _forget(document: Document) -> None:
-    """Drop what is no longer true of the moved geometry."""
+    """Drop what is no longer true: triangulations, curves on replaced surfaces, stated areas, volumes, centroids."""
     for part in document.parts:
         BRepTools.Clean_s(part.shape)
+        BRepTools.RemoveUnusedPCurves_s(part.shape)
     labels = TDF_ChildIterator(document.shape_tool.Label(), True)
     while labels.More():
         for property_of in (XCAFDoc_Area, XCAFDoc_Volume, XCAFDoc_Centroid):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
@@ -158,20 +159,13 @@ def _statuses(analyzer: BRepCheck_Analyzer, shape: TopoDS_Shape, context: TopoDS
 
 def _free_edges(document: Document) -> int:
     """Edges that one face uses once, degenerate ones left out."""
-    free = 0
-    for part in document.parts:
-        edges = TopTools_IndexedMapOfShape()
-        counts: dict[int, int] = {}
-        for face in document.faces[part.first : part.first + part.faces.Extent()]:
-            for edge in edge_uses(face):
-                place = edges.Add(edge)
-                counts[place] = counts.get(place, 0) + 1
-        free += sum(
-            not BRep_Tool.Degenerated_s(TopoDS.Edge_s(edges.FindKey(place)))
-            for place, count in counts.items()
-            if count == 1
-        )
-    return free
+    uses = Counter(
+        part.first_edge + part.edges.FindIndex(edge) - 1
+        for part in document.parts
+        for face in document.faces[part.first : part.first + part.faces.Extent()]
+        for edge in edge_uses(face)
+    )
+    return sum(count == 1 and not BRep_Tool.Degenerated_s(document.edges[edge]) for edge, count in uses.items())
 
 
 def _distance(face: TopoDS_Face) -> float:

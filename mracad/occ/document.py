@@ -12,10 +12,10 @@ from OCP.Quantity import Quantity_Color
 from OCP.TDataStd import TDataStd_Name
 from OCP.TDF import TDF_Label, TDF_LabelSequence
 from OCP.TDocStd import TDocStd_Document
-from OCP.TopAbs import TopAbs_FACE
+from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE
 from OCP.TopExp import TopExp
 from OCP.TopLoc import TopLoc_Location
-from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Shape
+from OCP.TopoDS import TopoDS, TopoDS_Edge, TopoDS_Face, TopoDS_Shape
 from OCP.TopTools import TopTools_IndexedMapOfShape
 from OCP.XCAFDoc import XCAFDoc_ColorTool, XCAFDoc_ColorType, XCAFDoc_DocumentTool, XCAFDoc_ShapeTool
 
@@ -36,6 +36,10 @@ class Part:
         Document-wide index of its first face.
     faces : TopTools_IndexedMapOfShape
         Its faces, from 1.
+    first_edge : int
+        Document-wide index of its first edge.
+    edges : TopTools_IndexedMapOfShape
+        The edges of its faces, from 1.
     placements : list of TopLoc_Location
         Where its instances stand.
     colour : str
@@ -49,6 +53,8 @@ class Part:
     product: str
     first: int
     faces: TopTools_IndexedMapOfShape
+    first_edge: int
+    edges: TopTools_IndexedMapOfShape
     placements: list[TopLoc_Location]
     colour: str
     face_names: dict[int, str]
@@ -123,28 +129,35 @@ class Document:
         for label in _labels(self.shape_tool.GetFreeShapes):
             _walk(label, TopLoc_Location(), "", placed, tints)
         parts: list[Part] = []
-        first = 0
+        first = first_edge = 0
         for label in _labels(self.shape_tool.GetShapes):
             if not XCAFDoc_ShapeTool.IsSimpleShape_s(label):
                 continue
             shape = XCAFDoc_ShapeTool.GetShape_s(label)
-            faces = TopTools_IndexedMapOfShape()
+            faces, edges = TopTools_IndexedMapOfShape(), TopTools_IndexedMapOfShape()
             TopExp.MapShapes_s(shape, TopAbs_FACE, faces)
+            for i in range(1, faces.Extent() + 1):
+                TopExp.MapShapes_s(faces.FindKey(i), TopAbs_EDGE, edges)
             names, colours = _described(label, faces)
             key = label_key(label)
+            colour = label_colour(label) or tints.get(key, "")
+            places = placed.get(key, [])
             parts.append(
-                Part(
-                    label, shape, label_name(label), first, faces, placed.get(key, []),
-                    label_colour(label) or tints.get(key, ""), names, colours,
-                )
+                Part(label, shape, label_name(label), first, faces, first_edge, edges, places, colour, names, colours)
             )
             first += faces.Extent()
+            first_edge += edges.Extent()
         return parts
 
     @cached_property
     def faces(self) -> list[TopoDS_Face]:
         """All faces, in their part's frame, in the order of ``Model.faces``."""
         return [TopoDS.Face_s(part.faces.FindKey(i)) for part in self.parts for i in range(1, part.faces.Extent() + 1)]
+
+    @cached_property
+    def edges(self) -> list[TopoDS_Edge]:
+        """All edges of faces, in their part's frame, in the order of ``Model.edges``."""
+        return [TopoDS.Edge_s(part.edges.FindKey(i)) for part in self.parts for i in range(1, part.edges.Extent() + 1)]
 
 
 def label_key(label: TDF_Label) -> str:

@@ -109,10 +109,10 @@ def _factors(model: StepData_StepModel, text: bytes) -> list[float]:
     found = []
     for match in re.finditer(rb"#(\d+)\s*=\s*\([^;]*?\bGLOBAL_UNIT_ASSIGNED_CONTEXT\b", text):
         number = model.NextNumberForLabel(f"#{match[1].decode()}", 0, True)
-        context = STEPConstruct_UnitContext()
-        entity = model.Value(number) if number else None
-        if hasattr(entity, "GlobalUnitAssignedContext"):
-            context.ComputeFactors(entity.GlobalUnitAssignedContext(), StepData_Factors())
+        units = getattr(model.Value(number), "GlobalUnitAssignedContext", None) if number else None
+        if units is not None:
+            context = STEPConstruct_UnitContext()
+            context.ComputeFactors(units(), StepData_Factors())
             if context.LengthDone():
                 found.append(context.LengthFactor())
     return sorted(found)

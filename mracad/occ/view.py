@@ -16,7 +16,6 @@ from OCP.ShapeFix import ShapeFix_Edge
 from OCP.TopAbs import TopAbs_FORWARD, TopAbs_REVERSED
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS, TopoDS_Edge, TopoDS_Face
-from OCP.TopTools import TopTools_IndexedMapOfShape
 
 from mracad.errors import UsageError
 from mracad.model import Edge, Face, Model, Side, Surface, Trim
@@ -67,8 +66,6 @@ class _Found:
     surface_of: list[int | None] = field(default_factory=list)
     surfaces: dict[Geom_Surface, list[int]] = field(default_factory=dict)  # each NURBS surface and its faces
     uses: list[_Use] = field(default_factory=list)
-    edges: list[TopoDS_Edge] = field(default_factory=list)
-    part_of_edge: list[int] = field(default_factory=list)
 
 
 def view(document: Document, convert: Iterable[int] = ()) -> Model:
@@ -113,7 +110,7 @@ def view(document: Document, convert: Iterable[int] = ()) -> Model:
             Surface(index, net, tuple(members), kinds[members[0]])
             for index, (net, members) in enumerate(zip(control, found.surfaces.values(), strict=True))
         )
-        edges = tuple(_edges(found, scale))
+        edges = tuple(_edges(document, found))
     products = tuple(part.product for part in document.parts)
     diagonal = _diagonal(document, boxes)
     return Model(document.name, surfaces, faces, edges, diagonal, document.unit, document.schema, products)
@@ -122,9 +119,7 @@ def view(document: Document, convert: Iterable[int] = ()) -> Model:
 def _walk(document: Document, chosen: frozenset[int]) -> _Found:
     """Go through all faces and their edges."""
     found = _Found(document.faces)
-    for number, part in enumerate(document.parts):
-        local = TopTools_IndexedMapOfShape()
-        offset = len(found.edges) - 1
+    for part in document.parts:
         for index in range(part.first, part.first + part.faces.Extent()):
             face = TopoDS.Face_s(found.faces[index].Oriented(TopAbs_FORWARD))
             location = TopLoc_Location()
@@ -137,11 +132,9 @@ def _walk(document: Document, chosen: frozenset[int]) -> _Found:
             found.frames.append(matrix(location))
             found.surface_of.append(list(found.surfaces).index(handle) if handle in found.surfaces else None)
             for position, edge in enumerate(edge_uses(face)):
-                place = offset + local.Add(edge)
+                place = part.first_edge + part.edges.FindIndex(edge) - 1
                 pcurve = replaced.pcurves[position] if replaced else _pcurve(edge, face)
                 found.uses.append(_Use(index, place, pcurve, *BRep_Tool.Range_s(edge, face)))
-        found.edges += [TopoDS.Edge_s(local.FindKey(i)) for i in range(1, local.Extent() + 1)]
-        found.part_of_edge += [number] * local.Extent()
     return found
 
 
@@ -163,13 +156,15 @@ def _trims(found: _Found) -> dict[int, tuple[Trim, ...]]:
     return trims
 
 
-def _edges(found: _Found, scale: float) -> Iterator[Edge]:
+def _edges(document: Document, found: _Found) -> Iterator[Edge]:
     """All edges with their samples."""
-    by_edge: list[list[_Use]] = [[] for _ in found.edges]
+    scale = document.unit_mm
+    part_of = np.repeat(np.arange(len(document.parts)), [part.edges.Extent() for part in document.parts]).tolist()
+    by_edge: list[list[_Use]] = [[] for _ in document.edges]
     for use in found.uses:
         by_edge[use.edge].append(use)
     walls = {use.face: _wall(found, use.face) for use in found.uses if found.surface_of[use.face] is None}
-    for index, (edge, uses) in enumerate(zip(found.edges, by_edge, strict=True)):
+    for index, (edge, uses) in enumerate(zip(document.edges, by_edge, strict=True)):
         degenerate = BRep_Tool.Degenerated_s(edge)
         points, tangents = (_NONE, _NONE) if degenerate else _along(edge)
         sides = []
@@ -183,7 +178,7 @@ def _edges(found: _Found, scale: float) -> Iterator[Edge]:
                 sides.append(Side(use.face, points=feet * scale, normals=normals))
         yield Edge(
             index, points * scale, tangents, tuple(sides), BRep_Tool.Tolerance_s(edge) * scale, degenerate,
-            found.part_of_edge[index],
+            part_of[index],
         )  # fmt: skip
 
 
