@@ -12,7 +12,7 @@ from numba import njit
 from mracad.bspline.knots import Array
 from mracad.bspline.rows import Rows
 
-_LINES = 32
+_LINES = 48
 _UNROLL = 4
 
 
@@ -22,7 +22,7 @@ def apply(start: Array, values: Array, c: Array, axis: int) -> Array:
     out = np.empty((c3.shape[0], len(start), c3.shape[2]))
     head, taps = _padded(start, values)
     _apply(c3, head, taps, out)
-    return out.reshape(c.shape[:axis] + (len(start),) + c.shape[axis + 1 :])
+    return out.reshape((*c.shape[:axis], len(start), *c.shape[axis + 1 :]))
 
 
 def solve(lower: Rows, upper: Rows, inverse: Array, rows: Array, columns: Array, b: Array, axis: int) -> Array:
@@ -41,7 +41,7 @@ def combine(matrix: Rows, columns: Array, rows: Array, coarse: Array, detail: Ar
     out = np.empty((first.shape[0], len(rows), first.shape[2]))
     head, taps = _padded(matrix.start, matrix.values)
     _combine(first, second, columns, rows, head, taps, out)
-    return out.reshape(coarse.shape[:axis] + (len(rows),) + coarse.shape[axis + 1 :])
+    return out.reshape((*coarse.shape[:axis], len(rows), *coarse.shape[axis + 1 :]))
 
 
 def scatter(start: Array, values: Array, columns: int, c: Array, axis: int) -> Array:
@@ -50,7 +50,7 @@ def scatter(start: Array, values: Array, columns: int, c: Array, axis: int) -> A
     out = np.empty((c3.shape[0], columns, c3.shape[2]))
     head, taps = _padded(start, values)
     _scatter(c3, head, taps, out)
-    return out.reshape(c.shape[:axis] + (columns,) + c.shape[axis + 1 :])
+    return out.reshape((*c.shape[:axis], columns, *c.shape[axis + 1 :]))
 
 
 def _three(c: Array, axis: int) -> Array:
