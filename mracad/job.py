@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import time
+from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from mracad.audit.continuity import SeamMeasure, key, seams
@@ -92,7 +93,7 @@ def run(
     model = view(document)
 
     def cadquery(expression: str) -> set[int]:
-        return select_cq(document, model, expression)
+        return select_cq(document, expression)
 
     nurbs = [face.index for face in model.faces if face.kind in NURBS]
     chosen = select(model, options.faces, nurbs, cadquery).faces if options.faces else frozenset(nurbs)
@@ -112,8 +113,7 @@ def run(
         put(document, model, result.displacement)
         stage("checking the result")(0, 1)
         touched = {f for i in result.displacement.offsets for f in model.surfaces[i].faces}
-        valid_after = check(document, faces=touched, model=model, before=valid_before)
-        _refuse_if_worse(model, valid_before, valid_after)
+        valid_after = _judged(model, valid_before, check(document, faces=touched), touched)
     return Report(model, result, moved, before, after, valid_before, valid_after, time.perf_counter() - start)
 
 
@@ -127,11 +127,28 @@ def _refuse_if_stuck(model: Model, result: Edit) -> None:
         )
 
 
-def _refuse_if_worse(model: Model, before: Validity, after: Validity) -> None:
-    if before.valid and not after.valid:
-        first = after.failures[0] if after.failures else None
+def _judged(model: Model, before: Validity, moved: Validity, touched: set[int]) -> Validity:
+    """The verdict after an edit, from the check before it and that of the faces that moved.
+
+    Raises
+    ------
+    EditError
+        When something fails that did not before.
+    """
+    known = Counter(before.failures)
+    fresh = list((Counter(moved.failures) - known).elements())
+    if fresh or moved.free_edges > before.free_edges:
+        what = str(fresh[0]) if fresh else "new free edges"
         raise EditError(
-            f"{model.name}: the result would not be valid" + (f" ({first})" if first else ""),
+            f"{model.name}: the result would be less valid ({what})",
             "leave that face out with --faces '!#N', or use --amount 0.5 or a smaller scale",
         )
-
+    rest = tuple(f for f in before.failures if f.face not in touched)
+    failures = rest + moved.failures
+    return replace(
+        before,
+        valid=not failures,
+        failures=failures,
+        edge_tolerance=max(before.edge_tolerance, moved.edge_tolerance),
+        vertex_tolerance=max(before.vertex_tolerance, moved.vertex_tolerance),
+    )

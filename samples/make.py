@@ -457,9 +457,9 @@ def panel_net() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     u, v = np.meshgrid(*(greville(k, 3) for k in knots), indexing="ij")
     p, q = u / 150.0 - 1.0, v / 100.0 - 1.0
     bulged = v + 6.0 * q * (1.0 - p * p)
-    line = (v - 118.0 - 14.0 * p) / 16.0
+    line = (v - 118.0 - 14.0 * p) / 32.0
     crown = 42.0 - 26.0 * p * p - 15.0 * q * q + 4.0 * p * q * q
-    z = crown + 5.0 * line / np.sqrt(1.0 + line * line) + 4.0 / (1.0 + 5.0 * ((p - 0.3) ** 2 + (q + 0.4) ** 2))
+    z = crown + 8.0 * line / np.sqrt(1.0 + line * line) + 4.0 / (1.0 + 5.0 * ((p - 0.3) ** 2 + (q + 0.4) ** 2))
     return *knots, np.stack((u, bulged, z), axis=-1)
 
 

@@ -83,7 +83,7 @@ class Outputs:
             if path == "-" or Path(path).suffix.lower() in STEP:
                 write_step(document, stream, schema=self.schema, options_text=title)
             else:
-                write_stl(document, stream, ascii=self.ascii_stl, chord=self.chord, angle=self.angle)
+                write_stl(document, stream, ascii=self.ascii_stl, chord=self._chord(document), angle=self.angle)
             made[path] = stream.getvalue()
         with contextlib.ExitStack() as stack:
             for path, data in made.items():
@@ -93,6 +93,13 @@ class Outputs:
             sys.stdout.buffer.write(made["-"])
             sys.stdout.buffer.flush()
         self._sizes = [f"{self._name(path)}, {_size(len(data))}" for path, data in made.items()]
+
+    def _chord(self, document: Document) -> float | None:
+        """The chord in millimetres; it may be a share of the diagonal."""
+        from mracad.occ.view import view
+        from mracad.options import length
+
+        return None if self.chord is None else length(self.chord, view(document).diagonal, "chord")
 
     def say(self, line: str) -> None:
         """Print a line of the result."""

@@ -83,11 +83,11 @@ schema = click.option(
     show_default=True,
     help="STEP schema to write.",
 )
-chord = click.option("--chord", metavar="LENGTH", help="STL: largest distance of triangles from the surface. [0.1%]")
+chord = click.option("--chord", metavar="LENGTH", help="STL: largest distance of triangles from the surface.  [default: 0.02%]")
 angle = click.option(
     "--angle",
     type=float,
-    default=20.0,
+    default=12.0,
     show_default=True,
     metavar="DEG",
     help="STL: largest turn along a triangle's edge.",

@@ -27,9 +27,11 @@ def coinciding(model: Model) -> list[tuple[Edge, Side, Side]]:
     from scipy.spatial import cKDTree
 
     tolerance = max(GAP, 1e-6 * model.diagonal)
-    points = np.concatenate([e.points for e in free])
-    owners = np.repeat(np.arange(len(free)), [len(e.points) for e in free])
-    reach = np.array([np.linalg.norm(np.diff(e.points, axis=0), axis=1).max() for e in free])[owners] + tolerance
+    lines = [_hermite(e.points, _slopes(e), *_between(len(e.points))) for e in free]
+    points = np.concatenate(lines)
+    owners = np.repeat(np.arange(len(free)), [len(line) for line in lines])
+    steps = np.array([np.linalg.norm(np.diff(line, axis=0), axis=1).max() for line in lines])
+    reach = steps[owners] + tolerance
     tree = cKDTree(points)
     found: dict[tuple[int, int], tuple[Edge, Side, Side]] = {}
     for i, edge in enumerate(free):
@@ -58,8 +60,7 @@ def _carried(points: Array, edge: Edge) -> tuple[Array, Array | None]:
     off = ((points[:, None] - start - along[..., None] * chord) ** 2).sum(axis=2)
     segment = off.argmin(axis=1)
     s = along[np.arange(len(points)), segment][:, None]
-    slopes = edge.tangents * np.linalg.norm(np.gradient(edge.points, axis=0), axis=1, keepdims=True)
-    on = _hermite(edge.points, slopes, segment, s)
+    on = _hermite(edge.points, _slopes(edge), segment, s)
     apart = points - on
     tangent = chord[segment] / np.sqrt(square[segment])[:, None]
     shift = (apart * tangent).sum(axis=1, keepdims=True)
@@ -67,6 +68,18 @@ def _carried(points: Array, edge: Edge) -> tuple[Array, Array | None]:
     distance = np.linalg.norm(apart - inner * shift * tangent, axis=1)
     uv = edge.sides[0].uv
     return distance, None if uv is None else _hermite(uv, np.gradient(uv, axis=0), segment, s)
+
+
+def _slopes(edge: Edge) -> Array:
+    """Derivatives of the edge's curve per sample step, ``(k, 3)``."""
+    return edge.tangents * np.linalg.norm(np.gradient(edge.points, axis=0), axis=1, keepdims=True)
+
+
+def _between(samples: int) -> tuple[Array, Array]:
+    """Segments and fractions that put eight points on each segment of a sampled curve, both ends included."""
+    at = np.linspace(0, samples - 1, 8 * (samples - 1) + 1)
+    segment = np.minimum(at.astype(int), samples - 2)
+    return segment, (at - segment)[:, None]
 
 
 def _hermite(values: Array, slopes: Array, segment: Array, s: Array) -> Array:

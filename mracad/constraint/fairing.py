@@ -1,20 +1,23 @@
 """The fairing solve: a smoothed surface fitted to frozen control points without a ring around them.
 
-With f the input, S f its smooth part and F the frozen control points,
+With f the input, S f its smooth part, F the frozen control points and ρ their noise (:func:`border_noise`),
 
-    x = argmin (x − S f)ᵀ (G_u ⊗ G_v) (x − S f) + xᵀ R x   subject to  x_F = f_F,
-    R = A_u ⊗ A_v − G_u ⊗ G_v,   A = G + ℓ⁴ E,   G_ij = ∫ N_i N_j,   E_ij = ∫ N_i'' N_j''   (arc length, mm),
+    x = argmin (x − S f)ᵀ (M_u ⊗ M_v) (x − S f) + xᵀ R x   subject to  x_F = f_F,
+    R = A_u ⊗ A_v − M_u ⊗ M_v,   A = M + ℓ⁴ E,   M = (1 − μ) G + μ diag(G 1),   μ = min(2ρ, 1),
+    G_ij = ∫ N_i N_j,   E_ij = ∫ N_i'' N_j''   (arc length, mm),   ℓ = (1 − ρ) scale / 5   (ρ ≤ 1),
 
-that is R = ℓ⁴ (E⊗G + G⊗E) + ℓ⁸ E⊗E: the thin-plate energy with its mixed term replaced by E⊗E, so that the
-quadratic form is separable.  The normal equations on the free points,
+that is R = ℓ⁴ (E⊗M + M⊗E) + ℓ⁸ E⊗E: the thin-plate energy with its mixed term replaced by E⊗E, so that the
+quadratic form is separable.  Where the frozen points are clean the free ones follow them as well as least squares and
+fairness can; where they are as noisy as the rest (ρ = 1) the lumped mass makes the limit the plain mask, x_I = (S f)_I,
+which nothing tried beats.  The normal equations on the free points,
 
-    (A_u ⊗ A_v)_II x_I = [(G_u ⊗ G_v) S f]_I − (A_u ⊗ A_v)_IF f_F,
+    (A_u ⊗ A_v)_II x_I = [(M_u ⊗ M_v) S f]_I − (A_u ⊗ A_v)_IF f_F,
 
 are solved by conjugate gradients preconditioned with the separable inverse on the smallest rows × columns frame
 around the free points.  Where the frozen points are a frame (an untrimmed face) that inverse is exact and one step
-suffices.  ℓ → 0 is the mask: x_I = (S f)_I for a whole frame of free points.
+suffices.
 
-Along a wave of length Λ the solve multiplies by 1 / (1 + (2πℓ/Λ)⁴); ℓ ≤ scale / 5 keeps 97 % at Λ = 3 scale.
+Along a wave of length Λ the solve multiplies by 1 / (1 + (2πℓ/Λ)⁴) at the least: 97 % at Λ = 3 scale.
 """
 
 from __future__ import annotations
@@ -36,19 +39,6 @@ STIFFEST = 1e12
 
 RESIDUAL = 1e-12
 MOST_STEPS = 400
-
-
-def fairing_length(scale: float, border: float) -> float:
-    """Length ℓ of the fairing solve (mm): scale / 5 where the frozen points are clean, 0 where they are noisy.
-
-    Parameters
-    ----------
-    scale : float
-        Wavelength of the smoothing, mm.
-    border : float
-        Noise of the frozen points as a fraction of that of the free ones, see :func:`border_noise`.
-    """
-    return scale / REACH * max(0.0, 1.0 - border)
 
 
 def border_noise(along_u: Array, along_v: Array, frozen: Array, free: Array) -> float:
@@ -87,25 +77,6 @@ def _runs(mask: Array, axis: int) -> Array:
     return np.moveaxis(forward + backward, 0, axis)
 
 
-def stiffness(knots: KnotVector, spans: Array, length: float) -> Array | None:
-    """A = G + ℓ⁴E in arc length as a sparse matrix ``(n, n)``, or None where it would be too stiff to solve with.
-
-    Parameters
-    ----------
-    knots : KnotVector
-    spans : ndarray
-        Arc length of each span, mm.
-    length : float
-        ℓ, mm.
-    """
-    speed = np.maximum(spans, 1e-6 * spans.max()) / np.diff(knots.breaks)
-    matrix = gram(knots, weights=speed).tocsr()
-    if length > 0 and knots.degree > 1:
-        matrix = matrix + gram(knots, 2, weights=speed**-3.0).tocsr() * length**4
-    diagonal = matrix.diagonal()
-    return matrix.tocsc() if diagonal.max() <= STIFFEST * diagonal.min() else None
-
-
 class Fairing:
     """The fairing solve on one tensor-product space.
 
@@ -114,23 +85,39 @@ class Fairing:
     u, v : KnotVector
     spans : (ndarray, ndarray)
         Arc length of each span in u and in v, mm.
+    scale : float
+        Wavelength of the smoothing, mm.
+    border : float
+        ρ, the noise of the frozen points as a fraction of that of the free ones; 1 and more count as 1.
+
+    Attributes
+    ----------
     length : float
         ℓ, mm.
 
     Raises
     ------
     ValueError
-        When the spaces are too stiff for ``length`` (near-duplicate knots).
+        When the spaces are too stiff to solve on (very uneven spans).
     """
 
-    def __init__(self, u: KnotVector, v: KnotVector, spans: tuple[Array, Array], length: float) -> None:
-        directions = list(zip((u, v), spans, strict=True))
-        mass = [stiffness(k, s, 0.0) for k, s in directions]
-        stiff = [stiffness(k, s, length) for k, s in directions]
-        if any(matrix is None for matrix in mass + stiff):
-            raise ValueError("the knots are too uneven for a fairing solve")
-        self.mass: list[Any] = mass
-        self.stiff: list[Any] = stiff
+    def __init__(self, u: KnotVector, v: KnotVector, spans: tuple[Array, Array], scale: float, border: float) -> None:
+        rho = min(max(border, 0.0), 1.0)
+        lumped = min(2.0 * rho, 1.0)
+        self.length = (1.0 - rho) * scale / REACH
+        self.mass, self.stiff = [], []
+        for knots, lengths in zip((u, v), spans, strict=True):
+            speed = np.maximum(lengths, 1e-6 * lengths.max()) / np.diff(knots.breaks)
+            full = gram(knots, weights=speed).tocsr()
+            mass = (1.0 - lumped) * full + lumped * _diagonal(full.sum(axis=1))
+            stiff = mass
+            if knots.degree > 1:
+                stiff = mass + self.length**4 * gram(knots, 2, weights=speed**-3.0).tocsr()
+            diagonal = stiff.diagonal()
+            if diagonal.max() > STIFFEST * diagonal.min():
+                raise ValueError("the knots are too uneven for a fairing solve")
+            self.mass.append(mass)
+            self.stiff.append(stiff.tocsc())
 
     def solve(self, target: Array, given: Array, free: Array) -> Array:
         """The fair net x.
@@ -180,6 +167,12 @@ class Fairing:
 
     def _apply(self, net: Array) -> Array:
         return _both(self.stiff[0].__matmul__, self.stiff[1].__matmul__, net)
+
+
+def _diagonal(values: Array) -> Any:
+    from scipy.sparse import diags_array
+
+    return diags_array(values).tocsr()
 
 
 def _both(along_u: Any, along_v: Any, net: Array) -> Array:

@@ -18,7 +18,7 @@ import numpy as np
 from mracad.bspline.basis import basis
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.net import Net
-from mracad.constraint.fairing import Fairing, border_noise, fairing_length
+from mracad.constraint.fairing import Fairing, border_noise
 from mracad.constraint.frozen import Separation, separate
 from mracad.edit.result import Edit, FaceOutcome, Status
 from mracad.model import Displacement, Face, Model, Offset, Surface
@@ -217,13 +217,14 @@ class _SurfaceSmoothing:
         """x − f on the free points of ``net``, which is the surface's own net or a refinement of it."""
         free, f = separation.free, net.poles
         noise = border_noise(target.along_u, target.along_v, separation.visible & separation.frozen, free)
-        self.fairing = fairing_length(target.scale, noise)
         x = target.poles
-        if self.fairing > 0:
+        if noise < 1.0:
             try:
-                x = Fairing(net.u, net.v, spans, self.fairing).solve(target.poles, f, free)
+                fairing = Fairing(net.u, net.v, spans, target.scale, noise)
             except ValueError:
-                self.fairing = 0.0
+                pass
+            else:
+                x, self.fairing = fairing.solve(target.poles, f, free), fairing.length
         return np.where(free[..., None], x - f, 0.0)
 
     def _refine(self, faces: list[Face], edited: Collection[int], target: _Target) -> tuple[Array, Array, Array] | None:

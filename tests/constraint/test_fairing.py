@@ -6,7 +6,7 @@ import pytest
 from mracad.bspline.gram import gram
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.net import Net
-from mracad.constraint.fairing import Fairing, border_noise, fairing_length
+from mracad.constraint.fairing import REACH, Fairing, border_noise
 from tests.constraint.test_frozen import along
 from tests.constraint.test_region import circle
 
@@ -37,7 +37,7 @@ def test_it_solves_its_normal_equations(periodic):
     for free in masks(u, v).values():
         target, given = rng.standard_normal(shape), rng.standard_normal(shape)
         spans = np.diff(u.breaks), np.diff(v.breaks)
-        x = Fairing(u, v, spans, 1.3).solve(target, given, free)
+        x = Fairing(u, v, spans, 1.3 * REACH, 0.0).solve(target, given, free)
         g = [gram(k).toarray() for k in (u, v)]
         a = [m + 1.3**4 * gram(k, 2).toarray() for m, k in zip(g, (u, v), strict=True)]
         stiff, mass, inside = np.kron(*a), np.kron(*g), np.flatnonzero(free)
@@ -50,11 +50,10 @@ def test_its_limit_is_the_mask():
     u, v = spaces()
     rng = np.random.default_rng(2)
     shape = (u.count, v.count, 3)
-    free = np.ones(shape[:2], bool)
-    target = rng.standard_normal(shape)
-    x = Fairing(u, v, (np.diff(u.breaks), np.diff(v.breaks)), 0.0).solve(target, target, free)
-    assert np.abs(x - target).max() < 1e-10
-    assert fairing_length(5.0, 1.0) == 0.0 and fairing_length(5.0, 0.0) == 1.0
+    target, given = rng.standard_normal(shape), rng.standard_normal(shape)
+    free = masks(u, v)["hole"]
+    x = Fairing(u, v, (np.diff(u.breaks), np.diff(v.breaks)), 5.0, border=1.0).solve(target, given, free)
+    assert np.abs(x - np.where(free[..., None], target, given)).max() < 1e-10
 
 
 def test_translation_and_scaling_commute():
@@ -63,11 +62,11 @@ def test_translation_and_scaling_commute():
     shape, free = (u.count, v.count, 3), masks(u, v)["hole"]
     target, given = rng.standard_normal(shape), rng.standard_normal(shape)
     spans = np.diff(u.breaks), np.diff(v.breaks)
-    x = Fairing(u, v, spans, 0.8).solve(target, given, free)
+    x = Fairing(u, v, spans, 4.0, 0.2).solve(target, given, free)
     shift = np.array([1e3, -2e3, 5e2])
-    moved = Fairing(u, v, spans, 0.8).solve(target + shift, given + shift, free)
+    moved = Fairing(u, v, spans, 4.0, 0.2).solve(target + shift, given + shift, free)
     assert np.abs(moved - shift - x).max() < 1e-9
-    scaled = Fairing(u, v, (7 * spans[0], 7 * spans[1]), 7 * 0.8).solve(7 * target, 7 * given, free)
+    scaled = Fairing(u, v, (7 * spans[0], 7 * spans[1]), 28.0, 0.2).solve(7 * target, 7 * given, free)
     assert np.abs(scaled / 7 - x).max() < 1e-9
 
 
@@ -77,7 +76,7 @@ def test_a_wave_is_multiplied_by_the_stated_gain():
     v = KnotVector.clamped(np.linspace(0, 4, 5), 3)
     wave = np.cos(2 * np.pi * np.arange(n) / 16)
     target = np.repeat(wave[:, None], v.count, axis=1)[..., None] * np.ones(3)
-    x = Fairing(u, v, (np.ones(n), np.ones(4)), 16 / 15).solve(target, target, np.ones((n, v.count), bool))
+    x = Fairing(u, v, (np.ones(n), np.ones(4)), 16 / 3, 0.0).solve(target, target, np.ones((n, v.count), bool))
     gain = 1 / (1 + (2 * np.pi / 15) ** 4)
     assert np.abs(x - gain * (target - target.mean(axis=(0, 1))) - target.mean(axis=(0, 1))).max() < 2e-3
     assert gain > 0.96
@@ -86,7 +85,7 @@ def test_a_wave_is_multiplied_by_the_stated_gain():
 def test_knots_too_uneven_to_solve_on_are_refused():
     u = KnotVector.clamped(np.r_[0, 1, 2 + 1e-5 * np.arange(8), 3, 4], 3)
     with pytest.raises(ValueError, match="uneven"):
-        Fairing(u, u, (np.diff(u.breaks), np.diff(u.breaks)), 1.0)
+        Fairing(u, u, (np.diff(u.breaks), np.diff(u.breaks)), 1.0, 0.0)
 
 
 def test_border_noise_tells_a_clean_border_from_a_noisy_one():
