@@ -45,6 +45,9 @@ class Failure:
     status: str
     face: int | None
 
+    def __str__(self) -> str:
+        return f"{self.status} in a {self.kind}" + (f" of #{self.face + 1}" if self.face is not None else "")
+
 
 @dataclass(frozen=True)
 class Validity:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from OCP.BRep import BRep_Builder, BRep_Tool
 from OCP.BRepBuilderAPI import BRepBuilderAPI_Copy, BRepBuilderAPI_NurbsConvert
+from OCP.BRepCheck import BRepCheck_Analyzer
 from OCP.BRepLib import BRepLib
 from OCP.Geom import Geom_Surface
 from OCP.Geom2d import Geom2d_Curve
@@ -16,6 +17,8 @@ from OCP.TopoDS import TopoDS, TopoDS_Edge, TopoDS_Face
 from mracad.errors import EditError
 from mracad.occ.document import Conversion, Document
 from mracad.occ.topology import edge_uses
+
+_SLACK = 1e-4  # memory units by which an edge's tolerance may grow in any conversion: offsets are approximated
 
 
 def conversion(document: Document, index: int) -> Conversion:
@@ -33,7 +36,7 @@ def conversion(document: Document, index: int) -> Conversion:
     Raises
     ------
     EditError
-        When the kernel cannot convert it.
+        When the kernel cannot convert it, or only to something invalid or less accurate.
     """
     if index not in document.conversions:
         bare = document.faces[index].Located(TopLoc_Location()).Oriented(TopAbs_FORWARD)
@@ -51,9 +54,13 @@ def conversion(document: Document, index: int) -> Conversion:
             if not BRep_Tool.Degenerated_s(edge):
                 BRep_Builder().SameParameter(edge, False)
                 BRepLib.SameParameter_s(edge, tolerance)
-        document.conversions[index] = Conversion(
-            surface, [_pcurve(edge, copied) for edge in edges], [BRep_Tool.Tolerance_s(edge) for edge in edges]
-        )
+        needed = [BRep_Tool.Tolerance_s(edge) for edge in edges]
+        worse = any(new > 1.5 * old + _SLACK for new, old in zip(needed, tolerances, strict=True))
+        if worse or not BRepCheck_Analyzer(copied).IsValid():
+            raise EditError(
+                f"the kernel's conversion of face #{index + 1} to NURBS is not valid", "leave it out of the selection"
+            )
+        document.conversions[index] = Conversion(surface, [_pcurve(edge, copied) for edge in edges], needed)
     return document.conversions[index]
 
 

@@ -23,6 +23,7 @@ Array = np.ndarray
 _TRIANGLES = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 _CHORD = 2e-4  # of the diagonal
 _ANGLE = 12.0  # degrees
+_WELD = 2e-7  # of the diagonal: about the resolution of the file's 32-bit numbers
 
 
 def write_stl(
@@ -70,12 +71,38 @@ def _triangles(document: Document, chord: float | None, angle: float) -> Array:
         deflection = chord / document.unit_mm if chord else _CHORD * float(np.linalg.norm(corners[1] - corners[0]))
         BRepMesh_IncrementalMesh(shape, deflection, False, float(np.radians(angle)), False)
         raw = Path(folder, "mesh.stl")
-        StlAPI_Writer().Write(shape, str(raw))
+        writer = StlAPI_Writer()
+        writer.ASCIIMode = False
+        writer.Write(shape, str(raw))
         BRepTools.Clean_s(shape)
         data = raw.read_bytes() if raw.exists() else b""
     triangles = np.frombuffer(data[84:], _TRIANGLES).copy()
     triangles["corners"] *= document.unit_mm
-    return triangles
+    return _welded(triangles)
+
+
+def _welded(triangles: Array) -> Array:
+    """The same triangles with corners that differ by rounding made one; those that vanish are left out.
+
+    The kernel evaluates both sides of a closing edge, and rounds them differently.
+    """
+    from scipy.sparse import coo_array  # a few tenths of a second that reading and writing STEP can do without
+    from scipy.sparse.csgraph import connected_components
+    from scipy.spatial import cKDTree
+
+    points, index = np.unique(triangles["corners"].reshape(-1, 3), axis=0, return_inverse=True)
+    if not len(points):
+        return triangles
+    reach = _WELD * float(np.linalg.norm(points.max(axis=0) - points.min(axis=0)))
+    pairs = cKDTree(points).query_pairs(reach, output_type="ndarray")
+    count = len(points)
+    links = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
+    groups = connected_components(links, directed=False)[1]
+    _, leader = np.unique(groups, return_index=True)
+    index = leader[groups[index]].reshape(-1, 3)
+    whole = (index[:, 0] != index[:, 1]) & (index[:, 1] != index[:, 2]) & (index[:, 2] != index[:, 0])
+    triangles["corners"] = points[index]
+    return triangles[whole]
 
 
 def _binary(triangles: Array) -> bytes:

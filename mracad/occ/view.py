@@ -82,7 +82,7 @@ def view(document: Document, convert: Iterable[int] = ()) -> Model:
     ------
     UsageError
         For a face that does not exist.
-    MracadError
+    EditError
         For a face that the kernel cannot convert.
     """
     chosen = frozenset(convert)

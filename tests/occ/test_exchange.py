@@ -1,0 +1,192 @@
+"""Reading and writing STEP: exact numbers, units, names, colours, errors, reproducible bytes."""
+
+import io
+import os
+import re
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox, BRepPrimAPI_MakeCylinder
+from OCP.gp import gp_Trsf, gp_Vec
+from OCP.TopLoc import TopLoc_Location
+
+from mracad import occ
+from mracad.errors import FileError, UsageError
+from tests.occ import shapes
+
+POINT = re.compile(rb"CARTESIAN_POINT\s*\(\s*'[^']*'\s*,\s*\(([^)]*)\)")
+
+
+def points(path):
+    """All Cartesian points of a STEP file, as the numbers that its text says."""
+    return {tuple(map(float, match[1].split(b","))) for match in POINT.finditer(path.read_bytes())}
+
+
+def far(x=0.0, y=0.0, z=0.0):
+    move = gp_Trsf()
+    move.SetTranslation(gp_Vec(x, y, z))
+    return TopLoc_Location(move)
+
+
+@pytest.fixture
+def wavy(tmp_path):
+    return shapes.save(shapes.face_on(shapes.bspline(shapes.wavy_poles(9, 7))), tmp_path / "wavy.step")
+
+
+@pytest.mark.parametrize("unit", ["MM", "CM", "M", "KM", "UM", "INCH", "FT", "MI", "MIL", "UIN"])
+def test_numbers_return_bit_identical_in_every_unit(tmp_path, unit):
+    surface = shapes.bspline(shapes.wavy_poles(9, 7))
+    source = shapes.save(shapes.face_on(surface), tmp_path / "in.step", unit)
+    document = occ.read_step(source)
+    occ.write_step(document, tmp_path / "out.step")
+    assert points(source) <= points(tmp_path / "out.step")
+    again = occ.read_step(tmp_path / "out.step")
+    assert again.unit == document.unit
+    poles = occ.view(again).surfaces[0].net.poles
+    assert np.array_equal(poles, occ.view(document).surfaces[0].net.poles)
+    assert poles == pytest.approx(shapes.wavy_poles(9, 7), abs=1e-8)
+
+
+def test_input_unit_corrects_a_wrong_unit(wavy, tmp_path):
+    right, wrong = occ.read_step(wavy), occ.read_step(wavy, "in")
+    assert (wrong.unit, wrong.unit_mm) == ("in", 25.4 / 32)
+    a, b = occ.view(right), occ.view(wrong)
+    assert b.surfaces[0].net.poles == pytest.approx(25.4 * a.surfaces[0].net.poles, rel=1e-15)
+    assert b.diagonal == pytest.approx(25.4 * a.diagonal)
+    occ.write_step(wrong, tmp_path / "out.step")
+    assert points(wavy) <= points(tmp_path / "out.step")
+    assert occ.view(occ.read_step(tmp_path / "out.step")).diagonal == pytest.approx(b.diagonal)
+
+
+def test_unknown_unit_is_a_usage_error(wavy):
+    with pytest.raises(UsageError, match="parsec"):
+        occ.read_step(wavy, "parsec")
+
+
+def test_reads_a_stream_and_a_file_with_an_odd_name(wavy, tmp_path):
+    odd = tmp_path / "naïve 部品 #1 (copy)'s.step"
+    odd.write_bytes(wavy.read_bytes())
+    assert occ.read_step(odd).name == odd.name
+    assert len(occ.read_step(io.BytesIO(wavy.read_bytes())).faces) == 1
+    stream = io.BytesIO()
+    occ.write_step(occ.read_step(odd), stream)
+    assert stream.getvalue().startswith(b"ISO-10303-21;")
+    occ.write_step(occ.read_step(odd), odd)
+    assert len(occ.read_step(odd).faces) == 1
+
+
+def test_bad_inputs_say_what_is_wrong(wavy, tmp_path):
+    text = wavy.read_bytes()
+    lines = shapes.compound()
+    cases = {
+        "missing.step": (None, "no such file"),
+        "empty.step": (b"", "empty"),
+        "cut.step": (text[: len(text) // 2], "truncated"),
+        "notes.step": (b"dear diary", "not a STEP file"),
+        "nothing.step": (shapes.save(lines, tmp_path / "x.step").read_bytes(), "no faces"),
+        "garbled.step": (text.replace(b"B_SPLINE_SURFACE_WITH_KNOTS", b"B_SPLINE_SURFACE_WITH_NOTHING"), "no faces"),
+    }
+    for name, (content, reason) in cases.items():
+        if content is not None:
+            (tmp_path / name).write_bytes(content)
+        with pytest.raises(FileError, match=reason) as error:
+            occ.read_step(tmp_path / name)
+        assert name in error.value.message and error.value.hint and "\n" not in str(error.value)
+    with pytest.raises(FileError, match="folder"):
+        occ.read_step(tmp_path)
+
+
+def test_unwritable_targets_leave_nothing_behind(wavy, tmp_path):
+    document = occ.read_step(wavy)
+    (tmp_path / "taken").mkdir()
+    for target in (tmp_path / "nowhere" / "out.step", tmp_path / "taken"):
+        with pytest.raises(FileError, match="cannot write"):
+            occ.write_step(document, target)
+    with pytest.raises(UsageError, match="AP999"):
+        occ.write_step(document, tmp_path / "out.step", schema="AP999")
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["taken", "wavy.step"]
+
+
+def test_nothing_is_printed(wavy, tmp_path, capfd):
+    document = occ.read_step(wavy)
+    occ.check(document, distances=True)
+    occ.write_step(document, tmp_path / "out.step")
+    occ.write_stl(document, tmp_path / "out.stl")
+    with pytest.raises(FileError):
+        occ.read_step(shapes.save(shapes.compound(), tmp_path / "none.step"))
+    captured = capfd.readouterr()
+    assert captured.out == "" and captured.err == ""
+
+
+def test_same_bytes_every_time_and_in_every_process(tmp_path):
+    box, bar = BRepPrimAPI_MakeBox(1, 2, 3).Shape(), BRepPrimAPI_MakeCylinder(1, 5).Shape()
+    source = tmp_path / "in.step"
+    occ.write_step(shapes.assembly(shapes.compound(box, bar.Moved(far(9))), far(), far(0, 30), far(0, 0, 40)), source)
+    script = (
+        "import sys; from mracad import occ\n"
+        "for target in sys.argv[2:]:\n"
+        "    occ.write_step(occ.read_step(sys.argv[1]), target, options_text='smooth --scale 5')\n"
+    )
+    for folder in ("one", "two"):
+        (tmp_path / folder).mkdir()
+    targets = [str(tmp_path / folder / "out.step") for folder in ("one", "two")]
+    subprocess.run([sys.executable, "-c", script, str(source), *targets], check=True)
+    first, second = ((tmp_path / folder / "out.step").read_bytes() for folder in ("one", "two"))
+    assert first == second
+    occ.write_step(occ.read_step(source), tmp_path / "out.step", options_text="smooth --scale 5")
+    assert (tmp_path / "out.step").read_bytes() == first
+    assert b"smooth --scale 5" in first and b"1970-01-01T00:00:00" in first
+    assert str(tmp_path).encode() not in first and b"Open CASCADE STEP translator" not in first
+
+
+def test_header_time_follows_source_date_epoch(wavy, tmp_path, monkeypatch):
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "1000000000")
+    occ.write_step(occ.read_step(wavy), tmp_path / "out.step")
+    assert b"2001-09-09T01:46:40" in (tmp_path / "out.step").read_bytes()
+
+
+@pytest.mark.parametrize("schema", ["AP203", "AP214", "AP242"])
+def test_schema_is_kept_unless_asked_otherwise(wavy, tmp_path, schema):
+    occ.write_step(occ.read_step(wavy), tmp_path / "out.step", schema=schema)
+    again = occ.read_step(tmp_path / "out.step")
+    assert again.schema == schema
+    occ.write_step(again, tmp_path / "again.step")
+    assert occ.read_step(tmp_path / "again.step").schema == schema
+
+
+def test_reals_are_valid_step_reals(tmp_path):
+    poles = shapes.wavy_poles(4, 4)
+    poles[0, 0] = [0.0, -3.0, 1e-7]
+    poles[0, 1] = [1e22, -1.5e-120, 1e-5]
+    document = shapes.document(shapes.face_on(shapes.bspline(poles)))
+    occ.write_step(document, tmp_path / "out.step")
+    for match in POINT.finditer((tmp_path / "out.step").read_bytes()):
+        for number in match[1].replace(b"\n", b"").replace(b" ", b"").split(b","):
+            assert re.fullmatch(rb"-?\d+\.\d*(E[-+]?\d+)?", number), number
+    kept = points(tmp_path / "out.step")
+    assert (0.0, -3.0, 1e-7) in kept and (1e22, -1.5e-120, 1e-5) in kept
+
+
+def test_names_and_colours_survive_and_are_seen(tmp_path):
+    box, bar = BRepPrimAPI_MakeBox(1, 2, 3).Shape(), BRepPrimAPI_MakeCylinder(1, 5).Shape()
+    made = shapes.document(box, bar, names={0: "Bügel 1.50", 1: "bar"}, colours={0: "#ff8000"})
+    occ.write_step(made, tmp_path / "one.step")
+    occ.write_step(occ.read_step(tmp_path / "one.step"), tmp_path / "two.step")
+    model = occ.view(occ.read_step(tmp_path / "two.step"))
+    assert model.products == ("Bügel 1.50", "bar")
+    assert {face.colour for face in model.faces if face.product == "bar"} == {""}
+    assert {face.colour for face in model.faces if face.product != "bar"} == {"#ff8000"}
+
+
+def test_face_names_survive(wavy, tmp_path):
+    named = tmp_path / "named.step"
+    named.write_bytes(re.sub(rb"ADVANCED_FACE\(''", b"ADVANCED_FACE('top 2.50'", wavy.read_bytes()))
+    occ.write_step(occ.read_step(named), tmp_path / "out.step")
+    assert occ.view(occ.read_step(tmp_path / "out.step")).faces[0].name == "top 2.50"
+
+
+def test_importing_mracad_loads_no_kernel():
+    script = "import sys, mracad, mracad.model; assert not [m for m in sys.modules if m.startswith('OCP')]"
+    subprocess.run([sys.executable, "-c", script], check=True, env=os.environ)

@@ -1,0 +1,73 @@
+"""STL and CadQuery selectors."""
+
+from collections import Counter
+
+import numpy as np
+import pytest
+from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox, BRepPrimAPI_MakeSphere
+
+from mracad import occ
+from mracad.errors import FileError, UsageError
+from tests.occ import shapes
+
+
+def corners(path):
+    data = path.read_bytes()
+    layout = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+    triangles = np.frombuffer(data[84:], layout)
+    assert len(triangles) == int.from_bytes(data[80:84], "little")
+    return triangles["corners"]
+
+
+def is_watertight(triangles):
+    edges = Counter()
+    for triangle in triangles.tolist():
+        a, b, c = map(tuple, triangle)
+        for edge in ((a, b), (b, c), (c, a)):
+            edges[edge] += 1
+    return all(count == 1 and edges[(b, a)] == 1 for (a, b), count in edges.items())
+
+
+@pytest.mark.parametrize("unit", ["MM", "M"])
+def test_a_box_is_watertight_and_in_millimetres(tmp_path, unit):
+    document = occ.read_step(shapes.save(BRepPrimAPI_MakeBox(1, 2, 3).Shape(), tmp_path / "in.step", unit))
+    occ.write_stl(document, tmp_path / "out.stl")
+    triangles = corners(tmp_path / "out.stl")
+    assert is_watertight(triangles) and len(triangles) == 12
+    assert triangles.reshape(-1, 3).max(axis=0) == pytest.approx([1, 2, 3], rel=1e-6)
+
+
+def test_finer_settings_give_more_triangles_and_text_says_the_same(tmp_path):
+    document = shapes.document(BRepPrimAPI_MakeSphere(5).Shape())
+    sizes = []
+    for chord, angle in ((0.5, 40), (0.05, 40), (0.05, 5), (None, None)):
+        occ.write_stl(document, tmp_path / "out.stl", chord=chord, angle=angle)
+        sizes.append(len(corners(tmp_path / "out.stl")))
+        assert is_watertight(corners(tmp_path / "out.stl"))
+    assert sizes[0] < sizes[1] < sizes[2]
+    first = (tmp_path / "out.stl").read_bytes()
+    occ.write_stl(document, tmp_path / "out.stl")
+    assert (tmp_path / "out.stl").read_bytes() == first
+    occ.write_stl(document, tmp_path / "text.stl", ascii=True)
+    text = (tmp_path / "text.stl").read_text()
+    assert text.startswith("solid mracad\n") and text.count("facet normal") == sizes[3]
+
+
+def test_bad_settings_and_targets(tmp_path):
+    document = shapes.document(BRepPrimAPI_MakeSphere(5).Shape())
+    for wrong in ({"chord": 0.0}, {"angle": -1.0}, {"chord": float("nan")}):
+        with pytest.raises(UsageError, match="positive"):
+            occ.write_stl(document, tmp_path / "out.stl", **wrong)
+    with pytest.raises(FileError, match="cannot write"):
+        occ.write_stl(document, tmp_path / "nowhere" / "out.stl")
+    assert not list(tmp_path.iterdir())
+
+
+def test_cadquery_selectors():
+    document = shapes.document(BRepPrimAPI_MakeBox(1, 2, 3).Shape())
+    boxes = [face.box for face in occ.view(document).faces]
+    (top,) = occ.select_cq(document, ">Z")
+    assert boxes[top][0, 2] == pytest.approx(3, abs=1e-6)
+    assert len(occ.select_cq(document, "|Z")) == 2
+    with pytest.raises(UsageError, match="selector"):
+        occ.select_cq(document, ">>nonsense<<")
