@@ -185,8 +185,11 @@ class _Ladder:
 
     def thinned(self, copies: Array) -> KnotVector:
         """The knot vector with the clusters that are left, those of more than ``copies`` knots cut down to that."""
-        mults = np.zeros_like(self.kv.multiplicities)
-        for cluster, limit in zip(self.alive.tolist(), copies.tolist(), strict=True):
+        here = np.zeros(len(self.first), dtype=bool)
+        here[self.alive] = True
+        mults = np.where(np.repeat(here, self.last - self.first + 1), self.kv.multiplicities, 0)
+        crowded = np.add.reduceat(mults, self.first)[self.alive] > copies
+        for cluster, limit in zip(self.alive[crowded].tolist(), copies[crowded].tolist(), strict=True):
             inside = slice(self.first[cluster], self.last[cluster] + 1)
             mults[inside] = self._cut(inside, limit)
         return self.kv.with_multiplicities(mults)
