@@ -41,7 +41,8 @@ def write_step(
     target : path or binary stream
         A path is replaced only once the whole file is written.
     schema : str
-        ``"AP203"``, ``"AP214"`` or ``"AP242"``; by default that of the file that was read, or AP214.
+        ``"AP203"``, ``"AP214"`` or ``"AP242"``.  By default AP242 for a document that was, otherwise AP214: written
+        as AP203, which the kernel takes to hold one body per product, a document of several loses its structure.
     options_text : str
         What was done, for the header.
 
@@ -52,7 +53,7 @@ def write_step(
     UsageError
         For an unknown schema.
     """
-    schema = schema or document.schema or "AP214"
+    schema = schema or ("AP242" if document.schema == "AP242" else "AP214")
     if schema not in _SCHEMAS:
         raise UsageError(f"unknown STEP schema '{schema}'", "use one of " + ", ".join(_SCHEMAS))
     name = Path(target).name if isinstance(target, str | os.PathLike) else document.name
@@ -117,10 +118,9 @@ def _head(model: StepData_StepModel, name: str, options_text: str) -> None:
 
 def _ascii(text: str) -> str:
     """A text as STEP encodes it: what is not plain ASCII as ``\\X2\\…\\X0\\``."""
-    coded = re.sub(
+    return re.sub(
         r"[^\x20-\x7e]+", lambda run: "\\X2\\" + run[0].encode("utf-16-be").hex().upper() + "\\X0\\", text
     )
-    return coded
 
 
 def _without_trailing_zeros(text: bytes) -> bytes:
