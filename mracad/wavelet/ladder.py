@@ -154,6 +154,8 @@ class _Ladder:
         self.kept = np.isin(kv.breaks, list(keep)) if isinstance(keep, AbstractSet) else np.array(keep, dtype=bool)
         if self.kept.shape != kv.breaks.shape:
             raise UsageError(f"{self.kept.size} marks of kept knots for {len(kv.breaks)} breaks")
+        if kv.periodic:
+            self.kept[[0, -1]] = self.kept[0] or self.kept[-1]
         apart = lengths >= max(tolerance, 1e-6 * lengths.sum())
         self.last = np.append(np.flatnonzero(apart), kv.spans)
         self.first = np.append(0, self.last[:-1] + 1)
@@ -199,7 +201,7 @@ class _Ladder:
         ends = np.arange(inside.start, inside.stop) % self.kv.spans == 0
         if not self.kv.periodic:
             kept |= ends
-        if mults[~kept].sum() <= limit:
+        if mults.sum() <= limit:
             return mults
         chief = ends if ends.any() else kept
         if not chief.any():
