@@ -306,7 +306,7 @@ def _bounded(moved: Array, bound: float, window: tuple[int, int]) -> Array:
     from scipy.ndimage import minimum_filter, uniform_filter
 
     size = np.linalg.norm(moved, axis=-1)
-    share = np.minimum(1.0, bound / np.maximum(size, np.finfo(float).tiny))
+    share = (1 - 1e-12) * bound / np.maximum(size, (1 - 1e-12) * bound)
     if share.min() == 1.0:
         return moved
     shape = (2 * window[0] + 1, 2 * window[1] + 1)
