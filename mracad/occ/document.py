@@ -230,7 +230,8 @@ def _described(label: TDF_Label, faces: TopTools_IndexedMapOfShape) -> tuple[dic
         if shape.ShapeType() == TopAbs_FACE:
             position = faces.FindIndex(shape) - 1
             if position >= 0:
-                if name := label_name(sub):
+                name = label_name(sub)
+                if name and name != "NONE":  # what some systems write for no name
                     names[position] = name
                 if colour:
                     colours[position] = colour

@@ -73,7 +73,7 @@ def _load(source: str | os.PathLike | BinaryIO) -> tuple[bytes, str]:
             why = reason.get(type(error), error.strerror or str(error))
             raise FileError(f"cannot read '{path}': {why}", "give the path of a STEP file") from error
     else:
-        name = Path(getattr(source, "name", "") or "stdin").name.strip("<>")
+        name = Path(str(getattr(source, "name", "stdin"))).name.strip("<>")
         text = source.read()
     if not text.strip():
         raise FileError(f"'{name}' is empty", "export it again")

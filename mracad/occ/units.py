@@ -30,13 +30,17 @@ UNITS = {
     "uin": (2.54e-5, "UIN"),
 }
 _ALIASES = {"inch": "in", "foot": "ft", "feet": "ft", "metre": "m", "meter": "m", "micron": "um", "µm": "um"}
+# dimensions and tolerances, which the kernel writes as it holds them in memory, whatever the unit of the output is
+_TOLERANCES = re.compile(rb"\b(GEOMETRIC_TOLERANCE|DIMENSIONAL_SIZE|DIMENSIONAL_LOCATION)\b")
 _SAME = 1e-9  # relative difference below which two factors are the same unit
 
 
 @dataclass(frozen=True)
 class Units:
-    """How a file's numbers are held in memory.  The default, plain millimetres, serves files that mix units or use one
-    that cannot be written.
+    """How a file's numbers are held in memory.
+
+    The default, plain millimetres for memory and output, serves files that mix units, use one that cannot be written,
+    or hold dimensions and tolerances.
 
     Attributes
     ----------
@@ -94,6 +98,8 @@ def of_file(model: StepData_StepModel, text: bytes, override: str | None = None)
         name = next((key for key, (mm, _) in UNITS.items() if abs(stated / mm - 1) < _SAME), None)
     if not name:
         return Units()
+    if _TOLERANCES.search(text):
+        return Units(kernel_mm=stated / UNITS[name][0])
     exponent = round(math.log2(UNITS[name][0]))
     return Units(name, exponent, math.ldexp(UNITS[name][0], -exponent), math.ldexp(stated, -exponent))
 

@@ -49,7 +49,7 @@ def write_step(
     FileError
         When the target cannot be written.
     UsageError
-        For an unknown schema.
+        For an unknown schema, or a SOURCE_DATE_EPOCH that is no number.
     """
     schema = schema or ("AP242" if document.schema == "AP242" else "AP214")
     if schema not in _SCHEMAS:
@@ -89,7 +89,11 @@ def _text(document: Document, schema: str, name: str, options_text: str) -> byte
 def _head(model: StepData_StepModel, name: str, options_text: str) -> None:
     """Fill the header: nothing in it depends on where, when or how often it is written."""
     header = APIHeaderSection_MakeHeader(model)
-    moment = datetime.fromtimestamp(int(os.environ.get("SOURCE_DATE_EPOCH", "0")), UTC)
+    epoch = os.environ.get("SOURCE_DATE_EPOCH", "0")
+    try:
+        moment = datetime.fromtimestamp(int(epoch), UTC)
+    except (ValueError, OverflowError) as error:
+        raise UsageError(f"SOURCE_DATE_EPOCH is '{epoch}'", "give it whole seconds since 1970, or unset it") from error
     header.SetName(TCollection_HAsciiString(_ascii(name)))
     header.SetTimeStamp(TCollection_HAsciiString(moment.strftime("%Y-%m-%dT%H:%M:%S")))
     header.SetOriginatingSystem(TCollection_HAsciiString(f"mracad {__version__}"))
