@@ -386,7 +386,7 @@ def blank(text: str, units: Units | None = None) -> Document:
     """Return an empty document, in millimetres by default."""
     units = units or Units()
     xcaf = TDocStd_Document(TCollection_ExtendedString("BinXCAF"))
-    XCAFDoc_DocumentTool.SetLengthUnit_s(xcaf, metres(units.memory_mm))
+    XCAFDoc_DocumentTool.SetLengthUnit_s(xcaf, metres(1.0))
     return Document(xcaf, text, units)
 
 

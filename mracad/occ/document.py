@@ -108,11 +108,6 @@ class Document:
         return self.units.name
 
     @property
-    def unit_mm(self) -> float:
-        """Millimetres in one unit of the numbers in memory."""
-        return self.units.memory_mm
-
-    @property
     def shape_tool(self) -> XCAFDoc_ShapeTool:
         return XCAFDoc_DocumentTool.ShapeTool_s(self.xcaf.Main())
 

@@ -76,7 +76,7 @@ def _triangles(document: Document, chord: float | None, angle: float) -> tuple[A
     with quiet(), tempfile.TemporaryDirectory() as folder:
         BRepTools.Clean_s(shape)
         corners = box(shape)
-        deflection = chord / document.unit_mm if chord else _CHORD * float(np.linalg.norm(corners[1] - corners[0]))
+        deflection = chord if chord else _CHORD * float(np.linalg.norm(corners[1] - corners[0]))
         BRepMesh_IncrementalMesh(shape, deflection, False, float(np.radians(angle)), False)
         nowhere = TopLoc_Location()
         missing = tuple(i for i, face in enumerate(document.faces) if BRep_Tool.Triangulation_s(face, nowhere) is None)
@@ -87,7 +87,6 @@ def _triangles(document: Document, chord: float | None, angle: float) -> tuple[A
         BRepTools.Clean_s(shape)
         data = raw.read_bytes() if raw.exists() else b""
     triangles = np.frombuffer(data[84:], _TRIANGLES).copy()
-    triangles["corners"] *= document.unit_mm
     return _welded(triangles), missing
 
 

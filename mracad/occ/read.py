@@ -54,7 +54,7 @@ def read_step(source: str | os.PathLike | BinaryIO, input_unit: str | None = Non
         units = of_file(reader.Reader().StepModel(), text, input_unit)
         _set_unit(xcaf, units.kernel_mm)
         done = reader.Transfer(xcaf)
-        _set_unit(xcaf, units.memory_mm)
+        _set_unit(xcaf, 1.0)
     document = Document(xcaf, name, units, _schema(text))
     if not done or not any(part.faces.Extent() for part in document.parts):
         raise FileError(f"'{name}' holds no faces", "the file needs surfaces or solids, not only curves or meshes")
