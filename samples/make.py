@@ -745,9 +745,8 @@ def assembly() -> Document:
     net = rough_top(501, (50.75, 25.5), (26, 14), 10.0, 0.075)
     body = block(surface(net[2], net[0], net[1]), [list(natural_rims(net).values())])
     axis = gp_Ax2(gp_Pnt(0, 0, 0), gp_Dir(0, 0, 1))
-    plate = part(
-        BRepPrimAPI_MakeBox(gp_Pnt(0, 0, 0), 7.0 * INCH, 4.0 * INCH, 0.5 * INCH).Shape(), "base plate", 0.0, 1.0, 0.0
-    )
+    box = BRepPrimAPI_MakeBox(gp_Pnt(0, 0, 0), 7.0 * INCH, 4.0 * INCH, 0.5 * INCH)
+    plate = part(box.Shape(), "base plate", 0.0, 1.0, 0.0)
     pad = part(body, "pad", 0.0, 0.0, 1.0)
     pin = part(BRepPrimAPI_MakeCylinder(axis, 0.25 * INCH, 1.5 * INCH).Shape(), "pin", 1.0, 1.0, 0.0)
     paint(shapes.AddSubShape(pad, TopExp_Explorer(body, TopAbs_FACE).Current()), 1.0, 0.0, 0.0)

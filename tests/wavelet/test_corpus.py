@@ -28,9 +28,7 @@ def test_smoothing_commutes_with_motion_and_scaling(corpus_file):
     worst = 0.0
     for surface in model.surfaces:
         net = surface.net
-        coarse = [
-            ladder_for_scale(k, arc_lengths(net, i), 0.05 * model.diagonal) for i, k in enumerate((net.u, net.v))
-        ]
+        coarse = [ladder_for_scale(k, arc_lengths(net, i), 0.05 * model.diagonal) for i, k in enumerate((net.u, net.v))]
         if coarse == [net.u, net.v]:
             continue
 
