@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import json
-
 import click
 
 from mracad_cli import options, render
-from mracad_cli.files import read
 from mracad_cli.progress import Progress
 
 
@@ -48,10 +45,13 @@ def command(
     fail_on: tuple[str, ...],
     as_json: bool,
 ) -> int:
+    import json
+
     from mracad.audit.continuity import key, seams, summary
     from mracad.occ.check import check
     from mracad.occ.view import view
     from mracad.options import length
+    from mracad_cli.files import read
 
     with Progress() as progress:
         progress("reading", 0, 1)
