@@ -37,10 +37,15 @@ def judge(path: Path) -> Verdict:
 
 
 def kernel_copy(source: Path, target: Path) -> Path:
-    """What the kernel alone makes of a file: read it, write it, nothing else."""
+    """What the kernel alone makes of a file: read it, write it, nothing else.
+
+    It is told to write all digits: with its usual twelve, the healing of the reader settles gaps of some files up to
+    1.5e-7 mm differently, which says nothing of an edit.
+    """
     from OCP.IFSelect import IFSelect_RetDone
     from OCP.STEPCAFControl import STEPCAFControl_Reader, STEPCAFControl_Writer
     from OCP.STEPControl import STEPControl_AsIs
+    from OCP.StepData import StepData_StepWriter
     from OCP.TCollection import TCollection_ExtendedString
     from OCP.TDocStd import TDocStd_Document
 
@@ -51,7 +56,11 @@ def kernel_copy(source: Path, target: Path) -> Path:
         assert reader.Transfer(document)
         writer = STEPCAFControl_Writer()
         assert writer.Transfer(document, STEPControl_AsIs)
-        assert writer.Write(str(target)) == IFSelect_RetDone
+        printer = StepData_StepWriter(writer.Writer().Model())
+        printer.FloatWriter().SetFormat("%.17G")
+        printer.SendModel(writer.Writer().WS().Protocol())
+        with target.open("wb") as stream:
+            printer.Print(stream)
     return target
 
 
