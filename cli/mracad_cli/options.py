@@ -106,6 +106,11 @@ debug = click.option("--debug", is_flag=True, expose_value=False, help="Show the
 reading = apply(source, input_unit)
 writing = apply(outputs, schema, chord, angle, ascii_stl, overwrite)
 printing = apply(as_json, debug)
+reports = apply(
+    click.option("--junit", metavar="F.xml", type=click.Path(), help="Write the verdict as JUnit, a case a layer."),
+    click.option("--sarif", metavar="F.sarif", type=click.Path(), help="Write the findings as SARIF."),
+    click.option("--overwrite", is_flag=True, help="Replace existing reports."),
+)
 editing = apply(
     click.option("--report", metavar="F.json", type=click.Path(), help="Write the full report (JSON) to a file."),
     click.option("--dry-run", is_flag=True, help="Say what would be done; write nothing but the report."),
