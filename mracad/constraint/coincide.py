@@ -18,15 +18,15 @@ GAP = 1e-2
 """Distance, mm, within which free edges of different faces are taken for a seam (or 1e-6 of the diagonal)."""
 
 
-def coinciding(model: Model) -> list[tuple[Edge, Side, Side]]:
-    """Seams of coinciding free edges: an edge, its own side, and the other face's side at the same places.
+def coinciding(model: Model, gap: float = GAP) -> list[tuple[Edge, Side, Side]]:
+    """Seams of free edges within ``gap`` of each other: an edge, its side, and the other face's at the same places.
 
     Where one edge is a part of the other (a T-junction) the shorter one is the seam.
     """
     free = [e for e in model.edges if e.free and len(e.points) > 1]
     if len({e.sides[0].face for e in free}) < 2:
         return []
-    tolerance = max(GAP, 1e-6 * model.diagonal)
+    tolerance = max(gap, 1e-6 * model.diagonal)
     lines = [_hermite(e.points, _slopes(e), *_between(len(e.points))) for e in free]
     found: dict[tuple[int, int], tuple[Edge, Side, Side]] = {}
     for i, j in _candidates(free, lines, tolerance):

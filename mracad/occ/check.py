@@ -164,3 +164,13 @@ def _distance(face: TopoDS_Face) -> float:
             validate.Process()
             worst = max(worst, validate.GetMaxDistance())
     return worst
+
+
+def looks(document: Document) -> Iterator[tuple[int, int, bool]]:
+    """Every use of an edge by a face of the document: edge, face, and whether the boundary runs along the edge."""
+    for part in document.parts:
+        for index in range(part.first, part.first + part.faces.Extent()):
+            for edge in edge_uses(document.faces[index]):
+                if not BRep_Tool.Degenerated_s(edge):
+                    along = edge.Orientation() == TopAbs_FORWARD
+                    yield part.first_edge + part.edges.FindIndex(edge) - 1, index, along

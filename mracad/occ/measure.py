@@ -15,18 +15,20 @@ from OCP.BRepTools import BRepTools
 from OCP.BRepTopAdaptor import BRepTopAdaptor_FClass2d
 from OCP.Geom import Geom_Surface
 from OCP.GeomAPI import GeomAPI_ProjectPointOnSurf
-from OCP.gp import gp_Pnt, gp_Pnt2d
+from OCP.gp import gp_Dir, gp_Lin, gp_Pnt, gp_Pnt2d, gp_Vec
 from OCP.GProp import GProp_GProps
+from OCP.IntCurvesFace import IntCurvesFace_ShapeIntersector
 from OCP.ShapeAnalysis import ShapeAnalysis_Surface
-from OCP.TopAbs import TopAbs_FORWARD, TopAbs_IN, TopAbs_SOLID
+from OCP.TopAbs import TopAbs_FORWARD, TopAbs_IN, TopAbs_REVERSED, TopAbs_SOLID
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS
 
-from mracad.occ.document import Document
+from mracad.occ.document import Document, Part
 from mracad.occ.settings import quiet
 from mracad.occ.topology import compound, inside, matrix
 
 Array = np.ndarray
+Point = tuple[float, float, float]
 _EXACT = 1e-6  # relative error of volumes and areas; the kernel's default is off by a hundredth on NURBS faces
 _LEAST = 9  # sample lines across a face in each direction
 
@@ -106,6 +108,30 @@ class Gauge:
         frame = matrix(location)
         with quiet():
             return np.fromiter(_off(surface, (points - frame[:3, 3]) @ frame[:3, :3]), float, len(points))
+
+    def thinnest(self, index: int, part: Part) -> tuple[float, Point | None]:
+        """Least distance from points of a face through the material of its part, along the normal; and where."""
+        face = self.document.faces[index]
+        rays = IntCurvesFace_ShapeIntersector()
+        rays.Load(part.shape, 1e-7)
+        surface = BRepAdaptor_Surface(face, False)
+        within = BRepTopAdaptor_FClass2d(TopoDS.Face_s(face.Oriented(TopAbs_FORWARD)), 1e-9)
+        bounds = BRepTools.UVBounds_s(face)
+        sign = 1.0 if face.Orientation() == TopAbs_REVERSED else -1.0
+        best: tuple[float, Point | None] = (float("inf"), None)
+        point, du, dv = gp_Pnt(), gp_Vec(), gp_Vec()
+        shares = (np.arange(_LEAST) + 0.5) / _LEAST
+        for u in (bounds[0] + (bounds[1] - bounds[0]) * shares).tolist():
+            for v in (bounds[2] + (bounds[3] - bounds[2]) * shares).tolist():
+                surface.D1(u, v, point, du, dv)
+                normal = du.Crossed(dv)
+                if normal.Magnitude() < 1e-12 or within.Perform(gp_Pnt2d(u, v)) != TopAbs_IN:
+                    continue
+                rays.Perform(gp_Lin(point, gp_Dir(normal * sign)), 1e-4, 1e10)
+                hits = [rays.WParameter(k) for k in range(1, rays.NbPnt() + 1)]
+                if hits and min(hits) < best[0]:
+                    best = min(hits), point.Coord()
+        return best
 
     def edge_distances(self, edges: Iterable[int], points: Array) -> Array:
         """Distances of points ``(q, 3)`` from the nearest of some edges."""

@@ -8,7 +8,7 @@ import numpy as np
 from OCP.Bnd import Bnd_Box
 from OCP.BRep import BRep_Builder
 from OCP.BRepBndLib import BRepBndLib
-from OCP.TopAbs import TopAbs_EDGE
+from OCP.TopAbs import TopAbs_EDGE, TopAbs_SOLID
 from OCP.TopExp import TopExp, TopExp_Explorer
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS, TopoDS_Compound, TopoDS_Edge, TopoDS_Face, TopoDS_Shape
@@ -56,3 +56,8 @@ def box(shape: TopoDS_Shape) -> Array:
     bounds = Bnd_Box()
     BRepBndLib.Add_s(shape, bounds, False)
     return np.array([bounds.CornerMin().Coord(), bounds.CornerMax().Coord()])
+
+
+def has_solids(shape: TopoDS_Shape) -> bool:
+    """Whether there is a solid in a shape."""
+    return TopExp_Explorer(shape, TopAbs_SOLID).More()
