@@ -84,35 +84,53 @@ def run(work: Callable[[], Result], seconds: float | None = None, memory: int | 
 
 
 def _child(work: Callable[[], Any], writer: int, memory: int | None) -> None:
-    """Run the work, send what became of it, and end the process."""
-    message: tuple[bool, Any]
+    """Run the work, send what became of it, and end the process, whatever happens."""
     try:
         if sys.platform == "linux":
             ctypes.CDLL(None).prctl(_DEATH_SIGNAL, signal.SIGKILL)
         signal.signal(signal.SIGTERM, _terminated)
-        if memory:
-            import resource
+        message = _outcome(work, memory)
+        with contextlib.suppress(OSError, ValueError):
+            sys.stdout.flush()
+            sys.stderr.flush()
+        with os.fdopen(writer, "wb") as pipe:
+            pipe.write(_packed(message))
+    finally:
+        os._exit(0)
 
-            resource.setrlimit(resource.RLIMIT_DATA, (memory, memory))
-        message = True, work()
-    except MemoryError:
-        message = False, _out_of_memory(memory) if memory else MemoryError()
-    except BaseException as error:
-        message = False, error
-    with contextlib.suppress(BaseException):
-        sys.stdout.flush()
-        sys.stderr.flush()
+
+def _outcome(work: Callable[[], Any], memory: int | None) -> tuple[bool, Any]:
+    """Whether the work was done, and its result or error."""
+    if not memory:
+        try:
+            return True, work()
+        except BaseException as error:
+            return False, error
+    import resource
+
+    hard = resource.getrlimit(resource.RLIMIT_DATA)[1]
+    resource.setrlimit(resource.RLIMIT_DATA, (memory, hard))
     try:
-        data = pickle.dumps(message)
-    except Exception:
-        data = pickle.dumps((False, RuntimeError(f"{type(message[1]).__name__}: {message[1]}")))
-    with contextlib.suppress(OSError), os.fdopen(writer, "wb") as pipe:
-        pipe.write(data)
-    os._exit(0)
+        return True, work()
+    except BaseException as error:
+        resource.setrlimit(resource.RLIMIT_DATA, (hard, hard))  # room to say so
+        return False, _out_of_memory(memory) if _starved(error) else error
+
+
+def _starved(error: BaseException) -> bool:
+    """Whether an error says that memory was refused; a library that cannot be loaded for that says it in words."""
+    return isinstance(error, MemoryError) or "failed to map segment" in str(error)
+
+
+def _packed(message: tuple[bool, Any]) -> bytes:
+    try:
+        return pickle.dumps(message)
+    except Exception:  # an error that cannot be sent is told in words
+        return pickle.dumps((False, RuntimeError(f"{type(message[1]).__name__}: {message[1]}")))
 
 
 def _terminated(*_: object) -> None:
-    raise KeyboardInterrupt
+    raise SystemExit(128 + signal.SIGTERM)
 
 
 def _received(reader: int, seconds: float | None) -> tuple[bytes, bool]:

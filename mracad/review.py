@@ -201,7 +201,7 @@ def _crossed(document: Document, measures: list[SeamMeasure]) -> Layer:
 
     first = crossing(None)
     if first:
-        again = crossing(5e-5 * diagonal(document))
+        again = crossing(1e-4 * diagonal(document))
         first = {faces: where for faces, where in first.items() if faces in again}
     findings = [
         Finding(f"#{a + 1} crosses itself" if a == b else f"#{a + 1} and #{b + 1} cross", "crossing", (a, b), where=w)
