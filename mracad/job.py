@@ -102,14 +102,17 @@ def run(
     convertible = {i for i in chosen - held if model.faces[i].surface is None}
     if convertible:
         model = view(document, convert=convertible)
-    before = seams(model)
-    stage("checking the input")(0, 1)
-    valid_before = check(document)
+    before: list[SeamMeasure] = []
+    valid_before: Validity | None = None
     spoiled: set[int] = set()
     while True:
         result = edit(model, options, faces=chosen, held=held | spoiled, progress=stage("editing"))
         result = _named(result, spoiled)
         _refuse_if_stuck(model, result)
+        if valid_before is None:
+            before = seams(model)
+            stage("checking the input")(0, 1)
+            valid_before = check(document)
         valid_after = valid_before
         if not (apply and result.displacement.offsets):
             break
@@ -128,7 +131,7 @@ def run(
                 "leave faces out with --faces '!#N', or use --amount 0.5",
             )
         spoiled |= worse
-    after = seams(result.displacement.applied(model))
+    after = seams(result.displacement.applied(model)) if result.displacement.offsets else before
     return Report(
         model,
         result,

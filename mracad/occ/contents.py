@@ -130,7 +130,7 @@ def _places(document: Document, products: list[TDF_Label]) -> Iterator[tuple[TDF
             if part and shape.ShapeType() == TopAbs_FACE:
                 yield sub, f"{product} #{part.first + part.faces.FindIndex(shape)}"
             else:
-                yield sub, f"{product} {shape.ShapeType().name.removeprefix('TopAbs_').lower()}"
+                yield sub, f"{product} inside"
 
 
 def _colours(places: Iterable[tuple[TDF_Label, str]]) -> Iterator[tuple[str, str, str]]:
