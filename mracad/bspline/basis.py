@@ -49,15 +49,16 @@ def local_values(kv: KnotVector, span: Array, offset: Array, derivative: int = 0
     arguments = np.broadcast_to(offset, (d - derivative, len(span)))
     values = np.ones((1, len(span)))
     for k in range(1, d + 1):
-        low, high = left[d - k :], right[:k]
-        share = values / (high - low)
+        low, high, old = left[d - k :], right[:k], values
         values = np.zeros((k + 1, len(span)))
         if k <= d - derivative:
-            values[:-1] = (high - arguments[k - 1]) * share
-            values[1:] += (arguments[k - 1] - low) * share
+            x = arguments[k - 1]
+            values[:-1] = (high - x) / (high - low) * old
+            values[1:] += (x - low) / (high - low) * old
         else:
-            values[:-1] = -k * share
-            values[1:] += k * share
+            slope = k / (high - low) * old
+            values[:-1] = -slope
+            values[1:] += slope
     return values
 
 

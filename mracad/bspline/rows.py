@@ -109,6 +109,8 @@ class Rows:
         first = begin.min(axis=1)
         width = other.values.shape[1]
         values = np.zeros((len(first), int((begin.max(axis=1) - first).max(initial=0)) + width))
+        if not self.periodic:
+            first = np.minimum(first, other.columns - values.shape[1])
         each = np.arange(len(first))[:, None]
         for k in range(place.shape[1]):
             run = (begin[:, k] - first)[:, None] + np.arange(width)

@@ -7,22 +7,35 @@ large arrays, because the compiler costs half a second to import.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+from numba import njit, types
 
 from mracad.bspline.knots import Array
 from mracad.bspline.rows import Rows
 
 _LINES = 48
 _UNROLL = 4
+# One signature a kernel, for arrays of any layout: each is compiled once, and kept on disk.
+_LINES_IN = types.Array(types.float64, 3, "A", readonly=True)
+_LINES_OUT = types.float64[:, :, ::1]
+_TAPS = types.Array(types.float64, 2, "C", readonly=True)
+_REAL = types.Array(types.float64, 1, "C", readonly=True)
+_INDEX = types.Array(types.int64, 1, "C", readonly=True)
 
 
 def apply(start: Array, values: Array, c: Array, axis: int) -> Array:
     """The matrix with runs ``values`` from columns ``start`` times ``c`` along ``axis``."""
     c3 = _three(c, axis)
     out = np.empty((c3.shape[0], len(start), c3.shape[2]))
-    head, taps = _padded(start, values)
-    _apply(c3, head, taps, out)
+    _product(c3, c3[:, :0], np.arange(c3.shape[1]), start, _padded(values), np.arange(len(start)), out)
     return out.reshape((*c.shape[:axis], len(start), *c.shape[axis + 1 :]))
+
+
+def combine(matrix: Rows, columns: Array, rows: Array, coarse: Array, detail: Array, axis: int) -> Array:
+    """``c[rows] = A x[columns]`` along ``axis``, with ``x`` the coarse values followed by the details."""
+    first, second = _three(coarse, axis), _three(detail, axis)
+    out = np.empty((first.shape[0], len(rows), first.shape[2]))
+    _product(first, second, np.argsort(columns), matrix.start, _padded(matrix.values), np.argsort(rows), out)
+    return out.reshape((*coarse.shape[:axis], len(rows), *coarse.shape[axis + 1 :]))
 
 
 def solve(lower: Rows, upper: Rows, inverse: Array, rows: Array, columns: Array, b: Array, axis: int) -> Array:
@@ -31,25 +44,15 @@ def solve(lower: Rows, upper: Rows, inverse: Array, rows: Array, columns: Array,
     out = np.empty(b3.shape)
     low, below = _window(lower, before=True)
     high, above = _window(upper, before=False)
-    _solve(b3, rows, columns, -low, below, -high, above, inverse, out)
+    _solve(b3, np.argsort(rows), np.argsort(columns), -low, below, -high, above, inverse, out)
     return out.reshape(b.shape)
-
-
-def combine(matrix: Rows, columns: Array, rows: Array, coarse: Array, detail: Array, axis: int) -> Array:
-    """``c[rows] = A x[columns]`` along ``axis``, with ``x`` the coarse values followed by the details."""
-    first, second = _three(coarse, axis), _three(detail, axis)
-    out = np.empty((first.shape[0], len(rows), first.shape[2]))
-    head, taps = _padded(matrix.start, matrix.values)
-    _combine(first, second, columns, rows, head, taps, out)
-    return out.reshape((*coarse.shape[:axis], len(rows), *coarse.shape[axis + 1 :]))
 
 
 def scatter(start: Array, values: Array, columns: int, c: Array, axis: int) -> Array:
     """The transpose of the matrix with runs ``values`` from columns ``start`` times ``c`` along ``axis``."""
     c3 = _three(c, axis)
     out = np.empty((c3.shape[0], columns, c3.shape[2]))
-    head, taps = _padded(start, values)
-    _scatter(c3, head, taps, out)
+    _scatter(c3, start, values, out)
     return out.reshape((*c.shape[:axis], columns, *c.shape[axis + 1 :]))
 
 
@@ -59,9 +62,9 @@ def _three(c: Array, axis: int) -> Array:
     return c.reshape(before, along, -1)
 
 
-def _padded(start: Array, values: Array) -> tuple[Array, Array]:
+def _padded(values: Array) -> Array:
     """Runs as wide as a multiple of the unrolling."""
-    return start, np.ascontiguousarray(np.pad(values, ((0, 0), (0, -values.shape[1] % _UNROLL))))
+    return np.pad(values, ((0, 0), (0, -values.shape[1] % _UNROLL)))
 
 
 def _window(triangle: Rows, before: bool) -> tuple[Array, Array]:
@@ -81,25 +84,25 @@ def _window(triangle: Rows, before: bool) -> tuple[Array, Array]:
 
 
 @njit(cache=True)
-def _gather(c, a0, a1, b0, b1, order, pad, buffer):
-    """Lines ``[a0:a1, :, b0:b1]`` into rows ``pad …`` of the buffer, in the given order."""
+def _gather(c, a0, a1, b0, b1, place, buffer):
+    """Lines ``[a0:a1, :, b0:b1]`` into the rows ``place`` of the buffer."""
     width = b1 - b0
-    for i in range(order.size):
+    for i in range(place.size):
         for a in range(a0, a1):
             at = (a - a0) * width
             for b in range(width):
-                buffer[pad + i, at + b] = c[a, order[i], b0 + b]
+                buffer[place[i], at + b] = c[a, i, b0 + b]
 
 
 @njit(cache=True)
-def _spread(buffer, pad, a0, a1, b0, b1, order, out):
-    """Rows ``pad …`` of the buffer to lines ``[a0:a1, order, b0:b1]``."""
+def _spread(buffer, place, a0, a1, b0, b1, out):
+    """Rows ``place`` of the buffer to lines ``[a0:a1, :, b0:b1]``."""
     width = b1 - b0
-    for i in range(order.size):
+    for i in range(place.size):
         for a in range(a0, a1):
             at = (a - a0) * width
             for b in range(width):
-                out[a, order[i], b0 + b] = buffer[pad + i, at + b]
+                out[a, i, b0 + b] = buffer[place[i], at + b]
 
 
 @njit(cache=True, fastmath={"contract", "nsz"})
@@ -118,27 +121,7 @@ def _blocks(before, after):
     return max(_LINES // width, 1), width
 
 
-@njit(cache=True)
-def _apply(c, head, taps, out):
-    before, along, after = c.shape
-    rows, reach = taps.shape
-    high, wide = _blocks(before, after)
-    x = np.zeros((along + reach, _LINES))
-    y = np.zeros((rows, _LINES))
-    identity, targets = np.arange(along), np.arange(rows)
-    for a0 in range(0, before, high):
-        a1 = min(a0 + high, before)
-        for b0 in range(0, after, wide):
-            b1 = min(b0 + wide, after)
-            _gather(c, a0, a1, b0, b1, identity, 0, x)
-            for i in range(rows):
-                y[i] = 0.0
-                for k in range(0, reach, _UNROLL):
-                    _axpy4(y[i], taps[i], k, x, head[i] + k)
-            _spread(y, 0, a0, a1, b0, b1, targets, out)
-
-
-@njit(cache=True)
+@njit(types.void(_LINES_IN, _INDEX, _TAPS, _LINES_OUT), cache=True)
 def _scatter(c, head, taps, out):
     before, along, after = c.shape
     columns, reach = out.shape[1], taps.shape[1]
@@ -150,7 +133,7 @@ def _scatter(c, head, taps, out):
         a1 = min(a0 + high, before)
         for b0 in range(0, after, wide):
             b1 = min(b0 + wide, after)
-            _gather(c, a0, a1, b0, b1, identity, 0, x)
+            _gather(c, a0, a1, b0, b1, identity, x)
             y[:] = 0.0
             for i in range(along):
                 for k in range(reach):
@@ -159,11 +142,11 @@ def _scatter(c, head, taps, out):
                         row = y[head[i] + k]
                         for j in range(_LINES):
                             row[j] += tap * x[i, j]
-            _spread(y, 0, a0, a1, b0, b1, targets, out)
+            _spread(y, targets, a0, a1, b0, b1, out)
 
 
-@njit(cache=True)
-def _solve(b, rows, columns, low, below, high_taps, above, inverse, out):
+@njit(types.void(_LINES_IN, _INDEX, _INDEX, _TAPS, _INDEX, _TAPS, _INDEX, _REAL, _LINES_OUT), cache=True)
+def _solve(b, place, target, low, below, high_taps, above, inverse, out):
     before, along, after = b.shape
     lead, tail = low.shape[1], high_taps.shape[1]
     high, wide = _blocks(before, after)
@@ -172,7 +155,7 @@ def _solve(b, rows, columns, low, below, high_taps, above, inverse, out):
         a1 = min(a0 + high, before)
         for b0 in range(0, after, wide):
             b1 = min(b0 + wide, after)
-            _gather(b, a0, a1, b0, b1, rows, lead, x)
+            _gather(b, a0, a1, b0, b1, place + lead, x)
             for i in range(along):
                 for k in range(below[i], lead, _UNROLL):
                     _axpy4(x[lead + i], low[i], k, x, i + k)
@@ -182,31 +165,24 @@ def _solve(b, rows, columns, low, below, high_taps, above, inverse, out):
                     _axpy4(y, high_taps[i], k, x, lead + i + 1 + k)
                 for j in range(_LINES):
                     y[j] *= inverse[i]
-            _spread(x, lead, a0, a1, b0, b1, columns, out)
+            _spread(x, target + lead, a0, a1, b0, b1, out)
 
 
-@njit(cache=True)
-def _combine(coarse, detail, columns, rows, head, taps, out):
-    before, along, after = out.shape
-    reach = taps.shape[1]
+@njit(types.void(_LINES_IN, _LINES_IN, _INDEX, _INDEX, _TAPS, _INDEX, _LINES_OUT), cache=True)
+def _product(first, second, place, head, taps, target, out):
+    before, _, after = out.shape
+    m, rows, reach = first.shape[1], head.size, taps.shape[1]
     high, wide = _blocks(before, after)
-    x = np.zeros((along + reach, _LINES))
-    y = np.zeros((along, _LINES))
-    m = coarse.shape[1]
-    place = np.empty(along, np.int64)
-    place[columns] = np.arange(along)
+    x = np.zeros((place.size + reach, _LINES))
+    y = np.zeros((rows, _LINES))
     for a0 in range(0, before, high):
         a1 = min(a0 + high, before)
         for b0 in range(0, after, wide):
             b1 = min(b0 + wide, after)
-            width = b1 - b0
-            for j in range(along):
-                for a in range(a0, a1):
-                    at = (a - a0) * width
-                    for b in range(width):
-                        x[place[j], at + b] = coarse[a, j, b0 + b] if j < m else detail[a, j - m, b0 + b]
-            for i in range(along):
+            _gather(first, a0, a1, b0, b1, place[:m], x)
+            _gather(second, a0, a1, b0, b1, place[m:], x)
+            for i in range(rows):
                 y[i] = 0.0
                 for k in range(0, reach, _UNROLL):
                     _axpy4(y[i], taps[i], k, x, head[i] + k)
-            _spread(y, 0, a0, a1, b0, b1, rows, out)
+            _spread(y, target, a0, a1, b0, b1, out)

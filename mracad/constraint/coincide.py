@@ -6,6 +6,8 @@ off by the fourth power of the step.  An edge belongs to another when all of its
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from mracad.model import Edge, Model, Side
@@ -24,32 +26,33 @@ def coinciding(model: Model) -> list[tuple[Edge, Side, Side]]:
     free = [e for e in model.edges if e.free and len(e.points) > 1]
     if len({e.sides[0].face for e in free}) < 2:
         return []
-    from scipy.spatial import cKDTree
-
     tolerance = max(GAP, 1e-6 * model.diagonal)
     lines = [_hermite(e.points, _slopes(e), *_between(len(e.points))) for e in free]
-    points = np.concatenate(lines)
-    owners = np.repeat(np.arange(len(free)), [len(line) for line in lines])
-    steps = np.array([np.linalg.norm(np.diff(line, axis=0), axis=1).max() for line in lines])
-    reach = steps[owners] + tolerance
-    tree = cKDTree(points)
     found: dict[tuple[int, int], tuple[Edge, Side, Side]] = {}
-    for i, edge in enumerate(free):
-        probes = edge.points[[0, len(edge.points) // 2, -1]]
-        near = [np.array(tree.query_ball_point(probe, reach.max()), dtype=int) for probe in probes]
-        hit = [
-            np.unique(owners[k[np.linalg.norm(points[k] - p, axis=1) <= reach[k]]])
-            for k, p in zip(near, probes, strict=True)
-        ]
-        for j in map(int, np.intersect1d(np.intersect1d(hit[0], hit[1]), hit[2])):
-            other = free[j]
-            if other.part != edge.part or other.sides[0].face == edge.sides[0].face or (j, i) in found:
-                continue
-            distance, uv = _carried(edge.points, other)
-            if distance.max() <= tolerance:
-                side = Side(other.sides[0].face, uv=uv) if uv is not None else _baked(edge, other)
-                found[i, j] = (edge, edge.sides[0], side)
+    for i, j in _candidates(free, lines, tolerance):
+        edge, other = free[i], free[j]
+        if (j, i) in found:
+            continue
+        distance, uv = _carried(edge.points, other)
+        if distance.max() <= tolerance:
+            side = Side(other.sides[0].face, uv=uv) if uv is not None else _baked(edge, other)
+            found[i, j] = (edge, edge.sides[0], side)
     return list(found.values())
+
+
+def _candidates(free: list[Edge], lines: list[Array], tolerance: float) -> Iterator[tuple[int, int]]:
+    """Pairs (i, j) of edges of one part and different faces where ends and middle of i are near points of j."""
+    low = np.array([line.min(axis=0) for line in lines]) - tolerance
+    high = np.array([line.max(axis=0) for line in lines]) + tolerance
+    reach = np.array([np.linalg.norm(np.diff(line, axis=0), axis=1).max() for line in lines]) + tolerance
+    part, face = (np.array(x) for x in zip(*((e.part, e.sides[0].face) for e in free), strict=True))
+    for i, line in enumerate(lines):
+        probes = line[[0, len(line) // 2, -1]]
+        inside = ((probes >= low[:, None]) & (probes <= high[:, None])).all(axis=(1, 2))
+        for j in np.flatnonzero(inside & (part == part[i]) & (face != face[i])):
+            apart = np.linalg.norm(probes[:, None] - lines[j], axis=2).min(axis=1)
+            if (apart <= reach[j]).all():
+                yield i, int(j)
 
 
 def _carried(points: Array, edge: Edge) -> tuple[Array, Array | None]:

@@ -28,6 +28,7 @@ import numpy as np
 from mracad.bspline.basis import basis
 from mracad.bspline.gram import gram
 from mracad.bspline.knots import KnotVector
+from mracad.bspline.knots import Side as Limit
 from mracad.bspline.net import Net
 from mracad.bspline.refine import refinement
 from mracad.constraint.seam import Border, Seam
@@ -116,8 +117,9 @@ def _functional(net: Net, border: Border, share: Array, terms: list[tuple[int, i
     pace = border.stop - border.start
     end = share > 0.5
     columns, values = [], []
-    for part, which in ((~end, "right"), (end, "left")):
-        along = which if pace > 0 else {"right": "left", "left": "right"}[which]
+    forward: Limit = "right" if pace > 0 else "left"
+    backward: Limit = "left" if pace > 0 else "right"
+    for part, along in ((~end, forward), (end, backward)):
         index, table = _jet(net, places[part], max(i + j for i, j, _ in terms), border.limits(along))
         total = np.zeros(index.shape)
         for i, j, factor in terms:
@@ -286,7 +288,7 @@ class Coupling:
 
     def _conditioned(self, start: dict[int, Array]) -> dict[int, Array]:
         """y from y₀, on the coarse nets."""
-        matrix, spaces = self.coarse_conditions()
+        matrix = self.coarse_conditions()
         shapes = {i: x.shape for i, x in start.items()}
         ends = np.cumsum([s[0] * s[1] for s in shapes.values()])[:-1]
         factors = {i: tuple(_Factor(k) for k in p.coarse) for i, p in self.patches.items()}
@@ -326,7 +328,7 @@ class Coupling:
         y = y0 - down
         return {i: x.reshape(shapes[i]) for i, x in zip(shapes, np.split(y, ends), strict=True)}
 
-    def coarse_conditions(self) -> tuple[Any, dict[int, tuple[KnotVector, ...]]]:
+    def coarse_conditions(self) -> Any:
         """C = L P, asked at the points that the coarse spaces need."""
         spaces = {i: p.coarse if p.net.weights is None else (p.net.u, p.net.v) for i, p in self.patches.items()}
         plain = all(p.net.weights is None for p in self.patches.values())
@@ -334,9 +336,9 @@ class Coupling:
             nets = {
                 i: Net(*p.coarse, np.zeros((p.coarse[0].count, p.coarse[1].count, 3))) for i, p in self.patches.items()
             }
-            return Conditions(nets, self.seams, spaces).matrix, spaces
+            return Conditions(nets, self.seams, spaces).matrix
         fine = Conditions({i: p.net for i, p in self.patches.items()}, self.seams, spaces).matrix
-        return fine @ self._refinement(fine), spaces
+        return fine @ self._refinement(fine)
 
     def _refinement(self, matrix: Any) -> Any:
         """Rows of P, the refinement of all surfaces, for the points that ``matrix`` uses."""

@@ -22,11 +22,12 @@ Along a wave of length Λ the solve multiplies by 1 / (1 + (2πℓ/Λ)⁴) at th
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
-from mracad.bspline.gram import gram
+from mracad.bspline.gram import Gram, gram
 from mracad.bspline.knots import KnotVector
 
 Array = np.ndarray
@@ -36,6 +37,9 @@ REACH = 5.0
 
 STIFFEST = 1e12
 """Largest ratio of diagonal entries of A that still leaves the solution accurate."""
+
+DENSE = 256
+"""Largest number of control points in one direction that is worked on with dense matrices."""
 
 RESIDUAL = 1e-12
 MOST_STEPS = 400
@@ -108,16 +112,16 @@ class Fairing:
         self.mass, self.stiff = [], []
         for knots, lengths in zip((u, v), spans, strict=True):
             speed = np.maximum(lengths, 1e-6 * lengths.max()) / np.diff(knots.breaks)
-            full = gram(knots, weights=speed).tocsr()
-            mass = (1.0 - lumped) * full + lumped * _diagonal(full.sum(axis=1))
+            full = _matrix(gram(knots, weights=speed))
+            mass = (1.0 - lumped) * full + lumped * _diagonal(full)
             stiff = mass
             if knots.degree > 1:
-                stiff = mass + self.length**4 * gram(knots, 2, weights=speed**-3.0).tocsr()
+                stiff = mass + self.length**4 * _matrix(gram(knots, 2, weights=speed**-3.0))
             diagonal = stiff.diagonal()
             if diagonal.max() > STIFFEST * diagonal.min():
                 raise ValueError("the knots are too uneven for a fairing solve")
             self.mass.append(mass)
-            self.stiff.append(stiff.tocsc())
+            self.stiff.append(stiff)
 
     def solve(self, target: Array, given: Array, free: Array) -> Array:
         """The fair net x.
@@ -130,19 +134,16 @@ class Fairing:
             f; kept bit for bit where ``free`` is false.
         free : ndarray of bool (nu, nv)
         """
-        from scipy.sparse.linalg import splu
-
         rows, columns = np.flatnonzero(free.any(axis=1)), np.flatnonzero(free.any(axis=0))
         if not len(rows):
             return given.copy()
         frame = np.ix_(rows, columns)
-        factors = [splu(a[np.ix_(i, i)].tocsc()) for a, i in zip(self.stiff, (rows, columns), strict=True)]
+        inverse = [_inverse(a, i) for a, i in zip(self.stiff, (rows, columns), strict=True)]
         mask = free[..., None]
 
         def precondition(residual: Array) -> Array:
-            inside = _both(factors[0].solve, factors[1].solve, residual[frame])
             result = np.zeros_like(residual)
-            result[frame] = inside
+            result[frame] = _both(*inverse, residual[frame])
             return result * mask
 
         origin = target.mean(axis=(0, 1))
@@ -169,10 +170,29 @@ class Fairing:
         return _both(self.stiff[0].__matmul__, self.stiff[1].__matmul__, net)
 
 
-def _diagonal(values: Array) -> Any:
+def _matrix(form: Gram) -> Any:
+    """A matrix of one direction: dense where it is small, which spares loading the sparse solvers."""
+    return form.toarray() if form.shape[0] <= DENSE else form.tocsr()
+
+
+def _diagonal(matrix: Any) -> Any:
+    """The row sums of a matrix as a diagonal one of the same kind."""
+    if isinstance(matrix, np.ndarray):
+        return np.diag(matrix.sum(axis=1))
     from scipy.sparse import diags_array
 
-    return diags_array(values).tocsr()
+    return diags_array(matrix.sum(axis=1)).tocsr()
+
+
+def _inverse(matrix: Any, keep: Array) -> Callable[[Array], Array]:
+    """Multiplication by the inverse of the rows and columns ``keep`` of a matrix."""
+    part = matrix[np.ix_(keep, keep)]
+    if isinstance(part, np.ndarray):
+        return np.linalg.inv(part).__matmul__
+    from scipy.sparse.linalg import splu
+
+    solve: Callable[[Array], Array] = splu(part.tocsc()).solve
+    return solve
 
 
 def _both(along_u: Any, along_v: Any, net: Array) -> Array:

@@ -16,7 +16,7 @@ def bounded(moved: Array, bound: float) -> Array:
     from scipy.ndimage import minimum_filter, uniform_filter
 
     size = np.linalg.norm(moved, axis=-1)
-    share = np.minimum(1.0, bound / np.maximum(size, np.finfo(float).tiny))
+    share = (1 - 1e-12) * bound / np.maximum(size, (1 - 1e-12) * bound)
     if share.min() == 1.0:
         return moved
     shape = tuple(2 * max(count // 16, 1) + 1 for count in size.shape)

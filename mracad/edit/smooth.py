@@ -116,9 +116,9 @@ class _SurfaceSmoothing:
         """Let the surface move with its neighbours."""
         self.net, self.separation, self.reach = moved.net, moved.separation, moved.separation.reach
         self.change, self.moved, self.coarser = moved.change, moved.offset, True
-        self.inserted = len(moved.u_knots) + len(moved.v_knots)
+        self.inserted = sum(map(len, moved.inserted))
         if np.any(self.moved):
-            self.offset = Offset(self.moved, moved.u_knots, moved.v_knots)
+            self.offset = Offset(self.moved, *moved.inserted)
 
     def solve(self, scale: float | None, bound: float | None, moving: Collection[int]) -> None:
         """Smooth the surface by itself; all its edges stay but the ``moving`` ones, which its own knots keep smooth."""

@@ -16,7 +16,7 @@ from mracad.bspline.knots import KnotVector
 from mracad.bspline.net import Net
 from mracad.constraint.couple import Coupling, Patch
 from mracad.constraint.frozen import Separation, separate
-from mracad.constraint.seam import Treatment, angles, gaps, seams
+from mracad.constraint.seam import Seam, Treatment, angles, gaps, seams
 from mracad.constraint.strip import Direction, Line, Strip, line, members, strips
 from mracad.edit.bound import bounded
 from mracad.model import Model, Surface
@@ -37,8 +37,8 @@ class Moved:
     ----------
     net : Net
         The surface, refined so that it can follow the others.
-    u_knots, v_knots : ndarray
-        The knots inserted.
+    inserted : (ndarray, ndarray)
+        Knots inserted in u and v.
     separation : Separation
         On that net.
     change, offset : ndarray (nu, nv, 3)
@@ -46,8 +46,7 @@ class Moved:
     """
 
     net: Net
-    u_knots: Array
-    v_knots: Array
+    inserted: tuple[Array, Array]
     separation: Separation
     change: Array
     offset: Array
@@ -85,7 +84,9 @@ class Together:
     ) -> None:
         self.model, self.movable, self.options = model, movable, options
         self.spans, self.creases = spans, creases
-        self.found, self.closing, self.frozen = [], set(), {}
+        self.found: list[Seam] = []
+        self.closing: set[int] = set()
+        self.frozen: dict[int, str] = {}
         if options.edges == "coupled":
             self.found, self.closing, self.frozen = seams(model, movable, options.keep)
         self.freedom: dict[int, int] = {}
@@ -154,20 +155,15 @@ class Together:
 
     def _attempt(self, scale: float | None, bound: float | None) -> dict[int, Moved]:
         lines = [(strip, line(strip, self._knots, self._lengths, self._creases)) for strip in self._strips()]
-        steps = (
-            [(1.0, [_at_scale(l, scale) for _, l in lines])]
-            if scale is not None
-            else _at_level(lines, self.options.level or 0.0)
-        )
-        coarse = [
-            {m: c for (strip, l), k in zip(lines, knots, strict=True)
-             for m, c in members(strip, l, k, self._knots, self._creases).items()}
-            for _, knots in steps
-        ]  # fmt: skip
+        if scale is not None:
+            steps = [(1.0, [_at_scale(each, scale) for _, each in lines])]
+        else:
+            steps = _at_level([each for _, each in lines], self.options.level or 0.0)
+        coarse = [self._members(lines, knots) for _, knots in steps]
         moving = self.moving
         nets, extra = {}, {}
         for i in self._joined():
-            inserted = tuple(_union([c[i, axis][1] for c in coarse]) for axis in (0, 1))
+            inserted = _union([c[i, 0][1] for c in coarse]), _union([c[i, 1][1] for c in coarse])
             extra[i] = inserted
             nets[i] = self.model.surfaces[i].net.refined(*inserted)
         change: dict[int, Array] = {}
@@ -185,7 +181,17 @@ class Together:
             offsets = {i: min(1.0, bound / max(largest, 1e-300)) * x for i, x in offsets.items()}
         for seam in self.found:
             self.freedom[seam.edge] = min(spaces[b.surface, 1 - b.axis][0].count for b in (seam.a, seam.b))
-        return {i: Moved(nets[i], *extra[i], separations[i], change[i], offsets[i]) for i in nets}
+        return {i: Moved(nets[i], extra[i], separations[i], change[i], offsets[i]) for i in nets}
+
+    def _members(
+        self, lines: list[tuple[Strip, Line]], coarse: list[KnotVector]
+    ) -> dict[Direction, tuple[KnotVector, Array]]:
+        """Coarse knots and knots to insert of every direction."""
+        found = (
+            members(strip, each, knots, self._knots, self._creases)
+            for (strip, each), knots in zip(lines, coarse, strict=True)
+        )
+        return {direction: vectors for part in found for direction, vectors in part.items()}
 
     def _separated(self, surface: Surface, net: Net, moving: Collection[int]) -> Separation:
         faces = [self.model.faces[i] for i in surface.faces]
@@ -219,9 +225,9 @@ def _at_scale(line: Line, scale: float) -> KnotVector:
     return ladder_for_scale(line.knots, line.lengths, scale, keep=line.kept)
 
 
-def _at_level(lines: list[tuple[Strip, Line]], level: float) -> list[tuple[float, list[KnotVector]]]:
+def _at_level(lines: list[Line], level: float) -> list[tuple[float, list[KnotVector]]]:
     """Weights and coarse knots of the one or two levels to blend."""
-    ladders = [rungs_by_level(l.knots, keep=l.kept, lengths=l.lengths) for _, l in lines]
+    ladders = [rungs_by_level(each.knots, keep=each.kept, lengths=each.lengths) for each in lines]
     whole, part = int(level), level % 1.0
     weights = [(1.0 - part, whole)] + ([(part, whole + 1)] if part else [])
     return [(weight, [rungs[min(rung, len(rungs) - 1)] for rungs in ladders]) for weight, rung in weights]

@@ -36,5 +36,4 @@ def box(shape: TopoDS_Shape) -> Array:
     """Lowest and highest corner of a shape, ``(2, 3)``, memory units: never too small, at most that of its poles."""
     bounds = Bnd_Box()
     BRepBndLib.Add_s(shape, bounds, False)
-    low, high = bounds.CornerMin(), bounds.CornerMax()
-    return np.array([[low.X(), low.Y(), low.Z()], [high.X(), high.Y(), high.Z()]])
+    return np.array([bounds.CornerMin().Coord(), bounds.CornerMax().Coord()])

@@ -11,7 +11,7 @@ from OCP.BRepAdaptor import BRepAdaptor_Curve, BRepAdaptor_Surface
 from OCP.Geom import Geom_Plane, Geom_Surface
 from OCP.Geom2d import Geom2d_Curve, Geom2d_Line
 from OCP.GeomAbs import GeomAbs_Line
-from OCP.gp import gp_Dir, gp_Pnt, gp_Vec
+from OCP.gp import gp_Pnt, gp_Vec
 from OCP.ShapeFix import ShapeFix_Edge
 from OCP.TopAbs import TopAbs_FORWARD, TopAbs_REVERSED
 from OCP.TopLoc import TopLoc_Location
@@ -189,13 +189,13 @@ def _along(edge: TopoDS_Edge) -> tuple[Array, Array]:
     place = first + (last - first) * _SPREAD
     if curve.GetType() == GeomAbs_Line:
         line = curve.Line()
-        direction = _triple(line.Direction())
-        return _triple(line.Location()) + place[:, None] * direction, np.tile(direction, (_SAMPLES, 1))
+        direction = np.array(line.Direction().Coord())
+        return np.array(line.Location().Coord()) + place[:, None] * direction, np.tile(direction, (_SAMPLES, 1))
     point, tangent = gp_Pnt(), gp_Vec()
     rows = []
     for t in place.tolist():
         curve.D1(t, point, tangent)
-        rows.append((point.X(), point.Y(), point.Z(), tangent.X(), tangent.Y(), tangent.Z()))
+        rows.append(point.Coord() + tangent.Coord())
     table = np.array(rows)
     return table[:, :3], _unit(table[:, 3:])
 
@@ -207,8 +207,8 @@ def _wall(found: _Found, index: int) -> Callable[[_Use, Array], tuple[Array, Arr
     surface = BRepAdaptor_Surface(face, False)
     if isinstance(found.grounds[index], Geom_Plane):
         plane = surface.Plane()
-        origin = _triple(plane.Location())
-        normal = _triple(plane.Axis().Direction()) * (sign if plane.Direct() else -sign)
+        origin = np.array(plane.Location().Coord())
+        normal = np.array(plane.Axis().Direction().Coord()) * (sign if plane.Direct() else -sign)
         return lambda use, points: (
             points - ((points - origin) @ normal)[:, None] * normal, np.tile(normal, (_SAMPLES, 1))
         )  # fmt: skip
@@ -218,8 +218,7 @@ def _wall(found: _Found, index: int) -> Callable[[_Use, Array], tuple[Array, Arr
         rows = []
         for u, v in _parameters(use).tolist():
             surface.D1(u, v, point, du, dv)
-            normal = du.Crossed(dv)
-            rows.append((point.X(), point.Y(), point.Z(), normal.X(), normal.Y(), normal.Z()))
+            rows.append(point.Coord() + du.Crossed(dv).Coord())
         table = np.array(rows)
         return table[:, :3], sign * _unit(table[:, 3:])
 
@@ -231,13 +230,8 @@ def _parameters(use: _Use) -> Array:
     place = use.first + (use.last - use.first) * _SPREAD
     if isinstance(use.pcurve, Geom2d_Line):
         line = use.pcurve.Lin2d()
-        start, way = line.Location(), line.Direction()
-        return np.array([start.X(), start.Y()]) + place[:, None] * np.array([way.X(), way.Y()])
-    return np.array([(point.X(), point.Y()) for point in map(use.pcurve.Value, place.tolist())])
-
-
-def _triple(of: gp_Pnt | gp_Dir) -> Array:
-    return np.array([of.X(), of.Y(), of.Z()])
+        return np.array(line.Location().Coord()) + place[:, None] * np.array(line.Direction().Coord())
+    return np.array([point.Coord() for point in map(use.pcurve.Value, place.tolist())])
 
 
 def _unit(vectors: Array) -> Array:

@@ -11,11 +11,9 @@ from pathlib import Path
 from typing import BinaryIO
 
 from OCP.APIHeaderSection import APIHeaderSection_MakeHeader
-from OCP.StepBasic import StepBasic_Product
 from OCP.STEPCAFControl import STEPCAFControl_Writer
 from OCP.STEPControl import STEPControl_AsIs
 from OCP.StepData import StepData_StepModel, StepData_StepWriter
-from OCP.StepRepr import StepRepr_NextAssemblyUsageOccurrence
 from OCP.TCollection import TCollection_HAsciiString
 
 from mracad import __version__
@@ -27,7 +25,7 @@ from mracad.occ.units import UNITS, metres
 
 _MODES = ("Name", "Color", "Layer", "DimTol", "Material", "Props", "SHUO")
 _SCHEMAS = {"AP203": "AP203", "AP214": "AP214IS", "AP242": "AP242DIS"}
-_UNNAMED = "mracad unnamed product"  # what the kernel calls a product without a name, followed by a count
+_UNNAMED = b"mracad unnamed product"  # what the kernel calls a product without a name, followed by a count
 
 
 def write_step(
@@ -41,7 +39,8 @@ def write_step(
     target : path or binary stream
         A path is replaced only once the whole file is written.
     schema : str
-        ``"AP203"``, ``"AP214"`` or ``"AP242"``; by default that of the file that was read, or AP214.
+        ``"AP203"``, ``"AP214"`` or ``"AP242"``.  By default AP242 for a document that was, otherwise AP214: written
+        as AP203, which the kernel takes to hold one body per product, a document of several loses its structure.
     options_text : str
         What was done, for the header.
 
@@ -52,7 +51,7 @@ def write_step(
     UsageError
         For an unknown schema.
     """
-    schema = schema or document.schema or "AP214"
+    schema = schema or ("AP242" if document.schema == "AP242" else "AP214")
     if schema not in _SCHEMAS:
         raise UsageError(f"unknown STEP schema '{schema}'", "use one of " + ", ".join(_SCHEMAS))
     name = Path(target).name if isinstance(target, str | os.PathLike) else document.name
@@ -64,7 +63,7 @@ def _text(document: Document, schema: str, name: str, options_text: str) -> byte
     settings = {
         "write.step.schema": schema,
         "write.step.unit": UNITS[document.unit][1],
-        "write.step.product.name": _UNNAMED,
+        "write.step.product.name": _UNNAMED.decode(),
         "write.stepcaf.subshapes.name": "On",
     }
     stream = io.BytesIO()
@@ -76,7 +75,6 @@ def _text(document: Document, schema: str, name: str, options_text: str) -> byte
         model.SetWriteLengthUnit(math.ldexp(metres(document.unit_mm) * 1000.0, document.units.exponent))
         if not writer.Transfer(document.xcaf, STEPControl_AsIs):
             raise FileError(f"the kernel cannot express '{document.name}' as STEP", "check its geometry")
-        _number_anew(model)
         _head(model, name, options_text)
         printer = StepData_StepWriter(model)
         # 17 significant digits, the point always there (a STEP real needs it); what is nearest to zero would not fit
@@ -85,23 +83,7 @@ def _text(document: Document, schema: str, name: str, options_text: str) -> byte
         printer.FloatWriter().SetFormatForRange("%#.17G", 1e-99, 1e99)
         printer.SendModel(writer.Writer().WS().Protocol())
         printer.Print(stream)
-    return _without_trailing_zeros(stream.getvalue())
-
-
-def _number_anew(model: StepData_StepModel) -> None:
-    """Count unnamed products and assembly usages from 1; the kernel counts on through the life of the process."""
-    products = usages = 0
-    for i in range(1, model.NbEntities() + 1):
-        entity = model.Value(i)
-        if isinstance(entity, StepBasic_Product):
-            if entity.Name().ToCString().startswith(_UNNAMED):
-                products += 1
-                text = TCollection_HAsciiString(f"part {products}")
-                entity.SetName(text)
-                entity.SetId(text)
-        elif isinstance(entity, StepRepr_NextAssemblyUsageOccurrence):
-            usages += 1
-            entity.SetId(TCollection_HAsciiString(str(usages)))
+    return _tidy(stream.getvalue())
 
 
 def _head(model: StepData_StepModel, name: str, options_text: str) -> None:
@@ -117,13 +99,22 @@ def _head(model: StepData_StepModel, name: str, options_text: str) -> None:
 
 def _ascii(text: str) -> str:
     """A text as STEP encodes it: what is not plain ASCII as ``\\X2\\…\\X0\\``."""
-    coded = re.sub(r"[^\x20-\x7e]+", lambda run: "\\X2\\" + run[0].encode("utf-16-be").hex().upper() + "\\X0\\", text)
-    return coded
+    return re.sub(
+        r"[^\x20-\x7e]+", lambda run: "\\X2\\" + run[0].encode("utf-16-be").hex().upper() + "\\X0\\", text
+    )
 
 
-def _without_trailing_zeros(text: bytes) -> bytes:
-    """Shorten reals as ``1.5000`` to ``1.5``, outside quoted strings."""
-    pieces = text.split(b"'")
+def _tidy(text: bytes) -> bytes:
+    """Write reals without trailing zeros, and count what the kernel counts through the life of the process from 1."""
+    pieces = text.split(b"'")  # every second one is within quotes
+    products = usages = 0
+    for i in range(0, len(pieces) - 1, 2):
+        if pieces[i].endswith(b"PRODUCT(") and pieces[i + 1].startswith(_UNNAMED):
+            products += 1
+            pieces[i + 1] = pieces[i + 3] = b"part %d" % products
+        elif pieces[i].endswith(b"NEXT_ASSEMBLY_USAGE_OCCURRENCE("):
+            usages += 1
+            pieces[i + 1] = b"%d" % usages
     plain = b"'".join(pieces[::2])
-    pieces[::2] = re.sub(rb"(\.(?:[0-9]*[1-9])?)0+(?=[,)E])", rb"\1", plain).split(b"'")
+    pieces[::2] = b"".join(re.split(rb"(\.(?:[0-9]*[1-9])?)0+(?=[,)E])", plain)).split(b"'")
     return b"'".join(pieces)

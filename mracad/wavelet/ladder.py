@@ -154,6 +154,8 @@ class _Ladder:
         self.kept = np.isin(kv.breaks, list(keep)) if isinstance(keep, AbstractSet) else np.array(keep, dtype=bool)
         if self.kept.shape != kv.breaks.shape:
             raise UsageError(f"{self.kept.size} marks of kept knots for {len(kv.breaks)} breaks")
+        if kv.periodic:
+            self.kept[[0, -1]] = self.kept[0] or self.kept[-1]
         apart = lengths >= max(tolerance, 1e-6 * lengths.sum())
         self.last = np.append(np.flatnonzero(apart), kv.spans)
         self.first = np.append(0, self.last[:-1] + 1)
@@ -185,8 +187,11 @@ class _Ladder:
 
     def thinned(self, copies: Array) -> KnotVector:
         """The knot vector with the clusters that are left, those of more than ``copies`` knots cut down to that."""
-        mults = np.zeros_like(self.kv.multiplicities)
-        for cluster, limit in zip(self.alive.tolist(), copies.tolist(), strict=True):
+        here = np.zeros(len(self.first), dtype=bool)
+        here[self.alive] = True
+        mults = np.where(np.repeat(here, self.last - self.first + 1), self.kv.multiplicities, 0)
+        crowded = np.add.reduceat(mults, self.first)[self.alive] > copies
+        for cluster, limit in zip(self.alive[crowded].tolist(), copies[crowded].tolist(), strict=True):
             inside = slice(self.first[cluster], self.last[cluster] + 1)
             mults[inside] = self._cut(inside, limit)
         return self.kv.with_multiplicities(mults)
@@ -196,7 +201,7 @@ class _Ladder:
         ends = np.arange(inside.start, inside.stop) % self.kv.spans == 0
         if not self.kv.periodic:
             kept |= ends
-        if mults[~kept].sum() <= limit:
+        if mults.sum() <= limit:
             return mults
         chief = ends if ends.any() else kept
         if not chief.any():

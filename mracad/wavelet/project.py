@@ -15,6 +15,7 @@ from mracad.bspline.rows import Rows
 from mracad.bspline.solve import BandSolver, folded
 from mracad.errors import UsageError
 
+_SMALL = 256  # poles up to which the dense operator is as quick, and spares loading LAPACK's banded solvers
 _TAME = 1e3
 _LOW_DEGREE = 5
 
@@ -42,7 +43,7 @@ class Projection:
     @cached_property
     def _normal(self) -> tuple[BandSolver, Array] | None:
         """Factored normal equations ``PᵀGP`` and their scaling, or None where they would lose too many digits."""
-        if self._fine.degree > _LOW_DEGREE:
+        if self._fine.degree > _LOW_DEGREE or self._fine.count <= _SMALL:
             return None
         span, values, weight = self._coarse_at_fine()
         begin = np.flatnonzero(np.diff(span, prepend=-1))

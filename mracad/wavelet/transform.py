@@ -163,7 +163,7 @@ class Level:
     bands : dict
         ``"LH"``, ``"HL"``, ``"HH"``: details (see the module).
     residual : ndarray or None
-        What rounding left over, in poles of the finer net, where it is more than 1e-13 of them.
+        What rounding left over, in poles of the finer net, where it is more than 1e-13 of the whole net.
     """
 
     u: Step | Chain | None
@@ -240,18 +240,8 @@ def decompose(poles: Array, ladder_u: Sequence[KnotVector], ladder_v: Sequence[K
     flat = poles.reshape(-1, poles.shape[-1])
     centroid = np.full(len(flat), 1.0 / len(flat)) @ flat
     c = _moved(poles, -centroid)
-    levels: list[Level] = []
-    small, exact = 0.0, True
-    for pair in zip_longest(*steps):
-        u, v = pair[0], pair[1] if len(pair) > 1 else None
-        if exact and not all(each is None or each.exact for each in (u, v)):
-            small, exact = _EXACT * np.abs(c).max(initial=0), False
-        coarse, bands = _bands(c, u, v)
-        level = Level(u, v, bands)
-        if not exact:
-            coarse, level = _corrected(c, coarse, level, small)
-        levels.append(level)
-        c = coarse
+    pairs = [(pair[0], pair[1] if len(pair) > 1 else None) for pair in zip_longest(*steps)]
+    c, levels = _analysed(c, pairs)
     return Pyramid(c, tuple(levels), centroid)
 
 
@@ -282,16 +272,38 @@ def _moved(poles: Array, offset: Array) -> Array:
     return (poles.reshape(len(poles), -1) + np.tile(offset, poles[0].size // len(offset))).reshape(poles.shape)
 
 
-def _corrected(c: Array, coarse: Array, level: Level, small: float) -> tuple[Array, Level]:
-    """Fold what rounding lost in once, and keep the rest where it is more than ``small``."""
-    more, extra = _bands(c - level.synthesise(coarse), level.u, level.v)
-    coarse = coarse + more
-    level = replace(level, bands={name: band + extra[name] for name, band in level.bands.items()})
-    residual = c - level.synthesise(coarse)
-    return coarse, replace(level, residual=residual if np.abs(residual).max(initial=0) > small else None)
+def _analysed(c: Array, pairs: list[tuple[Step | Chain | None, Step | Chain | None]]) -> tuple[Array, list[Level]]:
+    """Coarsest poles and levels.
+
+    Unless all steps are exact, what a level loses to rounding is folded in once, and the rest is kept where it still
+    counts.  The rest is taken on the way back up, against what reconstruction will really find below, so that the large
+    poles of an ill-conditioned coarse net cost nothing.
+    """
+    exact = all(each is None or each.exact for pair in pairs for each in pair)
+    small = 0.0 if exact else _EXACT * np.abs(c).max(initial=0)
+    nets, levels = [], []
+    for u, v in pairs:
+        coarse, bands = _bands(c, u, v)
+        level = Level(u, v, bands)
+        if not exact:
+            nets.append(c)
+            more, extra = _bands(c - level.synthesise(coarse), u, v)
+            coarse = coarse + more
+            level = replace(level, bands={name: band + extra[name] for name, band in bands.items()})
+        levels.append(level)
+        c = coarse
+    poles = c
+    for i in reversed(range(len(nets))):
+        poles = levels[i].synthesise(poles)
+        residual = nets[i] - poles
+        if np.abs(residual).max(initial=0) > small:
+            levels[i] = replace(levels[i], residual=residual)
+            poles = poles + residual
+    return c, levels
 
 
 def _bands(c: Array, u: Step | Chain | None, v: Step | Chain | None) -> tuple[Array, dict[str, Array]]:
+    """Coarse poles and bands of one level."""
     bands = {}
     if u is not None:
         c, bands["HL"] = u.analyse(c, 0)

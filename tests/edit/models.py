@@ -1,0 +1,59 @@
+"""Kernel-free models for the edits: one untrimmed face on a surface."""
+
+import numpy as np
+
+from mracad.bspline.knots import KnotVector
+from mracad.bspline.net import Curve, Net
+from mracad.model import Face, Model, Surface, Trim
+
+
+def segment(a, b):
+    return Curve(KnotVector.clamped([0, 1], 1), np.array([a, b], float))
+
+
+def sheet(net, frame=None, diagonal=None):
+    """A model of one face that covers all of ``net``, its four sides free edges."""
+    (u0, u1), (v0, v1) = net.u.domain, net.v.domain
+    corners = [(u0, v0), (u1, v0), (u1, v1), (u0, v1)]
+    trims = tuple(Trim(i, segment(corners[i], corners[(i + 1) % 4])) for i in range(4))
+    flat = net.poles.reshape(-1, 3)
+    box = np.array([flat.min(axis=0), flat.max(axis=0)])
+    face = Face(0, "bspline", 0, trims, False, np.eye(4) if frame is None else frame, box)
+    size = float(np.linalg.norm(box[1] - box[0])) if diagonal is None else diagonal
+    return Model("sheet", (Surface(0, net, (0,)),), (face,), (), size)
+
+
+def fitted(u, v, height, size=100.0, u_of=None, v_of=None):
+    """A height field z = height(x, y) over a square of ``size`` mm as a net: x = u_of(u) and y = v_of(v) in mm.
+
+    Coordinates are interpolated at the Greville points, so x and y are reproduced as far as the spaces allow.
+    """
+    from mracad.bspline.basis import basis
+
+    def collocation(k):
+        first, values = basis(k, k.greville())
+        dense = np.zeros((k.count, k.count))
+        for i, (f, row) in enumerate(zip(first, values, strict=True)):
+            dense[i, f : f + len(row)] = row
+        return dense
+
+    us, vs = u.greville(), v.greville()
+    x = us * size if u_of is None else u_of(us)
+    y = vs * size if v_of is None else v_of(vs)
+    grid = np.stack([*np.meshgrid(x, y, indexing="ij"), height(*np.meshgrid(x, y, indexing="ij"))], axis=-1)
+    a, b = collocation(u), collocation(v)
+    poles = np.linalg.solve(a, grid.reshape(len(us), -1)).reshape(grid.shape)
+    return Net(
+        u,
+        v,
+        np.linalg.solve(b, poles.transpose(1, 0, 2).reshape(len(vs), -1))
+        .reshape(len(vs), len(us), 3)
+        .transpose(1, 0, 2),
+    )
+
+
+def rotation(axis, angle):
+    """Rotation matrix about an axis."""
+    k = np.asarray(axis, float) / np.linalg.norm(axis)
+    cross = np.array([[0, -k[2], k[1]], [k[2], 0, -k[0]], [-k[1], k[0], 0]])
+    return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross

@@ -1,0 +1,82 @@
+"""What the kernel says of a STEP file that it reads back: the yardstick for every output."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+from mracad.audit.continuity import SeamMeasure, seams
+from mracad.model import Model
+from mracad.occ.check import Validity, check
+from mracad.occ.read import read_step
+from mracad.occ.settings import exchange, quiet
+from mracad.occ.view import view
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Validity, the snapshot and the seams of a file."""
+
+    validity: Validity
+    model: Model
+    seams: list[SeamMeasure]
+
+    @property
+    def tolerance(self) -> float:
+        return max(self.validity.edge_tolerance, self.validity.vertex_tolerance)
+
+
+@lru_cache(maxsize=4)
+def judge(path: Path) -> Verdict:
+    """Read a file and judge it."""
+    document = read_step(path)
+    model = view(document)
+    return Verdict(check(document), model, seams(model))
+
+
+def kernel_copy(source: Path, target: Path) -> Path:
+    """What the kernel alone makes of a file: read it, write it, nothing else."""
+    from OCP.IFSelect import IFSelect_RetDone
+    from OCP.STEPCAFControl import STEPCAFControl_Reader, STEPCAFControl_Writer
+    from OCP.STEPControl import STEPControl_AsIs
+    from OCP.TCollection import TCollection_ExtendedString
+    from OCP.TDocStd import TDocStd_Document
+
+    with quiet(), exchange({"write.step.schema": "AP214IS"}):
+        document = TDocStd_Document(TCollection_ExtendedString("copy"))
+        reader = STEPCAFControl_Reader()
+        assert reader.ReadFile(str(source)) == IFSelect_RetDone
+        assert reader.Transfer(document)
+        writer = STEPCAFControl_Writer()
+        assert writer.Transfer(document, STEPControl_AsIs)
+        assert writer.Write(str(target)) == IFSelect_RetDone
+    return target
+
+
+def assert_as_good(result: Verdict, yardstick: Verdict) -> None:
+    """The output is as good as the kernel's own copy of the input."""
+    new, old = result.validity, yardstick.validity
+    assert new.valid or not old.valid, new.failures[:5]
+    assert (new.solids, new.shells, new.faces) == (old.solids, old.shells, old.faces)
+    assert new.free_edges <= old.free_edges
+    assert result.tolerance <= yardstick.tolerance + 1e-7
+    ours, theirs = _by_faces(result.seams), _by_faces(yardstick.seams)
+    assert ours.keys() == theirs.keys()
+    for faces, found in ours.items():
+        before = theirs[faces]
+        assert len(found) == len(before)
+        for new_gap, old_gap in zip(*(sorted(m.gap for m in each) for each in (found, before)), strict=True):
+            assert new_gap <= old_gap + 1e-7, faces
+        smooth = [sorted(m.angle for m in each if m.smooth) for each in (found, before)]
+        for new_angle, old_angle in zip(*smooth, strict=True):
+            assert new_angle <= old_angle + 1e-4, faces
+
+
+def _by_faces(measures: list[SeamMeasure]) -> dict[tuple[int, int], list[SeamMeasure]]:
+    """Seams by the pair of faces that they join (the two files may list their edges in another order)."""
+    found: dict[tuple[int, int], list[SeamMeasure]] = defaultdict(list)
+    for measure in measures:
+        found[min(measure.faces), max(measure.faces)].append(measure)
+    return found
