@@ -39,10 +39,10 @@ Array = np.ndarray
 ROUNDING = 1e-14
 """Residual, relative to the right-hand side, at which conditions hold."""
 
-FLOOR = 1e-11
+FLOOR = 1e-7
 """Added to the unit diagonal of the conditions' normal matrix, whose rows may be dependent."""
 
-SETTLED = 1e-11
+SETTLED = 1e-9
 MOST_STEPS = 300
 
 
@@ -217,8 +217,8 @@ class Restoration:
         self.factor = splu((self.normal + eye).tocsc(), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
 
     def solve(self, residual: Array) -> Array:
-        """λ with ``(L D⁻¹ Lᵀ) λ = r`` in the scaled rows, by the factor alone."""
-        return self.factor.solve(residual)
+        """λ with ``(L D⁻¹ Lᵀ) λ = r`` in the scaled rows, nearly; nothing of it in the dependent conditions."""
+        return self.factor.solve(self.normal @ self.factor.solve(residual))
 
     def change(self, wanted: Array) -> Array:
         """c ``(points, 3)`` for ``r`` (conditions, 3)."""
@@ -325,6 +325,8 @@ class Coupling:
             step_of = preconditioner.solve(residual)
             rho, before = (residual * step_of).sum(axis=0), rho
             direction = step_of + np.divide(rho, before, out=np.zeros_like(rho), where=before > 0) * direction
+        import os
+        if os.environ.get("DBG"): print("cg", _, np.abs(residual).max(), goal)
         y = y0 - down
         return {i: x.reshape(shapes[i]) for i, x in zip(shapes, np.split(y, ends), strict=True)}
 
