@@ -83,7 +83,13 @@ schema = click.option(
     show_default=True,
     help="STEP schema to write.",
 )
-chord = click.option("--chord", metavar="LENGTH", help="STL: largest distance of triangles from the surface.  [default: 0.02%]")
+chord = click.option(
+    "--chord",
+    metavar="LENGTH",
+    default="0.02%",
+    show_default=True,
+    help="STL: largest distance of triangles from the surface.",
+)
 angle = click.option(
     "--angle",
     type=float,

@@ -115,7 +115,7 @@ def seam(value: SeamMeasure) -> dict[str, Any]:
     """One seam; its faces by number."""
     return {
         **plain(value),
-        "edge": value.edge + 1 if value.sewn else None,
+        "edge": value.edge + 1,
         "faces": [i + 1 for i in value.faces],
         "smooth": value.smooth,
     }

@@ -32,6 +32,7 @@ from mracad.bspline.knots import Side as Limit
 from mracad.bspline.net import Net
 from mracad.bspline.refine import refinement
 from mracad.constraint.seam import Border, Seam
+from mracad.wavelet.filters import wavelets
 from mracad.wavelet.project import projection
 
 Array = np.ndarray
@@ -54,13 +55,19 @@ class Patch:
     ----------
     net : Net
         Its control net, refined so that it holds the coarse space; poles (mm).
-    coarse : (KnotVector, KnotVector)
+    base, lifted : (KnotVector, KnotVector)
+        Coarse knots, and those of the control points next to seams: the coarse space is the sum of the splines over
+        ``base`` and of those over ``lifted`` along a seam times those over ``base`` that its conditions look at.
+    near : (ndarray of bool, ndarray of bool)
+        Functions over ``base`` in u and v that the conditions of seams along the other direction look at.
     weight : float
         Area per unit of the parameter plane.
     """
 
     net: Net
-    coarse: tuple[KnotVector, KnotVector]
+    base: tuple[KnotVector, KnotVector]
+    lifted: tuple[KnotVector, KnotVector]
+    near: tuple[Array, Array]
     weight: float
 
 
@@ -276,36 +283,32 @@ class Coupling:
         nets = self.split(g)
         start = {}
         for i, p in self.patches.items():
-            in_u = projection(p.coarse[0], p.net.u).coarse(nets[i], 0)
-            start[i] = projection(p.coarse[1], p.net.v).coarse(in_u, 1)
+            in_u = projection(p.lifted[0], p.net.u).coarse(nets[i], 0)
+            start[i] = projection(p.lifted[1], p.net.v).coarse(in_u, 1)
         coarse = self._conditioned(start)
         smooth = {}
         for i, p in self.patches.items():
-            in_u = refinement(p.coarse[0], p.net.u).apply(coarse[i], 0)
-            smooth[i] = refinement(p.coarse[1], p.net.v).apply(in_u, 1)
+            in_u = refinement(p.lifted[0], p.net.u).apply(coarse[i], 0)
+            smooth[i] = refinement(p.lifted[1], p.net.v).apply(in_u, 1)
         delta = self.stacked(smooth) - g
         return self.split(delta - self.restoration.change(self.fine.matrix @ delta))
 
     def _conditioned(self, start: dict[int, Array]) -> dict[int, Array]:
         """y from y₀, on the coarse nets."""
         matrix = self.coarse_conditions()
-        shapes = {i: x.shape for i, x in start.items()}
-        ends = np.cumsum([s[0] * s[1] for s in shapes.values()])[:-1]
-        factors = {i: tuple(_Factor(k) for k in p.coarse) for i, p in self.patches.items()}
-        weights = [p.weight * np.outer(*(gram(k).diagonal() for k in p.coarse)).ravel() for p in self.patches.values()]
-        preconditioner = Restoration(matrix, np.concatenate(weights))
+        from scipy.sparse import block_diag
+
+        spaces = [_Space(p) for p in self.patches.values()]
+        lift = block_diag([space.lift for space in spaces], format="csr")
+        matrix = (matrix @ lift).tocsr()
+        preconditioner = Restoration(matrix, np.concatenate([space.diagonal for space in spaces]))
+        ends = np.cumsum([len(space.diagonal) for space in spaces])[:-1]
 
         def inverse(b: Array) -> Array:
-            parts = np.split(b, ends)
-            return np.concatenate(
-                [
-                    factors[i][1].solve(factors[i][0].solve(part.reshape(shapes[i]), 0), 1).reshape(-1, 3) / p.weight
-                    for part, (i, p) in zip(parts, self.patches.items(), strict=True)
-                ]
-            )
+            return np.concatenate([space.solve(part) for space, part in zip(spaces, np.split(b, ends), strict=True)])
 
         rows = preconditioner.rows
-        y0 = np.concatenate([x.reshape(-1, 3) for x in start.values()])
+        y0 = np.concatenate([space.project(x) for space, x in zip(spaces, start.values(), strict=True)])
         residual = rows @ y0
         multiplier = np.zeros_like(residual)
         down = np.zeros_like(y0)
@@ -325,18 +328,18 @@ class Coupling:
             step_of = preconditioner.solve(residual)
             rho, before = (residual * step_of).sum(axis=0), rho
             direction = step_of + np.divide(rho, before, out=np.zeros_like(rho), where=before > 0) * direction
-        import os
-        if os.environ.get("DBG"): print("cg", _, np.abs(residual).max(), goal)
-        y = y0 - down
+        y = lift @ (y0 - down)
+        shapes = {i: x.shape for i, x in start.items()}
+        ends = np.cumsum([s[0] * s[1] for s in shapes.values()])[:-1]
         return {i: x.reshape(shapes[i]) for i, x in zip(shapes, np.split(y, ends), strict=True)}
 
     def coarse_conditions(self) -> Any:
         """C = L P, asked at the points that the coarse spaces need."""
-        spaces = {i: p.coarse if p.net.weights is None else (p.net.u, p.net.v) for i, p in self.patches.items()}
+        spaces = {i: p.lifted if p.net.weights is None else (p.net.u, p.net.v) for i, p in self.patches.items()}
         plain = all(p.net.weights is None for p in self.patches.values())
         if plain:
             nets = {
-                i: Net(*p.coarse, np.zeros((p.coarse[0].count, p.coarse[1].count, 3))) for i, p in self.patches.items()
+                i: Net(*p.lifted, np.zeros((p.lifted[0].count, p.lifted[1].count, 3))) for i, p in self.patches.items()
             }
             return Conditions(nets, self.seams, spaces).matrix
         fine = Conditions({i: p.net for i, p in self.patches.items()}, self.seams, spaces).matrix
@@ -352,12 +355,12 @@ class Coupling:
             nu, nv = p.net.u.count, p.net.v.count
             own = used[(used >= self.fine.first[i]) & (used < self.fine.first[i] + nu * nv)]
             u, v = np.divmod(own - self.fine.first[i], nv)
-            in_u, in_v = refinement(p.coarse[0], p.net.u), refinement(p.coarse[1], p.net.v)
-            column = in_u.index[u][:, :, None] * p.coarse[1].count + in_v.index[v][:, None, :]
+            in_u, in_v = refinement(p.lifted[0], p.net.u), refinement(p.lifted[1], p.net.v)
+            column = in_u.index[u][:, :, None] * p.lifted[1].count + in_v.index[v][:, None, :]
             value = in_u.values[u][:, :, None] * in_v.values[v][:, None, :]
             row = np.broadcast_to(own[:, None, None], column.shape)
             parts.append((row.ravel(), start + column.ravel(), value.ravel()))
-            start += p.coarse[0].count * p.coarse[1].count
+            start += p.lifted[0].count * p.lifted[1].count
         row, column, value = (np.concatenate(x) for x in zip(*parts, strict=True))
         return csr_array((value, (row, column)), shape=(self.fine.size, start))
 
@@ -369,18 +372,62 @@ class Coupling:
         return self.split(masked - fix.change(self.fine.matrix @ masked))
 
 
-class _Factor:
-    """Solver with the Gram matrix of a basis along an axis."""
+class _Space:
+    """The coarse space of one patch.
 
-    def __init__(self, knots: KnotVector) -> None:
+    Attributes
+    ----------
+    lift : scipy.sparse.csr_array
+        From its coordinates to the control points over the lifted knots; the identity where nothing is lifted.
+    diagonal : ndarray
+        Of its Gram matrix.
+    """
+
+    def __init__(self, patch: Patch) -> None:
+        from scipy.sparse import eye_array, hstack, kron
         from scipy.sparse.linalg import splu
 
-        self.factor = splu(gram(knots).tocsr().tocsc())
+        self.patch = patch
+        grams = [gram(k) for k in patch.lifted]
+        if patch.base == patch.lifted:
+            size = patch.lifted[0].count * patch.lifted[1].count
+            self.lift = eye_array(size, format="csr")
+            self.factors = [splu(g.tocsr().tocsc()) for g in grams]
+            self.diagonal = patch.weight * np.outer(*(g.diagonal() for g in grams)).ravel()
+            return
+        in_u, in_v = (refinement(b, k).tocsr() for b, k in zip(patch.base, patch.lifted, strict=True))
+        more_u, more_v = (_wavelets(b, k) for b, k in zip(patch.base, patch.lifted, strict=True))
+        near_u, near_v = (np.flatnonzero(x) for x in patch.near)
+        parts = [kron(in_u, in_v), kron(in_u[:, near_u], more_v), kron(more_u, in_v[:, near_v])]
+        self.lift = hstack(parts, format="csr")
+        self.gram = patch.weight * kron(*(g.tocsr() for g in grams), format="csr")
+        whole = (self.lift.T @ self.gram @ self.lift).tocsc()
+        self.factors = [splu(whole, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})]
+        self.diagonal = whole.diagonal()
 
-    def solve(self, b: Array, axis: int) -> Array:
-        moved = np.moveaxis(b, axis, 0)
-        flat = np.ascontiguousarray(moved.reshape(len(moved), -1))
-        return np.moveaxis(self.factor.solve(flat).reshape(moved.shape), 0, axis)
+    def solve(self, b: Array) -> Array:
+        """The inverse of the Gram matrix times ``b`` (coordinates, 3)."""
+        if len(self.factors) == 1:
+            return self.factors[0].solve(b)
+        nu, nv = (k.count for k in self.patch.lifted)
+        along_u = self.factors[0].solve(np.ascontiguousarray(b.reshape(nu, -1))).reshape(nu, nv, 3)
+        turned = np.ascontiguousarray(along_u.swapaxes(0, 1)).reshape(nv, -1)
+        return self.factors[1].solve(turned).reshape(nv, nu, 3).swapaxes(0, 1).reshape(-1, 3) / self.patch.weight
+
+    def project(self, net: Array) -> Array:
+        """Coordinates of the projection of a net over the lifted knots."""
+        flat = net.reshape(-1, 3)
+        return flat if len(self.factors) == 2 else self.solve(self.lift.T @ (self.gram @ flat))
+
+
+def _wavelets(base: KnotVector, lifted: KnotVector) -> Any:
+    from scipy.sparse import csr_array
+
+    if base == lifted:
+        return csr_array((lifted.count, 0))
+    found = wavelets(base, lifted)
+    row, column, value = found.coo()
+    return csr_array((value, (row, column)), shape=found.shape)
 
 
 def _lumped(knots: KnotVector) -> Array:

@@ -2,15 +2,14 @@
 
 All directions of a strip are mapped affinely onto one line.  The ladder is walked on the union of their knots there,
 so that a coarse knot of one is one of all, whatever the orientation; each direction takes the part of it within its own
-domain.  Where degrees differ, the direction of degree d has multiplicity r + d − d_min at a coarse knot that has
-multiplicity r in the lowest degree: its coarse space then contains the lower one's.  Where a joint's ratio varies along
-a seam, T_n = a S_n + b S_t has d − 1 − r + … fewer derivatives than S_n has, or one degree more: one more copy of every
-coarse knot leaves room for that.
+domain.  Where degrees differ, a curve of the lowest degree d_min with a knot of multiplicity r is one of degree d with
+multiplicity r + d − d_min; where a joint's ratio varies along a seam, T_n = a S_n + b S_t has one degree more than S_n
+or one derivative less.  So the control points that such a seam looks at are given more copies of the coarse knots
+(``lifted``), or the seam would lock; the rest of the surface does without.
 """
 
 from __future__ import annotations
 
-from collections import defaultdict
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 
@@ -151,30 +150,54 @@ def line(
     return Line(vector, own, frozenset(breaks[kept].tolist()), total / np.maximum(share, 1))
 
 
+@dataclass(frozen=True, eq=False)
+class Coarse:
+    """The coarse knots of one direction.
+
+    Attributes
+    ----------
+    base : KnotVector
+        Of the whole surface.
+    lifted : KnotVector
+        Of the control points that a seam along this direction looks at: ``base`` or a refinement of it.
+    inserted : ndarray
+        Knots that the surface must be given before it holds them all.
+    """
+
+    base: KnotVector
+    lifted: KnotVector
+    inserted: Array
+
+
 def members(
     strip: Strip,
     line: Line,
     coarse: KnotVector,
     knots: Callable[[Direction], KnotVector],
     creases: Callable[[Direction], frozenset[float]],
-) -> dict[Direction, tuple[KnotVector, Array]]:
-    """For each direction of a strip its coarse knots, and the knots to insert before it holds them all."""
+) -> dict[Direction, Coarse]:
+    """The coarse knots of every direction of a strip, from those of its line."""
     result = {}
     place = np.searchsorted(line.knots.breaks, coarse.breaks)
     for m in strip.members:
         kv = knots(m)
-        lift = kv.degree - line.knots.degree + (strip.copies if len(strip.members) > 1 else 0)
-        ends = kv.domain
-        wanted: dict[float, int] = defaultdict(int)
-        for at, count in zip(line.own[m][place].tolist(), coarse.multiplicities.tolist(), strict=True):
-            if kv.periodic or ends[0] < at < ends[1]:
-                wanted[at] = min(count + lift, kv.degree)
+        lift = kv.degree - line.knots.degree
+        more = lift + (strip.copies if len(strip.members) > 1 else 0)
+        start, stop = kv.domain
+        base: dict[float, int] = {}
+        lifted: dict[float, int] = {}
         have = dict(zip(kv.breaks.tolist(), kv.multiplicities.tolist(), strict=True))
+        for at, count in zip(line.own[m][place].tolist(), coarse.multiplicities.tolist(), strict=True):
+            if kv.periodic or start < at < stop:
+                base[at] = count if count == 1 else min(count + lift, kv.degree)
+                lifted[at] = min(count + more, kv.degree)
         for at in creases(m):
-            wanted[at] = have[at]
-        extra = [np.full(max(count - have.get(at, 0), 0), at) for at, count in wanted.items() if at != ends[1]]
+            base[at] = lifted[at] = have[at]
+        extra = [np.full(max(count - have.get(at, 0), 0), at) for at, count in lifted.items() if at != stop]
         inserted = np.sort(np.concatenate(extra)) if extra else np.empty(0)
         fine = kv.refined(inserted)
-        mults = np.array([wanted.get(float(x), 0) for x in fine.breaks])
-        result[m] = fine.with_multiplicities(mults), inserted
+        result[m] = Coarse(
+            *(fine.with_multiplicities(np.array([w.get(float(x), 0) for x in fine.breaks])) for w in (base, lifted)),
+            inserted,
+        )
     return result

@@ -15,9 +15,9 @@ import numpy as np
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.net import Net
 from mracad.constraint.couple import Coupling, Patch
-from mracad.constraint.frozen import Separation, separate
+from mracad.constraint.frozen import Separation, jet_support, separate
 from mracad.constraint.seam import Seam, Treatment, angles, gaps, seams
-from mracad.constraint.strip import Direction, Line, Strip, line, members, strips
+from mracad.constraint.strip import Coarse, Direction, Line, Strip, line, members, strips
 from mracad.edit.bound import bounded
 from mracad.model import Model, Surface
 from mracad.options import Smooth
@@ -163,12 +163,12 @@ class Together:
         moving = self.moving
         nets, extra = {}, {}
         for i in self._joined():
-            inserted = _union([c[i, 0][1] for c in coarse]), _union([c[i, 1][1] for c in coarse])
+            inserted = _union([c[i, 0].inserted for c in coarse]), _union([c[i, 1].inserted for c in coarse])
             extra[i] = inserted
             nets[i] = self.model.surfaces[i].net.refined(*inserted)
         change: dict[int, Array] = {}
         for (weight, _), spaces in zip(steps, coarse, strict=True):
-            patches = {i: Patch(nets[i], (spaces[i, 0][0], spaces[i, 1][0]), self._area(i)) for i in nets}
+            patches = {i: self._patch(i, nets[i], (spaces[i, 0], spaces[i, 1])) for i in nets}
             coupling = Coupling(patches, self.found)
             for i, delta in coupling.displacement().items():
                 change[i] = weight * delta + change.get(i, 0.0)
@@ -180,18 +180,25 @@ class Together:
             largest = max(float(np.linalg.norm(x, axis=-1).max()) for x in offsets.values())
             offsets = {i: min(1.0, bound / max(largest, 1e-300)) * x for i, x in offsets.items()}
         for seam in self.found:
-            self.freedom[seam.edge] = min(spaces[b.surface, 1 - b.axis][0].count for b in (seam.a, seam.b))
+            self.freedom[seam.edge] = min(spaces[b.surface, 1 - b.axis].base.count for b in (seam.a, seam.b))
         return {i: Moved(nets[i], extra[i], separations[i], change[i], offsets[i]) for i in nets}
 
-    def _members(
-        self, lines: list[tuple[Strip, Line]], coarse: list[KnotVector]
-    ) -> dict[Direction, tuple[KnotVector, Array]]:
+    def _members(self, lines: list[tuple[Strip, Line]], coarse: list[KnotVector]) -> dict[Direction, Coarse]:
         """Coarse knots and knots to insert of every direction."""
         found = (
             members(strip, each, knots, self._knots, self._creases)
             for (strip, each), knots in zip(lines, coarse, strict=True)
         )
         return {direction: vectors for part in found for direction, vectors in part.items()}
+
+    def _patch(self, surface: int, net: Net, coarse: tuple[Coarse, Coarse]) -> Patch:
+        near = np.zeros(coarse[0].base.count, bool), np.zeros(coarse[1].base.count, bool)
+        for seam in self.found:
+            for border in (seam.a, seam.b):
+                if border.surface == surface:
+                    near[border.axis][:] |= jet_support(coarse[border.axis].base, border.at, seam.joint.order)
+        base, lifted = (coarse[0].base, coarse[1].base), (coarse[0].lifted, coarse[1].lifted)
+        return Patch(net, base, lifted, near, self._area(surface))
 
     def _separated(self, surface: Surface, net: Net, moving: Collection[int]) -> Separation:
         faces = [self.model.faces[i] for i in surface.faces]

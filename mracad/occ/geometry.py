@@ -14,6 +14,9 @@ from OCP.BinTools import BinTools_Curve2dSet, BinTools_SurfaceSet
 from OCP.Geom import Geom_BezierSurface, Geom_BSplineSurface, Geom_RectangularTrimmedSurface, Geom_Surface
 from OCP.Geom2d import Geom2d_BSplineCurve, Geom2d_Curve, Geom2d_Line, Geom2d_TrimmedCurve
 from OCP.Geom2dConvert import Geom2dConvert
+from OCP.gp import gp_Pnt
+from OCP.TColgp import TColgp_Array2OfPnt
+from OCP.TColStd import TColStd_Array1OfInteger, TColStd_Array1OfReal, TColStd_Array2OfReal
 
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.net import Curve, Net
@@ -35,21 +38,46 @@ def is_nurbs(surface: Geom_Surface) -> bool:
     return isinstance(surface, Geom_BSplineSurface | Geom_BezierSurface)
 
 
-def nets(surfaces: Sequence[Geom_Surface], scale: float = 1.0) -> list[Net]:
+def nets(surfaces: Sequence[Geom_Surface]) -> list[Net]:
     """The control nets of B-spline and Bézier surfaces.
 
     Parameters
     ----------
     surfaces : sequence of Geom_BSplineSurface or Geom_BezierSurface
         All different.
-    scale : float
-        Factor on the poles (memory unit to mm).
     """
     collection = BinTools_SurfaceSet()
     for surface in surfaces:
         collection.Add(surface)
     stream = _Stream(collection)
-    return [_net(stream, isinstance(surface, Geom_BezierSurface), scale) for surface in surfaces]
+    return [_net(stream, isinstance(surface, Geom_BezierSurface)) for surface in surfaces]
+
+
+def spline(net: Net) -> Geom_BSplineSurface:
+    """The kernel's surface over a control net."""
+    poles = TColgp_Array2OfPnt(1, net.u.count, 1, net.v.count)
+    weights = TColStd_Array2OfReal(1, net.u.count, 1, net.v.count)
+    given = np.ones(net.poles.shape[:2]) if net.weights is None else net.weights
+    for (i, j), weight in np.ndenumerate(given):
+        poles.SetValue(i + 1, j + 1, gp_Pnt(*net.poles[i, j].tolist()))
+        weights.SetValue(i + 1, j + 1, float(weight))
+    (u, u_mults), (v, v_mults) = _multiplicities(net.u), _multiplicities(net.v)
+    directions = net.u.degree, net.v.degree, net.u.periodic, net.v.periodic
+    if net.weights is None:
+        return Geom_BSplineSurface(poles, u, v, u_mults, v_mults, *directions)
+    return Geom_BSplineSurface(poles, weights, u, v, u_mults, v_mults, *directions)
+
+
+def _multiplicities(knots: KnotVector) -> tuple[TColStd_Array1OfReal, TColStd_Array1OfInteger]:
+    """Distinct knots and their multiplicities as the kernel wants them."""
+    values, counts = knots.breaks, knots.multiplicities
+    if not knots.periodic:
+        values, counts = np.unique(knots.knots, return_counts=True)
+    breaks, mults = TColStd_Array1OfReal(1, len(values)), TColStd_Array1OfInteger(1, len(values))
+    for i, (value, count) in enumerate(zip(values.tolist(), counts.tolist(), strict=True), 1):
+        breaks.SetValue(i, value)
+        mults.SetValue(i, count)
+    return breaks, mults
 
 
 def curves(pieces: Sequence[tuple[Geom2d_Curve, float, float]]) -> list[Curve]:
@@ -84,7 +112,7 @@ class _Stream:
         return values
 
 
-def _net(stream: _Stream, bezier: bool, scale: float) -> Net:
+def _net(stream: _Stream, bezier: bool) -> Net:
     """The next surface."""
     if bezier:
         _, u_rational, v_rational = stream.take("u1", 3).tolist()
@@ -98,7 +126,7 @@ def _net(stream: _Stream, bezier: bool, scale: float) -> Net:
         poles, weights = _poles(stream, (nu, nv), 3, u_rational or v_rational)
         u = _knots(stream, mu, p, bool(u_periodic))
         v = _knots(stream, mv, q, bool(v_periodic))
-    return Net(u, v, poles if scale == 1.0 else poles * scale, weights)
+    return Net(u, v, poles, weights)
 
 
 def _curve(stream: _Stream) -> Curve:

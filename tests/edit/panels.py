@@ -14,7 +14,7 @@ SIZE = 100.0
 
 @dataclass(frozen=True)
 class Patch:
-    """A piece of the panel; ``turns`` are what was done to its parameters: ``"u"``, ``"v"`` reversed, ``"x"`` swapped."""
+    """A piece of the panel; ``turns`` are ``u``, ``v`` reversed, ``x`` swapped."""
 
     net: Net
     turns: str = ""

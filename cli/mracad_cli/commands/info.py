@@ -88,7 +88,7 @@ def command(source: str, input_unit: str | None, scale: str, keep: Any, everythi
             ["edge", "faces", "gap mm", "angle °", "at"],
             [
                 (
-                    f"edge#{m.edge + 1}" if m.sewn else "not sewn",
+                    f"edge#{m.edge + 1}" + ("" if m.sewn else " (not sewn)"),
                     "#{} #{}".format(*(i + 1 for i in m.faces)),
                     f"{m.gap:.2g}",
                     f"{m.angle:.3g}",
