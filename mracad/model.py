@@ -110,12 +110,15 @@ class Side:
         Parameters on the face's surface.
     points, normals : ndarray (k, 3) or None
         Points (mm) and outward unit normals in the part's frame.
+    curvatures : ndarray (k,) or None
+        Normal curvatures across the edge (1/mm), positive where the face bends towards its normal.
     """
 
     face: int
     uv: Array | None = None
     points: Array | None = None
     normals: Array | None = None
+    curvatures: Array | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -96,4 +96,5 @@ def _baked(edge: Edge, other: Edge) -> Side:
     side = other.sides[0]
     assert side.points is not None and side.normals is not None
     nearest = np.linalg.norm(edge.points[:, None] - other.points, axis=2).argmin(axis=1)
-    return Side(side.face, points=edge.points, normals=side.normals[nearest])
+    curvatures = None if side.curvatures is None else side.curvatures[nearest]
+    return Side(side.face, points=edge.points, normals=side.normals[nearest], curvatures=curvatures)

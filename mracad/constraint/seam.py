@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mracad.bspline.knots import Side as Limit
+from mracad.bspline.net import Net
 from mracad.constraint.frozen import CONTINUITY, ISO, local_span
 from mracad.model import Edge, Face, Model, Side
 
@@ -229,6 +230,23 @@ def border(model: Model, edge: Edge, side: Side, use: int) -> Border | None:
             limit = _inner_side(face, trim.edge, axis, place)
         return Border(face.index, face.surface, axis, place, limit, start, stop)
     return None
+
+
+def from_inside(face: Face, net: Net, edge: int, uv: Array) -> tuple[Array, tuple[Limit, Limit]]:
+    """Parameters ``uv`` (k, 2) along an edge of a face, moved onto the knot line that it lies on, and the limits there.
+
+    They matter where the surface goes on beyond the edge, unseen, another way.
+    """
+    found: list[Limit] = ["right", "right"]
+    for axis, knots in enumerate((net.u, net.v)):
+        at = float(uv[:, axis].mean())
+        low, high = knots.domain
+        near = 2 * ISO * local_span(knots, at)
+        nearest = float(knots.breaks[np.argmin(np.abs(knots.breaks - at))])
+        if low < at < high and np.abs(uv[:, axis] - nearest).max() <= near:
+            found[axis] = _inner_side(face, edge, axis, nearest)
+            uv = np.where(np.arange(2) == axis, nearest, uv)
+    return uv, (found[0], found[1])
 
 
 def _pace(count: int) -> Array:

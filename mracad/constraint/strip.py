@@ -196,8 +196,6 @@ def members(
         extra = [np.full(max(count - have.get(at, 0), 0), at) for at, count in lifted.items() if at != stop]
         inserted = np.sort(np.concatenate(extra)) if extra else np.empty(0)
         fine = kv.refined(inserted)
-        result[m] = Coarse(
-            *(fine.with_multiplicities(np.array([w.get(float(x), 0) for x in fine.breaks])) for w in (base, lifted)),
-            inserted,
-        )
+        spaces = [fine.with_multiplicities(np.array([w.get(float(x), 0) for x in fine.breaks])) for w in (base, lifted)]
+        result[m] = Coarse(spaces[0], spaces[1], inserted)
     return result

@@ -117,13 +117,15 @@ class Together:
         bound : float or None
             On the displacement of any control point, mm.
         """
-        while self.found:
-            moved = self._attempt(scale, bound)
+        while True:
+            lines = [(strip, line(strip, self._knots, self._lengths, self._creases)) for strip in self._strips()]
+            if not self.found:
+                return {}
+            moved = self._attempt(lines, scale, bound)
             broken = self._broken(moved)
             if not broken:
                 return moved
             self._freeze(broken)
-        return {}
 
     def _freeze(self, reasons: Mapping[int, str]) -> None:
         self.frozen |= reasons
@@ -153,8 +155,7 @@ class Together:
     def _joined(self) -> list[int]:
         return sorted({border.surface for seam in self.found for border in (seam.a, seam.b)})
 
-    def _attempt(self, scale: float | None, bound: float | None) -> dict[int, Moved]:
-        lines = [(strip, line(strip, self._knots, self._lengths, self._creases)) for strip in self._strips()]
+    def _attempt(self, lines: list[tuple[Strip, Line]], scale: float | None, bound: float | None) -> dict[int, Moved]:
         if scale is not None:
             steps = [(1.0, [_at_scale(each, scale) for _, each in lines])]
         else:
