@@ -120,36 +120,36 @@ def _terms(seam: Seam, derivative: int) -> list[tuple[Border, list[tuple[int, in
 
 def _functional(net: Net, border: Border, share: Array, terms: list[tuple[int, int, Array]]) -> tuple[Array, Array]:
     """Control points ``(q, k)`` and their factors in Σ c(t) ∂ₙⁱ∂ₜʲ of the surface at fractions of a border."""
-    places = border.places(share)
     pace = border.stop - border.start
-    end = share > 0.5
-    columns, values = [], []
-    forward: Limit = "right" if pace > 0 else "left"
-    backward: Limit = "left" if pace > 0 else "right"
-    for part, along in ((~end, forward), (end, backward)):
-        index, table = _jet(net, places[part], max(i + j for i, j, _ in terms), border.limits(along))
-        total = np.zeros(index.shape)
-        for i, j, factor in terms:
-            if factor.size:
-                weight = np.polynomial.polynomial.polyval(share[part], factor) * pace**j
-                total += weight[:, None] * table[(i, j) if border.axis == 0 else (j, i)]
-        columns.append(index)
-        values.append(total)
-    column, value = np.empty((len(share), columns[0].shape[1]), int), np.empty((len(share), columns[0].shape[1]))
-    for part, c, v in zip((~end, end), columns, values, strict=True):
-        column[part], value[part] = c, v
+    along = (1.0 - share) * border.start + share * border.stop
+    column, table = _jet(net, border, along, max(i + j for i, j, _ in terms), "right" if pace > 0 else "left")
+    value = np.zeros(column.shape)
+    for i, j, factor in terms:
+        if factor.size:
+            value += (np.polynomial.polynomial.polyval(share, factor) * pace**j)[:, None] * table[i, j]
     return column, value
 
 
-def _jet(net: Net, uv: Array, order: int, limits: Any) -> tuple[Array, dict[tuple[int, int], Array]]:
-    """Rational basis functions and derivatives at ``uv``: control points ``(q, k)`` and values by (in u, in v)."""
-    in_u = [basis(net.u, uv[:, 0], r, limits[0]) for r in range(order + 1)]
-    in_v = [basis(net.v, uv[:, 1], r, limits[1]) for r in range(order + 1)]
-    row = (in_u[0][0][:, None] + np.arange(net.u.degree + 1)) % net.u.count
-    column = (in_v[0][0][:, None] + np.arange(net.v.degree + 1)) % net.v.count
-    index = (row[:, :, None] * net.v.count + column[:, None, :]).reshape(len(uv), -1)
+def _jet(net: Net, border: Border, at: Array, order: int, limit: Limit) -> tuple[Array, dict[tuple[int, int], Array]]:
+    """Rational basis functions and derivatives at places ``at`` along a border.
+
+    Returns
+    -------
+    index : ndarray (q, k)
+        Control points.
+    table : dict
+        For derivatives (across, along) the values ``(q, k)``.
+    """
+    across, along = (net.u, net.v)[:: 1 - 2 * border.axis]
+    place = np.array([border.at])
+    in_n = [basis(across, place, r, border.limit) for r in range(order + 1)]
+    in_t = [basis(along, at, r, limit) for r in range(order + 1)]
+    line = (in_n[0][0][:, None] + np.arange(across.degree + 1)) % across.count
+    step = (in_t[0][0][:, None] + np.arange(along.degree + 1)) % along.count
+    stride = (net.v.count, 1)[:: 1 - 2 * border.axis]
+    index = (line[:, :, None] * stride[0] + step[:, None, :] * stride[1]).reshape(len(at), -1)
     table = {
-        (i, j): (in_u[i][1][:, :, None] * in_v[j][1][:, None, :]).reshape(len(uv), -1)
+        (i, j): (in_n[i][1][:, :, None] * in_t[j][1][:, None, :]).reshape(len(at), -1)
         for i in range(order + 1)
         for j in range(order + 1 - i)
     }

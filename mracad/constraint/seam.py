@@ -106,12 +106,20 @@ class Joint:
 
 @dataclass(frozen=True, eq=False)
 class Seam:
-    """Two borders of edited faces that meet, and their joint; its fractions run from start to stop on both."""
+    """Two borders of edited faces that meet, and their joint; its fractions run from start to stop on both.
+
+    Attributes
+    ----------
+    gap, angle : float
+        Largest gap, mm, and angle between the outward normals.
+    """
 
     edge: int
     a: Border
     b: Border
     joint: Joint
+    gap: float
+    angle: float
 
 
 @dataclass(frozen=True)
@@ -201,7 +209,7 @@ def _seam(model: Model, movable: Collection[int], edge: Edge, one: Side, two: Si
         if knots.periodic and abs(abs(a.at - b.at) - knots.period) <= ISO * knots.period:
             return ""
     joint = _joint(model, edge, a, b, CONTINUITY[keep])
-    return joint if isinstance(joint, str) else Seam(edge.index, a, b, joint)
+    return joint if isinstance(joint, str) else Seam(edge.index, a, b, joint, *opening(model, a, b))
 
 
 def border(model: Model, edge: Edge, side: Side, use: int) -> Border | None:
@@ -265,28 +273,24 @@ def _inner_side(face: Face, edge: int, axis: int, at: float) -> Limit:
     return "right" if others and np.concatenate(others).mean() > at else "left"
 
 
-def jets(model: Model, border: Border, share: Array) -> tuple[Array, ...]:
-    """``S, S_n, S_t, S_nn`` at fractions of the edge in the part's frame; t is the fraction, n the parameter."""
+def jets(model: Model, border: Border, share: Array, order: int) -> tuple[Array, ...]:
+    """``S, S_n, S_t`` and for order 2 ``S_nn`` at fractions of the edge in the part's frame; t is the fraction."""
     face, net = model.faces[border.face], model.surfaces[border.surface].net
-    values = net.evaluate(border.places(share), 2, border.limits("right"))
-    s, su, sv, suu, _, svv = (x @ face.frame[:3, :3].T for x in values)
+    values = net.evaluate(border.places(share), order, border.limits("right"))
+    s, su, sv, *second = (x @ face.frame[:3, :3].T for x in values)
     pace = border.stop - border.start
-    s = s + face.frame[:3, 3]
-    return (s, su, sv * pace, suu) if border.axis == 0 else (s, sv, su * pace, svv)
+    first = (su, sv * pace) if border.axis == 0 else (sv, su * pace)
+    return (s + face.frame[:3, 3], *first, *second[:: 2 if border.axis == 0 else -2][:1])
 
 
-def gaps(model: Model, seam: Seam) -> Array:
-    """Distances between the two surfaces at points along a seam, mm, differences along the seam left out."""
-    s, _, st, _ = jets(model, seam.a, _SAMPLES)
-    apart = s - jets(model, seam.b, _SAMPLES)[0]
+def opening(model: Model, a: Border, b: Border) -> tuple[float, float]:
+    """Largest gap (mm, differences along the seam left out) and angle between the outward normals of two borders."""
+    s, sn, st = jets(model, a, _SAMPLES, 1)
+    t, tn, tt = jets(model, b, _SAMPLES, 1)
     way = st / np.linalg.norm(st, axis=1, keepdims=True)
-    return np.linalg.norm(apart - (apart * way).sum(axis=1, keepdims=True) * way, axis=1)
-
-
-def angles(model: Model, seam: Seam) -> Array:
-    """Angles between the outward normals at points along a seam."""
-    sides = ((border, jets(model, border, _SAMPLES)) for border in (seam.a, seam.b))
-    return _between(*(_outward(model, border, jet[1], jet[2]) for border, jet in sides))
+    apart = s - t - ((s - t) * way).sum(axis=1, keepdims=True) * way
+    angle = _between(_outward(model, a, sn, st), _outward(model, b, tn, tt))
+    return float(np.linalg.norm(apart, axis=1).max()), float(angle.max())
 
 
 def _outward(model: Model, border: Border, across: Array, along: Array) -> Array:
@@ -302,8 +306,8 @@ def _between(one: Array, two: Array) -> Array:
 
 def _joint(model: Model, edge: Edge, a: Border, b: Border, order: int) -> Joint | str:
     """The joint between two borders, or why it cannot be kept."""
-    s, sn, st, snn = jets(model, a, _SAMPLES)
-    t, tn, tt, tnn = jets(model, b, _SAMPLES)
+    s, sn, st, snn = jets(model, a, _SAMPLES, 2)
+    t, tn, tt, tnn = jets(model, b, _SAMPLES, 2)
     length = np.linalg.norm(st, axis=1).mean()
     slip = np.abs(((s - t) * st).sum(axis=1) / np.maximum(np.linalg.norm(st, axis=1), 1e-12 * length)).max()
     if slip > max(SLIP, 1e-5 * length):

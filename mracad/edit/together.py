@@ -16,7 +16,7 @@ from mracad.bspline.knots import KnotVector
 from mracad.bspline.net import Net
 from mracad.constraint.couple import Coupling, Patch
 from mracad.constraint.frozen import Separation, jet_support, separate
-from mracad.constraint.seam import Seam, Treatment, angles, gaps, seams
+from mracad.constraint.seam import Seam, Treatment, opening, seams
 from mracad.constraint.strip import Coarse, Direction, Line, Strip, line, members, strips
 from mracad.edit.bound import bounded
 from mracad.model import Model, Surface
@@ -221,10 +221,10 @@ class Together:
         after = self.model.with_surfaces(surfaces)
         result = {}
         for seam in self.found:
-            gap, angle = gaps(self.model, seam).max(), angles(self.model, seam).max()
-            if gaps(after, seam).max() > gap + WIDER:
+            gap, angle = opening(after, seam.a, seam.b)
+            if gap > seam.gap + WIDER:
                 result[seam.edge] = "would gape"
-            elif seam.joint.order and angles(after, seam).max() > angle + STEEPER:
+            elif seam.joint.order and angle > seam.angle + STEEPER:
                 result[seam.edge] = "would kink"
         return result
 
