@@ -151,7 +151,10 @@ class _SurfaceSmoothing:
             self.inserted = len(extra_u) + len(extra_v)
         else:
             return
-        if _deviation(net.refined(extra_u, extra_v), moved) > OVERSHOOT * _deviation(net, self.change):
+        most = OVERSHOOT * _deviation(net, self.change)
+        if self.fairing and not self.inserted and _deviation(net, moved) > most:
+            moved, self.fairing = np.where(self.separation.free[..., None], self.change, 0.0), 0.0
+        if _deviation(net.refined(extra_u, extra_v), moved) > most:
             self.fairing, self.inserted, self.entangled = 0.0, 0, True
             return
         moved = options.amount * moved
