@@ -20,6 +20,9 @@ if TYPE_CHECKING:
     from mracad.occ.check import Validity
     from mracad.occ.document import Document
 
+WIDER, STEEPER = 1e-5, 0.01
+"""No seam may gape by so much more (mm), and no smooth one turn by so much more (degrees), after an edit."""
+
 Progress = Callable[[str, int, int], None]
 """Called with the name of a stage, the steps done and the steps in all."""
 
@@ -104,9 +107,9 @@ def run(
         model = view(document, convert=convertible)
     before: list[SeamMeasure] = []
     valid_before: Validity | None = None
-    spoiled: set[int] = set()
+    spoiled: dict[int, str] = {}
     while True:
-        result = edit(model, options, faces=chosen, held=held | spoiled, progress=stage("editing"))
+        result = edit(model, options, faces=chosen, held=held | spoiled.keys(), progress=stage("editing"))
         result = _named(result, spoiled)
         _refuse_if_stuck(model, result)
         if valid_before is None:
@@ -114,6 +117,11 @@ def run(
             stage("checking the input")(0, 1)
             valid_before = check(document)
         valid_after = valid_before
+        after = seams(result.displacement.applied(model)) if result.displacement.offsets else before
+        torn = {i for i in _torn(before, after) if model.faces[i].surface is not None} - spoiled.keys()
+        if torn:
+            spoiled |= dict.fromkeys(torn, "its seams would not hold")
+            continue
         if not (apply and result.displacement.offsets):
             break
         put(document, model, result.displacement)
@@ -125,13 +133,12 @@ def run(
             valid_after = _verdict(valid_before, moved, touched)
             break
         restore(document, model, result.displacement)
-        if not worse <= touched - spoiled:
+        if not worse <= touched - spoiled.keys():
             raise EditError(
                 f"{model.name}: the result would be less valid",
                 "leave faces out with --faces '!#N', or use --amount 0.5",
             )
-        spoiled |= worse
-    after = seams(result.displacement.applied(model)) if result.displacement.offsets else before
+        spoiled |= dict.fromkeys(worse, "its result would not be valid")
     return Report(
         model,
         result,
@@ -154,15 +161,24 @@ def _refuse_if_stuck(model: Model, result: Edit) -> None:
         )
 
 
-def _named(result: Edit, spoiled: set[int]) -> Edit:
-    """The outcomes with the reason for which ``spoiled`` faces were left."""
+def _torn(before: list[SeamMeasure], after: list[SeamMeasure]) -> set[int]:
+    """Faces of seams that an edit would open, or that were smooth and would not be."""
+    return {
+        face
+        for old, new in zip(before, after, strict=True)
+        if new.gap > old.gap + WIDER or (old.smooth and new.angle > old.angle + STEEPER)
+        for face in old.faces
+    }
+
+
+def _named(result: Edit, spoiled: dict[int, str]) -> Edit:
+    """The outcomes with the reasons for which ``spoiled`` faces were left."""
     if not spoiled:
         return result
     return replace(
         result,
         outcomes=tuple(
-            replace(o, status="stuck", reason="its result would not be valid") if o.face in spoiled else o
-            for o in result.outcomes
+            replace(o, status="stuck", reason=spoiled[o.face]) if o.face in spoiled else o for o in result.outcomes
         ),
     )
 

@@ -56,6 +56,13 @@ class Selection(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         Literal["g0", "g1", "g2"],
         Meta(description="Continuity that every edge keeps: position, tangent plane or curvature."),
     ] = "g1"
+    edges: Annotated[
+        Literal["frozen", "coupled"],
+        Meta(
+            description="Edges between two edited faces: frozen, none moves; coupled, they move and stay as smooth as "
+            "they were, where both sides are natural boundaries and that is possible."
+        ),
+    ] = "frozen"
     refine: Annotated[
         bool,
         Meta(description="Insert knots (exactly) where a face has too few free control points."),

@@ -9,6 +9,7 @@ import msgspec
 
 if TYPE_CHECKING:
     from mracad.audit.continuity import SeamMeasure, SeamSummary
+    from mracad.constraint.seam import Treatment
     from mracad.edit.result import FaceOutcome
     from mracad.job import Report
     from mracad.occ.check import Validity
@@ -88,8 +89,18 @@ def edit_lines(report: Report, done: str, quiet: str, written: str) -> list[str]
     ]
     if worse:
         lines[-1] += f"; {len(worse)} less smooth"
+    if edit.edges:
+        lines[-1] += f"; {edge_words(edit.edges)}"
     lines.append(f"valid: {verdict(report.valid_after.valid)} (was {verdict(report.valid_before.valid)}); {written}")
     return lines
+
+
+def edge_words(edges: tuple[Treatment, ...]) -> str:
+    """What was done about the edges of the edited faces."""
+    coupled = sum(e.how == "coupled" for e in edges)
+    why = Counter(e.reason for e in edges if e.reason)
+    reasons = ", ".join(f"{count} {reason}" for reason, count in why.most_common())
+    return f"{coupled} of {plural(len(edges), 'edge')} moved with both faces" + (f" (not: {reasons})" if why else "")
 
 
 def seam_line(new: SeamSummary, old: SeamSummary | None = None) -> str:
@@ -132,6 +143,7 @@ def report(value: Report) -> dict[str, Any]:
         "diagonal": value.model.diagonal,
         "counts": dict(Counter(o.status for o in value.edit.outcomes)),
         "faces": [outcome(o) for o in value.edit.outcomes],
+        "edges": [{**plain(e), "edge": e.edge + 1, "faces": [i + 1 for i in e.faces]} for e in value.edit.edges],
         "notes": list(value.edit.notes),
         "deviation": [{**plain(d), "face": d.face + 1} for d in value.deviations],
         "seams": {

@@ -1,0 +1,250 @@
+"""Smoothing of surfaces whose common edges move with them.
+
+The target is the coupled projection (:mod:`mracad.constraint.couple`) in place of the projection of each surface by
+itself.  Points that some other edge freezes stay, and the seam conditions are restored where that broke them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from mracad.bspline.knots import KnotVector
+from mracad.bspline.net import Net
+from mracad.constraint.couple import Coupling, Patch
+from mracad.constraint.frozen import Separation, jet_support, separate
+from mracad.constraint.seam import Seam, Treatment, opening, seams
+from mracad.constraint.strip import Coarse, Direction, Line, Strip, line, members, strips
+from mracad.edit.bound import bounded
+from mracad.model import Model, Surface
+from mracad.options import Smooth
+from mracad.wavelet.ladder import ladder_for_scale, rungs_by_level
+
+Array = np.ndarray
+
+WIDER, STEEPER = 1e-6, math.radians(0.01)
+"""A seam that was smooth may end up with so much more gap (mm) and angle; otherwise it is frozen."""
+
+
+@dataclass(frozen=True, eq=False)
+class Moved:
+    """A surface that moves together with others.
+
+    Attributes
+    ----------
+    net : Net
+        The surface, refined so that it can follow the others.
+    inserted : (ndarray, ndarray)
+        Knots inserted in u and v.
+    separation : Separation
+        On that net.
+    change, offset : ndarray (nu, nv, 3)
+        What the edit would do were nothing frozen, and what it does, mm.
+    """
+
+    net: Net
+    inserted: tuple[Array, Array]
+    separation: Separation
+    change: Array
+    offset: Array
+
+
+class Together:
+    """The surfaces of a model that move together.
+
+    Parameters
+    ----------
+    model : Model
+    movable : collection of int
+        Faces that the edit may move.
+    options : Smooth
+    spans : mapping of int to pair of ndarray
+        Arc lengths of the knot spans in u and v of each surface, mm.
+    creases : mapping of int to pair of frozenset
+        Crease lines of each surface.
+
+    Attributes
+    ----------
+    found : list of Seam
+    closing : set of int
+        Closing edges that need no condition.
+    frozen : dict of int to str
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        movable: Collection[int],
+        options: Smooth,
+        spans: Mapping[int, tuple[Array, Array]],
+        creases: Mapping[int, tuple[frozenset[float], frozenset[float]]],
+    ) -> None:
+        self.model, self.movable, self.options = model, movable, options
+        self.spans, self.creases = spans, creases
+        self.found: list[Seam] = []
+        self.closing: set[int] = set()
+        self.frozen: dict[int, str] = {}
+        if options.edges == "coupled":
+            self.found, self.closing, self.frozen = seams(model, movable, options.keep)
+        self.freedom: dict[int, int] = {}
+
+    @property
+    def moving(self) -> set[int]:
+        """Edges that move."""
+        return self.closing | {seam.edge for seam in self.found}
+
+    def treatments(self) -> tuple[Treatment, ...]:
+        """What was done about each edge of a movable face, in edge order."""
+
+        def of(edge: int) -> Treatment:
+            faces = tuple(side.face for side in self.model.edges[edge].sides)
+            if edge in self.frozen:
+                return Treatment(edge, faces, "frozen", self.frozen[edge])
+            return Treatment(edge, faces, "coupled", freedom=self.freedom.get(edge, 0))
+
+        return tuple(of(edge) for edge in sorted(self.moving | set(self.frozen)))
+
+    def smoothed(self, scale: float | None, bound: float | None) -> dict[int, Moved]:
+        """Smooth the surfaces that coupled seams join; a seam that does not hold is frozen and the rest done again.
+
+        Parameters
+        ----------
+        scale : float or None
+            Wavelength, mm; None for the level of the options.
+        bound : float or None
+            On the displacement of any control point, mm.
+        """
+        while True:
+            lines = [(strip, line(strip, self._knots, self._lengths, self._creases)) for strip in self._strips()]
+            if not self.found:
+                return {}
+            moved = self._attempt(lines, scale, bound)
+            broken = self._broken(moved)
+            if not broken:
+                return moved
+            self._freeze(broken)
+
+    def _freeze(self, reasons: Mapping[int, str]) -> None:
+        self.frozen |= reasons
+        self.found = [seam for seam in self.found if seam.edge not in reasons]
+
+    def _knots(self, direction: Direction) -> KnotVector:
+        net = self.model.surfaces[direction[0]].net
+        return (net.u, net.v)[direction[1]]
+
+    def _lengths(self, direction: Direction) -> Array:
+        return self.spans[direction[0]][direction[1]]
+
+    def _creases(self, direction: Direction) -> frozenset[float]:
+        return self.creases[direction[0]][direction[1]]
+
+    def _strips(self) -> list[Strip]:
+        """Strips of all directions of the surfaces that seams join; seams that contradict are frozen."""
+        while True:
+            found, refused = strips(self.found, self._knots)
+            if not refused:
+                break
+            self._freeze(refused)
+        there = {m for strip in found for m in strip.members}
+        lone = [(i, axis) for i in self._joined() for axis in (0, 1) if (i, axis) not in there]
+        return found + [Strip({direction: (1.0, 0.0)}) for direction in lone]
+
+    def _joined(self) -> list[int]:
+        return sorted({border.surface for seam in self.found for border in (seam.a, seam.b)})
+
+    def _attempt(self, lines: list[tuple[Strip, Line]], scale: float | None, bound: float | None) -> dict[int, Moved]:
+        if scale is not None:
+            steps = [(1.0, [_at_scale(each, scale) for _, each in lines])]
+        else:
+            steps = _at_level([each for _, each in lines], self.options.level or 0.0)
+        coarse = [self._members(lines, knots) for _, knots in steps]
+        moving = self.moving
+        nets, extra = {}, {}
+        for i in self._joined():
+            inserted = _union([c[i, 0].inserted for c in coarse]), _union([c[i, 1].inserted for c in coarse])
+            extra[i] = inserted
+            nets[i] = self.model.surfaces[i].net.refined(*inserted)
+        change: dict[int, Array] = {}
+        for (weight, _), spaces in zip(steps, coarse, strict=True):
+            patches = {i: self._patch(i, nets[i], (spaces[i, 0], spaces[i, 1])) for i in nets}
+            coupling = Coupling(patches, self.found)
+            for i, delta in coupling.displacement().items():
+                change[i] = weight * delta + change.get(i, 0.0)
+        separations = {i: self._separated(self.model.surfaces[i], nets[i], moving) for i in nets}
+        free = {i: s.free for i, s in separations.items()}
+        offsets = coupling.held({i: self.options.amount * x for i, x in change.items()}, free)
+        if bound is not None:
+            offsets = coupling.held({i: bounded(x, bound) for i, x in offsets.items()}, free)
+            largest = max(float(np.linalg.norm(x, axis=-1).max()) for x in offsets.values())
+            offsets = {i: min(1.0, bound / max(largest, 1e-300)) * x for i, x in offsets.items()}
+        for seam in self.found:
+            self.freedom[seam.edge] = min(spaces[b.surface, 1 - b.axis].base.count for b in (seam.a, seam.b))
+        return {i: Moved(nets[i], extra[i], separations[i], change[i], offsets[i]) for i in nets}
+
+    def _members(self, lines: list[tuple[Strip, Line]], coarse: list[KnotVector]) -> dict[Direction, Coarse]:
+        """Coarse knots and knots to insert of every direction."""
+        found = (
+            members(strip, each, knots, self._knots, self._creases)
+            for (strip, each), knots in zip(lines, coarse, strict=True)
+        )
+        return {direction: vectors for part in found for direction, vectors in part.items()}
+
+    def _patch(self, surface: int, net: Net, coarse: tuple[Coarse, Coarse]) -> Patch:
+        near = np.zeros(coarse[0].base.count, bool), np.zeros(coarse[1].base.count, bool)
+        for seam in self.found:
+            for border in (seam.a, seam.b):
+                if border.surface == surface:
+                    near[border.axis][:] |= jet_support(coarse[border.axis].base, border.at, seam.joint.order)
+        base, lifted = (coarse[0].base, coarse[1].base), (coarse[0].lifted, coarse[1].lifted)
+        return Patch(net, base, lifted, near, self._area(surface))
+
+    def _separated(self, surface: Surface, net: Net, moving: Collection[int]) -> Separation:
+        faces = [self.model.faces[i] for i in surface.faces]
+        return separate(net, faces, [i for i in surface.faces if i in self.movable], self.options.keep, moving)
+
+    def _area(self, surface: int) -> float:
+        """Area per unit of the parameter plane."""
+        net = self.model.surfaces[surface].net
+        return math.prod(
+            float(lengths.sum()) / knots.period
+            for lengths, knots in zip(self.spans[surface], (net.u, net.v), strict=True)
+        )
+
+    def _broken(self, moved: Mapping[int, Moved]) -> dict[int, str]:
+        """Seams that are wider or steeper than they may be, and what is wrong with them."""
+        surfaces = list(self.model.surfaces)
+        for i, m in moved.items():
+            surfaces[i] = Surface(i, Net(m.net.u, m.net.v, m.net.poles + m.offset, m.net.weights), surfaces[i].faces)
+        after = self.model.with_surfaces(surfaces)
+        result = {}
+        for seam in self.found:
+            gap, angle = opening(after, seam.a, seam.b)
+            if gap > seam.gap + WIDER:
+                result[seam.edge] = "would gape"
+            elif seam.joint.order and angle > seam.angle + STEEPER:
+                result[seam.edge] = "would kink"
+        return result
+
+
+def _at_scale(line: Line, scale: float) -> KnotVector:
+    return ladder_for_scale(line.knots, line.lengths, scale, keep=line.kept)
+
+
+def _at_level(lines: list[Line], level: float) -> list[tuple[float, list[KnotVector]]]:
+    """Weights and coarse knots of the one or two levels to blend."""
+    ladders = [rungs_by_level(each.knots, keep=each.kept, lengths=each.lengths) for each in lines]
+    whole, part = int(level), level % 1.0
+    weights = [(1.0 - part, whole)] + ([(part, whole + 1)] if part else [])
+    return [(weight, [rungs[min(rung, len(rungs) - 1)] for rungs in ladders]) for weight, rung in weights]
+
+
+def _union(knots: list[Array]) -> Array:
+    """Knots of several lists, each as often as where it is most frequent."""
+    counts: dict[float, int] = {}
+    for each in knots:
+        for value, count in zip(*np.unique(each, return_counts=True), strict=True):
+            counts[float(value)] = max(counts.get(float(value), 0), int(count))
+    return np.sort(np.repeat(list(counts), list(counts.values()))) if counts else np.empty(0)
