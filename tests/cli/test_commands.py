@@ -19,8 +19,21 @@ def test_the_four_lines(mracad, samples, tmp_path):
     assert found == "panel.step: 6 NURBS faces: 6 smoothed at 16mm"
     assert deviation.startswith("deviation: max 0.") and " on #" in deviation
     assert seams.startswith("seams: 7 smooth of 7, angle ≤ ") and "(was " in seams
-    assert seams.endswith("; 7 of 17 edges moved with both faces (not: 10 free edge)")
     assert valid.startswith("valid: yes (was yes); wrote out.step, ")
+
+
+def test_coupled_seams_move_and_are_counted(mracad, samples, tmp_path):
+    out = tmp_path / "out.step"
+    result = mracad("smooth", samples / "panel.step", "--scale", "16mm", "--edges", "coupled", "-o", out)
+    assert result.code == 0
+    assert result.out.splitlines()[2].endswith("; 7 of 17 edges moved with both faces (not: 10 free edge)")
+    after = judge(out)
+    assert after.validity.valid and len(after.seams) == 7
+    assert max(m.gap for m in after.seams) <= 1e-9 and max(m.angle for m in after.seams) <= 1e-5
+    for a, b in zip(judge(samples / "panel.step").model.surfaces, after.model.surfaces, strict=True):
+        border = np.ones(a.net.poles.shape[:2], bool)
+        border[2:-2, 2:-2] = False
+        assert not np.array_equal(a.net.poles[border], b.net.poles[border])
 
 
 def test_frozen_poles_are_bit_identical_in_the_file(mracad, samples, tmp_path):
