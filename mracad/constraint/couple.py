@@ -43,6 +43,9 @@ ROUNDING = 1e-14
 FLOOR = 1e-7
 """Added to the unit diagonal of the conditions' normal matrix, whose rows may be dependent."""
 
+DEPENDENT = 1e-8
+"""Singular values below this fraction of the largest count as zero."""
+
 SETTLED = 1e-9
 MOST_STEPS = 300
 
@@ -81,6 +84,8 @@ class Conditions:
         Where the control points of each surface begin.
     owner : ndarray (conditions,)
         Index of the seam that each condition belongs to.
+    sites : list of int
+        How many of the conditions of each seam, the first ones, are on its curve (G0).
     """
 
     def __init__(self, nets: Mapping[int, Net], seams: Sequence[Seam], spaces: Mapping[int, tuple[KnotVector, ...]]):
@@ -91,6 +96,7 @@ class Conditions:
         self.size = int(sum(sizes))
         parts: list[tuple[Array, Array, Array]] = []
         owner, count = [], 0
+        self.sites: list[int] = []
         for number, seam in enumerate(seams):
             for derivative in range(seam.joint.order + 1):
                 share = _sites(seam, derivative, nets, spaces)
@@ -98,6 +104,8 @@ class Conditions:
                     column, value = _functional(nets[border.surface], border, share, terms)
                     row = np.repeat(count + np.arange(len(share)), column.shape[1])
                     parts.append((row, self.first[border.surface] + column.ravel(), value.ravel()))
+                if derivative == 0:
+                    self.sites.append(len(share))
                 owner.append(np.full(len(share), number))
                 count += len(share)
         row, column, value = (np.concatenate(x) for x in zip(*parts, strict=True))
@@ -295,12 +303,11 @@ class Coupling:
 
     def _conditioned(self, start: dict[int, Array]) -> dict[int, Array]:
         """y from y₀, on the coarse nets."""
-        matrix = self.coarse_conditions()
         from scipy.sparse import block_diag
 
         spaces = [_Space(p) for p in self.patches.values()]
         lift = block_diag([space.lift for space in spaces], format="csr")
-        matrix = (matrix @ lift).tocsr()
+        matrix = (self.coarse.matrix @ lift).tocsr()
         preconditioner = Restoration(matrix, np.concatenate([space.diagonal for space in spaces]))
         ends = np.cumsum([len(space.diagonal) for space in spaces])[:-1]
 
@@ -333,17 +340,39 @@ class Coupling:
         ends = np.cumsum([s[0] * s[1] for s in shapes.values()])[:-1]
         return {i: x.reshape(shapes[i]) for i, x in zip(shapes, np.split(y, ends), strict=True)}
 
-    def coarse_conditions(self) -> Any:
+    @cached_property
+    def coarse(self) -> Conditions:
         """C = L P, asked at the points that the coarse spaces need."""
-        spaces = {i: p.lifted if p.net.weights is None else (p.net.u, p.net.v) for i, p in self.patches.items()}
-        plain = all(p.net.weights is None for p in self.patches.values())
-        if plain:
+        if all(p.net.weights is None for p in self.patches.values()):
             nets = {
                 i: Net(*p.lifted, np.zeros((p.lifted[0].count, p.lifted[1].count, 3))) for i, p in self.patches.items()
             }
-            return Conditions(nets, self.seams, spaces).matrix
-        fine = Conditions({i: p.net for i, p in self.patches.items()}, self.seams, spaces).matrix
-        return fine @ self._refinement(fine)
+            return Conditions(nets, self.seams, {i: p.lifted for i, p in self.patches.items()})
+        spaces = {i: p.lifted if p.net.weights is None else (p.net.u, p.net.v) for i, p in self.patches.items()}
+        conditions = Conditions({i: p.net for i, p in self.patches.items()}, self.seams, spaces)
+        conditions.matrix = conditions.matrix @ self._refinement(conditions.matrix)
+        conditions.first = dict(zip(self.patches, np.cumsum([0, *self._coarse_sizes()[:-1]]).tolist(), strict=True))
+        return conditions
+
+    def _coarse_sizes(self) -> list[int]:
+        return [p.lifted[0].count * p.lifted[1].count for p in self.patches.values()]
+
+    def freedom(self, number: int) -> int:
+        """Degrees of freedom of the curve of a seam in the coarse space, its own conditions alone holding.
+
+        The rank of the curve as a function of the coarse nets on which all conditions of the seam vanish.
+        """
+        seam = self.seams[number]
+        rows = self.coarse.matrix[self.coarse.owner == number]
+        used = np.unique(rows.indices)
+        patch = self.patches[seam.a.surface]
+        begin = self.coarse.first[seam.a.surface]
+        own = (used >= begin) & (used < begin + patch.lifted[0].count * patch.lifted[1].count)
+        dense = rows[:, used].toarray()
+        curve = np.where(own, dense, 0.0)[: self.coarse.sites[number]]
+        _, size, right = np.linalg.svd(dense)
+        free = right[np.count_nonzero(size > DEPENDENT * size[0]) :]
+        return int(np.linalg.matrix_rank(curve @ free.T, tol=DEPENDENT * np.linalg.norm(curve)))
 
     def _refinement(self, matrix: Any) -> Any:
         """Rows of P, the refinement of all surfaces, for the points that ``matrix`` uses."""

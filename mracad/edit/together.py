@@ -16,7 +16,7 @@ from mracad.bspline.knots import KnotVector
 from mracad.bspline.net import Net
 from mracad.constraint.couple import Coupling, Patch
 from mracad.constraint.frozen import Separation, jet_support, separate
-from mracad.constraint.seam import Seam, Treatment, opening, seams
+from mracad.constraint.seam import Border, Seam, Treatment, opening, seams
 from mracad.constraint.strip import Coarse, Direction, Line, Strip, line, members, strips
 from mracad.edit.bound import bounded
 from mracad.model import Model, Surface
@@ -27,6 +27,9 @@ Array = np.ndarray
 
 WIDER, STEEPER = 1e-6, math.radians(0.01)
 """A seam that was smooth may end up with so much more gap (mm) and angle; otherwise it is frozen."""
+
+LEAST = 0.5
+"""A seam with less of the freedom of the smoother of its two sides is frozen."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,6 +93,7 @@ class Together:
         if options.edges == "coupled":
             self.found, self.closing, self.frozen = seams(model, movable, options.keep)
         self.freedom: dict[int, int] = {}
+        self.inserted: dict[int, tuple[Array, Array]] = {}
 
     @property
     def moving(self) -> set[int]:
@@ -121,8 +125,11 @@ class Together:
             lines = [(strip, line(strip, self._knots, self._lengths, self._creases)) for strip in self._strips()]
             if not self.found:
                 return {}
-            moved = self._attempt(lines, scale, bound)
-            broken = self._broken(moved)
+            couplings = self._couplings(lines, scale)
+            broken = self._locked(couplings[0][1])
+            if not broken:
+                moved = self._moved(couplings, bound)
+                broken = self._broken(moved)
             if not broken:
                 return moved
             self._freeze(broken)
@@ -155,34 +162,58 @@ class Together:
     def _joined(self) -> list[int]:
         return sorted({border.surface for seam in self.found for border in (seam.a, seam.b)})
 
-    def _attempt(self, lines: list[tuple[Strip, Line]], scale: float | None, bound: float | None) -> dict[int, Moved]:
+    def _couplings(self, lines: list[tuple[Strip, Line]], scale: float | None) -> list[tuple[float, Coupling]]:
+        """Coupled projections to blend and their weights; all on the same nets."""
         if scale is not None:
             steps = [(1.0, [_at_scale(each, scale) for _, each in lines])]
         else:
             steps = _at_level([each for _, each in lines], self.options.level or 0.0)
         coarse = [self._members(lines, knots) for _, knots in steps]
-        moving = self.moving
-        nets, extra = {}, {}
-        for i in self._joined():
-            inserted = _union([c[i, 0].inserted for c in coarse]), _union([c[i, 1].inserted for c in coarse])
-            extra[i] = inserted
-            nets[i] = self.model.surfaces[i].net.refined(*inserted)
+        self.inserted = {
+            i: (_union([c[i, 0].inserted for c in coarse]), _union([c[i, 1].inserted for c in coarse]))
+            for i in self._joined()
+        }
+        nets = {i: self.model.surfaces[i].net.refined(*inserted) for i, inserted in self.inserted.items()}
+        return [
+            (weight, Coupling({i: self._patch(i, nets[i], (c[i, 0], c[i, 1])) for i in nets}, self.found))
+            for (weight, _), c in zip(steps, coarse, strict=True)
+        ]
+
+    def _locked(self, coupling: Coupling) -> dict[int, str]:
+        """Seams whose conditions leave too little freedom; counts the freedom of all."""
+        result = {}
+        for number, seam in enumerate(self.found):
+            whole = min(self._functions(coupling.patches[b.surface].base, b) for b in (seam.a, seam.b))
+            degrees = {coupling.patches[b.surface].base[1 - b.axis].degree for b in (seam.a, seam.b)}
+            plain = len(degrees) == 1 and not seam.joint.varying
+            self.freedom[seam.edge] = whole if plain else coupling.freedom(number)
+            if self.freedom[seam.edge] < LEAST * whole:
+                result[seam.edge] = f"would lock ({self.freedom[seam.edge]} of {whole} degrees of freedom)"
+        return result
+
+    @staticmethod
+    def _functions(base: tuple[KnotVector, KnotVector], border: Border) -> int:
+        """Coarse functions that a border depends on."""
+        knots = base[1 - border.axis]
+        low, high = sorted((border.start, border.stop))
+        inside = (knots.breaks > low) & (knots.breaks < high)
+        return min(int(knots.multiplicities[inside].sum()) + knots.degree + 1, knots.count)
+
+    def _moved(self, couplings: list[tuple[float, Coupling]], bound: float | None) -> dict[int, Moved]:
+        coupling = couplings[0][1]
+        nets = {i: patch.net for i, patch in coupling.patches.items()}
         change: dict[int, Array] = {}
-        for (weight, _), spaces in zip(steps, coarse, strict=True):
-            patches = {i: self._patch(i, nets[i], (spaces[i, 0], spaces[i, 1])) for i in nets}
-            coupling = Coupling(patches, self.found)
-            for i, delta in coupling.displacement().items():
+        for weight, each in couplings:
+            for i, delta in each.displacement().items():
                 change[i] = weight * delta + change.get(i, 0.0)
-        separations = {i: self._separated(self.model.surfaces[i], nets[i], moving) for i in nets}
+        separations = {i: self._separated(self.model.surfaces[i], net, self.moving) for i, net in nets.items()}
         free = {i: s.free for i, s in separations.items()}
         offsets = coupling.held({i: self.options.amount * x for i, x in change.items()}, free)
         if bound is not None:
             offsets = coupling.held({i: bounded(x, bound) for i, x in offsets.items()}, free)
             largest = max(float(np.linalg.norm(x, axis=-1).max()) for x in offsets.values())
             offsets = {i: min(1.0, bound / max(largest, 1e-300)) * x for i, x in offsets.items()}
-        for seam in self.found:
-            self.freedom[seam.edge] = min(spaces[b.surface, 1 - b.axis].base.count for b in (seam.a, seam.b))
-        return {i: Moved(nets[i], extra[i], separations[i], change[i], offsets[i]) for i in nets}
+        return {i: Moved(net, self.inserted[i], separations[i], change[i], offsets[i]) for i, net in nets.items()}
 
     def _members(self, lines: list[tuple[Strip, Line]], coarse: list[KnotVector]) -> dict[Direction, Coarse]:
         """Coarse knots and knots to insert of every direction."""
