@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import importlib
-import json
 import os
-import pkgutil
 import sys
 from collections.abc import Sequence
 
@@ -13,14 +11,15 @@ import click
 
 import mracad
 from mracad.errors import Code, MracadError
-from mracad_cli import commands
+from mracad_cli import commands, options
 
 
 class Commands(click.Group):
     """A group whose commands are the modules of ``mracad_cli.commands``."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        return sorted(module.name for module in pkgutil.iter_modules(commands.__path__))
+        files = os.listdir(commands.__path__[0])
+        return sorted(name.removesuffix(".py") for name in files if name.endswith(".py") and name[0] != "_")
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name not in self.list_commands(ctx):
@@ -47,11 +46,10 @@ def group() -> None:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code."""
+    guarded = arguments is None
     arguments = list(sys.argv[1:] if arguments is None else arguments)
     try:
-        result = group.main(arguments, prog_name="mracad", standalone_mode=False)
-        sys.stdout.flush()
-        return result if isinstance(result, int) else 0
+        return _limited(arguments, guarded)
     except click.exceptions.NoArgsIsHelpError as error:
         click.echo(error.format_message(), err=True)
         return int(Code.USAGE)
@@ -79,10 +77,29 @@ def main(arguments: Sequence[str] | None = None) -> int:
             "please report it with the output of --debug",
         )
     if "--json" in arguments:
+        import json
+
         body = {"code": int(failure.code), "message": failure.message, "hint": failure.hint}
         click.echo(json.dumps({"error": body}, ensure_ascii=False))
     click.echo(f"mracad: {' '.join(str(failure).split())}", err=True)
     return int(failure.code)
+
+
+def _limited(arguments: list[str], guarded: bool) -> int:
+    """Run a command; in a child process when it has a limit, or when a crash must not be the end of this one."""
+
+    def work() -> int:
+        result = group.main(arguments, prog_name="mracad", standalone_mode=False)
+        sys.stdout.flush()
+        return result if isinstance(result, int) else 0
+
+    seconds, memory = options.limits(arguments)
+    working = bool(arguments) and arguments[0] in group.list_commands(click.Context(group))
+    if seconds is None and memory is None and not (guarded and working and "--debug" not in arguments):
+        return work()
+    from mracad import guard
+
+    return guard.run(work, seconds, memory)
 
 
 if __name__ == "__main__":

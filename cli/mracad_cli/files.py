@@ -17,13 +17,45 @@ if TYPE_CHECKING:
 STEP, STL = frozenset({".step", ".stp", ".p21"}), frozenset({".stl"})
 
 
-def read(source: str, input_unit: str | None) -> Document:
+class Text(io.BytesIO):
+    """The bytes of an input, with its name."""
+
+    name = "stdin"
+
+
+def load(source: str) -> Text:
+    """The bytes of a file, or of standard input for ``-``."""
+    from mracad.occ.read import load as load_file
+
+    text, name = load_file(sys.stdin.buffer if source == "-" else source)
+    stream = Text(text)
+    stream.name = name
+    return stream
+
+
+def read(source: str | Text, input_unit: str | None) -> Document:
     """Read a STEP file, or standard input for ``-``."""
     from mracad.occ.read import read_step
 
-    if source == "-":
-        return read_step(io.BytesIO(sys.stdin.buffer.read()), input_unit)
-    return read_step(source, input_unit)
+    return read_step(load(source) if source == "-" else source, input_unit)
+
+
+def check_reports(*paths: str | None, overwrite: bool) -> None:
+    """Refuse reports that could not be written."""
+    for path in filter(None, paths):
+        check_target(Path(path), overwrite)
+
+
+def check_target(path: Path, overwrite: bool) -> None:
+    """Refuse an output that could not be written, or that exists already."""
+    if path.is_dir():
+        raise FileError(f"cannot write {path}: it is a directory", "name a file in it")
+    if not path.parent.is_dir():
+        raise FileError(f"cannot write {path}: there is no folder {path.parent}", "create it first")
+    if not os.access(path.parent, os.W_OK):
+        raise FileError(f"cannot write {path}: the folder is not writable", "choose another one")
+    if path.exists() and not overwrite:
+        raise UsageError(f"{path} exists", "give --overwrite to replace it")
 
 
 def write_text(path: Path, text: str) -> None:
@@ -57,19 +89,12 @@ class Outputs:
 
     def check_report(self, path: str) -> None:
         """Refuse a report that could not be written."""
-        self._check(Path(path), ending=False)
+        check_target(Path(path), self.overwrite)
 
-    def _check(self, path: Path, ending: bool = True) -> None:
-        if ending and path.suffix.lower() not in STEP | STL:
+    def _check(self, path: Path) -> None:
+        if path.suffix.lower() not in STEP | STL:
             raise FileError(f"cannot write {path}: unknown ending {path.suffix!r}", "end it in .step, .stp or .stl")
-        if path.is_dir():
-            raise FileError(f"cannot write {path}: it is a directory", "name a file in it")
-        if not path.parent.is_dir():
-            raise FileError(f"cannot write {path}: there is no folder {path.parent}", "create it first")
-        if not os.access(path.parent, os.W_OK):
-            raise FileError(f"cannot write {path}: the folder is not writable", "choose another one")
-        if path.exists() and not self.overwrite:
-            raise UsageError(f"{path} exists", "give --overwrite to replace it")
+        check_target(path, self.overwrite)
 
     def write(self, document: Document, title: str) -> None:
         """Write the document to every output; none is replaced unless all could be made."""

@@ -10,6 +10,8 @@ from typing import Any, Literal
 import click
 from msgspec import Meta, Struct, structs
 
+from mracad.errors import UsageError
+
 Command = Callable[..., Any]
 
 SHORT = {"max_deviation": "LENGTH", "scale": "LENGTH", "faces": "SEL", "hold": "SEL"}
@@ -103,10 +105,53 @@ overwrite = click.option("--overwrite", is_flag=True, help="Replace an existing 
 as_json = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 debug = click.option("--debug", is_flag=True, expose_value=False, help="Show the traceback of an error.")
 
+limiting = apply(
+    click.option(
+        "--time-limit",
+        metavar="SECONDS",
+        expose_value=False,
+        help="End the command after this time: exit code 5.",
+    ),
+    click.option(
+        "--memory-limit", metavar="SIZE", expose_value=False, help="Memory that the command may hold: 500MB, 2GB."
+    ),
+)
 reading = apply(source, input_unit)
 writing = apply(outputs, schema, chord, angle, ascii_stl, overwrite)
-printing = apply(as_json, debug)
+printing = apply(as_json, limiting, debug)
+reports = apply(
+    click.option("--junit", metavar="F.xml", type=click.Path(), help="Write the verdict as JUnit, a case a layer."),
+    click.option("--sarif", metavar="F.sarif", type=click.Path(), help="Write the findings as SARIF."),
+    click.option("--overwrite", is_flag=True, help="Replace existing reports."),
+)
 editing = apply(
     click.option("--report", metavar="F.json", type=click.Path(), help="Write the full report (JSON) to a file."),
     click.option("--dry-run", is_flag=True, help="Say what would be done; write nothing but the report."),
 )
+
+
+def limits(arguments: list[str]) -> tuple[float | None, int | None]:
+    """Seconds and bytes that ``--time-limit`` and ``--memory-limit`` allow: needed before the command itself runs."""
+    from mracad.guard import size
+
+    time, memory = (_given(arguments, flag) for flag in ("--time-limit", "--memory-limit"))
+    if time is None:
+        return None, None if memory is None else size(memory)
+    try:
+        seconds = float(time)
+    except ValueError:
+        seconds = 0.0
+    if not 0 < seconds < float("inf"):
+        raise UsageError(f"time-limit: {time!r} is not a time", "give seconds, greater than zero")
+    return seconds, None if memory is None else size(memory)
+
+
+def _given(arguments: list[str], flag: str) -> str | None:
+    """The last value of an option."""
+    value = None
+    for i, word in enumerate(arguments):
+        if word == flag and i + 1 < len(arguments):
+            value = arguments[i + 1]
+        elif word.startswith(flag + "="):
+            value = word.partition("=")[2]
+    return value
