@@ -63,6 +63,17 @@ class Selection(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
             "is possible; frozen, none moves."
         ),
     ] = "coupled"
+    fit_g1: Annotated[
+        float | None,
+        Meta(
+            description="Make seams tangent that are meant to be: those between edited faces under this angle (°).",
+            ge=0.0,
+        ),
+    ] = None
+    close_gaps: Annotated[
+        bool,
+        Meta(description="Pull gaps along seams between edited faces shut."),
+    ] = False
     refine: Annotated[
         bool,
         Meta(description="Insert knots (exactly) where a face has too few free control points."),

@@ -4,7 +4,8 @@ With f the control points of all surfaces, P the refinement from the coarse spac
 
     y = argmin ‖g − P y‖²_G   subject to   L P y = 0,      δ = P y − g,      g = f − e,
 
-where e is the smallest change with L e = L f: the defects that the input has are carried unchanged.  Without the
+where e is the smallest change with L e = L f: the defects that the input has are carried unchanged (or, where they are
+to be mended, left out of e).  Without the
 conditions the projection y₀ is separable on each surface; with them
 
     y = y₀ − G_c⁻¹ Cᵀ λ,      (C G_c⁻¹ Cᵀ) λ = C y₀,      C = L P,   G_c = PᵀGP,
@@ -46,6 +47,10 @@ FLOOR = 1e-7
 DEPENDENT = 1e-8
 """Singular values below this fraction of the largest count as zero."""
 
+FILTERS = 3
+"""How often the part in nearly dependent conditions, where the joints of a vertex contradict each other a little, is
+damped."""
+
 SETTLED = 1e-9
 MOST_STEPS = 300
 
@@ -84,6 +89,8 @@ class Conditions:
         Where the control points of each surface begin.
     owner : ndarray (conditions,)
         Index of the seam that each condition belongs to.
+    mended : ndarray of bool (conditions,)
+        Whether the input's defect is to vanish instead of being carried.
     sites : list of int
         How many of the conditions of each seam, the first ones, are on its curve (G0).
     """
@@ -97,6 +104,7 @@ class Conditions:
         parts: list[tuple[Array, Array, Array]] = []
         owner, count = [], 0
         self.sites: list[int] = []
+        mended = []
         for number, seam in enumerate(seams):
             for derivative in range(seam.joint.order + 1):
                 share = _sites(seam, derivative, nets, spaces)
@@ -107,12 +115,14 @@ class Conditions:
                 if derivative == 0:
                     self.sites.append(len(share))
                 owner.append(np.full(len(share), number))
+                mended.append(np.full(len(share), (seam.joint.close, seam.joint.fit, False)[derivative]))
                 count += len(share)
         row, column, value = (np.concatenate(x) for x in zip(*parts, strict=True))
         matrix = csr_array((value, (row, column)), shape=(count, self.size))
         matrix.data[np.abs(matrix.data) < 1e-14 * np.abs(matrix.data).max()] = 0.0
         matrix.eliminate_zeros()
         self.matrix, self.owner = matrix, np.concatenate(owner)
+        self.mended = np.concatenate(mended)
 
 
 def _terms(seam: Seam, derivative: int) -> list[tuple[Border, list[tuple[int, int, Array]]]]:
@@ -233,7 +243,11 @@ class Restoration:
 
     def solve(self, residual: Array) -> Array:
         """λ with ``(L D⁻¹ Lᵀ) λ = r`` in the scaled rows, nearly; nothing of it in the dependent conditions."""
-        return self.factor.solve(self.normal @ self.factor.solve(residual))
+        return self.factor.solve(self.attainable(residual))
+
+    def attainable(self, residual: Array) -> Array:
+        """The part of a residual that control points can answer for: nothing in (nearly) dependent conditions."""
+        return self.normal @ self.factor.solve(residual)
 
     def change(self, wanted: Array) -> Array:
         """c ``(points, 3)`` for ``r`` (conditions, 3)."""
@@ -272,6 +286,12 @@ class Coupling:
     def restoration(self) -> Restoration:
         return Restoration(self.fine.matrix, self.diagonal)
 
+    @cached_property
+    def goal(self) -> Array:
+        """L δ (conditions, 3): zero, or minus the defects that are to be mended."""
+        f = self.stacked({i: p.net.poles for i, p in self.patches.items()})
+        return np.where(self.fine.mended[:, None], -(self.fine.matrix @ (f - f.mean(axis=0))), 0.0)
+
     def split(self, stacked: Array) -> dict[int, Array]:
         """Stacked points ``(points, 3)`` as nets."""
         return {
@@ -284,11 +304,12 @@ class Coupling:
         return np.concatenate([nets[i].reshape(-1, 3) for i in self.patches])
 
     def displacement(self) -> dict[int, Array]:
-        """δ of every surface, over its refined net: L δ = 0."""
+        """δ of every surface, over its refined net: L δ = 0, or −L f where defects are mended."""
         f = self.stacked({i: p.net.poles for i, p in self.patches.items()})
         f = f - f.mean(axis=0)
-        g = f - self.restoration.change(self.fine.matrix @ f)
-        nets = self.split(g)
+        defect = self.fine.matrix @ f
+        carried = self.restoration.change(np.where(self.fine.mended[:, None], 0.0, defect))
+        nets = self.split(f - carried)
         start = {}
         for i, p in self.patches.items():
             in_u = projection(p.lifted[0], p.net.u).coarse(nets[i], 0)
@@ -298,8 +319,8 @@ class Coupling:
         for i, p in self.patches.items():
             in_u = refinement(p.lifted[0], p.net.u).apply(coarse[i], 0)
             smooth[i] = refinement(p.lifted[1], p.net.v).apply(in_u, 1)
-        delta = self.stacked(smooth) - g
-        return self.split(delta - self.restoration.change(self.fine.matrix @ delta))
+        delta = self.stacked(smooth) + carried - f
+        return self.split(delta - self.restoration.change(self.fine.matrix @ delta - self.goal))
 
     def _conditioned(self, start: dict[int, Array]) -> dict[int, Array]:
         """y from y₀, on the coarse nets."""
@@ -317,6 +338,8 @@ class Coupling:
         rows = preconditioner.rows
         y0 = np.concatenate([space.project(x) for space, x in zip(spaces, start.values(), strict=True)])
         residual = rows @ y0
+        for _ in range(FILTERS):
+            residual = preconditioner.attainable(residual)
         multiplier = np.zeros_like(residual)
         down = np.zeros_like(y0)
         direction = step_of = preconditioner.solve(residual)
@@ -393,12 +416,12 @@ class Coupling:
         row, column, value = (np.concatenate(x) for x in zip(*parts, strict=True))
         return csr_array((value, (row, column)), shape=(self.fine.size, start))
 
-    def held(self, delta: Mapping[int, Array], free: Mapping[int, Array]) -> dict[int, Array]:
-        """δ with zeros where ``free`` is false, and L δ = 0 all the same."""
+    def held(self, delta: Mapping[int, Array], free: Mapping[int, Array], amount: float) -> dict[int, Array]:
+        """δ with zeros where ``free`` is false, and the conditions (by ``amount``) fulfilled all the same."""
         mask = np.concatenate([free[i].ravel() for i in self.patches])
         masked = np.where(mask[:, None], self.stacked(delta), 0.0)
         fix = Restoration(self.fine.matrix, self.diagonal, mask)
-        return self.split(masked - fix.change(self.fine.matrix @ masked))
+        return self.split(masked - fix.change(self.fine.matrix @ masked - amount * self.goal))
 
 
 class _Space:

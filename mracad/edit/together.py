@@ -16,7 +16,7 @@ from mracad.bspline.knots import KnotVector
 from mracad.bspline.net import Net
 from mracad.constraint.couple import Coupling, Patch
 from mracad.constraint.frozen import Separation, jet_support, separate
-from mracad.constraint.seam import Border, Seam, Treatment, opening, seams
+from mracad.constraint.seam import Border, Seam, Treatment, Wishes, opening, seams
 from mracad.constraint.strip import Coarse, Direction, Line, Strip, line, members, strips
 from mracad.edit.bound import bounded
 from mracad.model import Model, Surface
@@ -25,8 +25,12 @@ from mracad.wavelet.ladder import ladder_for_scale, rungs_by_level
 
 Array = np.ndarray
 
-WIDER, STEEPER = 1e-6, math.radians(0.01)
-"""A seam that was smooth may end up with so much more gap (mm) and angle; otherwise it is frozen."""
+WIDER = 1e-6
+"""A seam may end up with so much more of a gap, mm; otherwise it is frozen."""
+
+STEEPER, SHARE = math.radians(0.01), 0.05
+"""A seam that was smooth may end up with so much more of an angle, and so much of that it had (a tilt that is carried
+turns with the faces); otherwise it is frozen."""
 
 LEAST = 0.5
 """A seam with less of the freedom of the smoother of its two sides is frozen."""
@@ -91,14 +95,15 @@ class Together:
         self.closing: set[int] = set()
         self.frozen: dict[int, str] = {}
         if options.edges == "coupled":
-            self.found, self.closing, self.frozen = seams(model, movable, options.keep)
+            wishes = Wishes(options.keep, math.radians(options.fit_g1 or 0.0), options.close_gaps)
+            self.found, self.closing, self.frozen = seams(model, movable, wishes)
         self.freedom: dict[int, int] = {}
         self.inserted: dict[int, tuple[Array, Array]] = {}
 
     @property
     def moving(self) -> set[int]:
         """Edges that move."""
-        return self.closing | {seam.edge for seam in self.found}
+        return self.closing | {edge for seam in self.found for edge in (seam.edge, seam.twin)}
 
     def treatments(self) -> tuple[Treatment, ...]:
         """What was done about each edge of a movable face, in edge order."""
@@ -136,6 +141,7 @@ class Together:
 
     def _freeze(self, reasons: Mapping[int, str]) -> None:
         self.frozen |= reasons
+        self.frozen |= {seam.twin: reasons[seam.edge] for seam in self.found if seam.edge in reasons}
         self.found = [seam for seam in self.found if seam.edge not in reasons]
 
     def _knots(self, direction: Direction) -> KnotVector:
@@ -208,9 +214,10 @@ class Together:
                 change[i] = weight * delta + change.get(i, 0.0)
         separations = {i: self._separated(self.model.surfaces[i], net, self.moving) for i, net in nets.items()}
         free = {i: s.free for i, s in separations.items()}
-        offsets = coupling.held({i: self.options.amount * x for i, x in change.items()}, free)
+        amount = self.options.amount
+        offsets = coupling.held({i: amount * x for i, x in change.items()}, free, amount)
         if bound is not None:
-            offsets = coupling.held({i: bounded(x, bound) for i, x in offsets.items()}, free)
+            offsets = coupling.held({i: bounded(x, bound) for i, x in offsets.items()}, free, amount)
             largest = max(float(np.linalg.norm(x, axis=-1).max()) for x in offsets.values())
             offsets = {i: min(1.0, bound / max(largest, 1e-300)) * x for i, x in offsets.items()}
         return {i: Moved(net, self.inserted[i], separations[i], change[i], offsets[i]) for i, net in nets.items()}
@@ -255,7 +262,7 @@ class Together:
             gap, angle = opening(after, seam.a, seam.b)
             if gap > seam.gap + WIDER:
                 result[seam.edge] = "would gape"
-            elif seam.joint.order and angle > seam.angle + STEEPER:
+            elif seam.joint.order and angle > (1 + SHARE) * seam.angle + STEEPER:
                 result[seam.edge] = "would kink"
         return result
 

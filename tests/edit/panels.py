@@ -125,15 +125,17 @@ def _mirrored(knots):
     return KnotVector((low + high - knots.knots)[::-1], knots.degree)
 
 
-def document(patches):
-    """The patches as a document with one shell; edges run along the growing parameter of the unsplit panel."""
+def document(patches, sewn=True):
+    """The patches as a document, in one shell or each with edges of its own.
+
+    Edges run along the growing parameter of the unsplit panel.
+    """
     corners, edges = {}, {}
     grid = [max(k[axis] for k in patches) + 1 for axis in (0, 1)]
 
     def corner(i, j):
         if (i, j) not in corners:
-            key = min(i, grid[0] - 1), min(j, grid[1] - 1)
-            patch = patches[key]
+            patch = patches[min(i, grid[0] - 1), min(j, grid[1] - 1)]
             at = patch.place((SIZE * i, SIZE * j))
             corners[i, j] = make.vertex(patch.net.evaluate([at])[0])
         return corners[i, j]
@@ -146,6 +148,8 @@ def document(patches):
 
     faces = []
     for (i, j), patch in sorted(patches.items()):
+        if not sewn:
+            corners, edges, grid = {}, {}, (i + 1, j + 1)
         ring = [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)]
         loop = []
         for k in range(4):

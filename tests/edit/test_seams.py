@@ -173,3 +173,34 @@ def test_a_joint_of_varying_ratio():
                 assert seam.freedom >= SPANS // 4 + 3
     print(", ".join(f"ratio 1 + {skew} v {edges}: {v:.4f} mm" for (skew, edges), v in figures.items()))
     assert figures[0.5, "coupled"] < figures[0.5, "frozen"]
+
+
+def torn(patches, sewn):
+    """Patches of which one is a little too high and another tilted, as a document; or as faces of their own."""
+    moved = {}
+    for k, patch in patches.items():
+        poles = patch.net.poles.copy()
+        if k == (0, 1):
+            poles[..., 2] += 4e-3
+        if k == (1, 0):
+            poles[1, :, 2] += 6e-3
+        moved[k] = replace(patch, net=Net(patch.net.u, patch.net.v, poles))
+    return panels.document(moved, sewn)
+
+
+@pytest.mark.parametrize("sewn", [True, False])
+def test_defects_are_carried_or_mended(sewn):
+    _, noisy = panels.whole(24, 0.05, patches=(2, 2))
+    patches = panels.cut(noisy, (2, 2))
+    before = seams(view(torn(patches, sewn)))
+    gap, angle = max(m.gap for m in before), max(m.angle for m in before)
+    assert gap > 3e-3 and 0.05 < angle < 1
+    for options in ({}, {"close_gaps": True}, {"fit_g1": 1.0}, {"close_gaps": True, "fit_g1": 1.0}):
+        document = torn(patches, sewn)
+        report = job.run(document, smooth, Smooth(level=1, **options))
+        assert coupled(report) == (4 if sewn else 8)
+        now = seams(view(document))
+        assert all(a.gap <= 1.01 * b.gap + 1e-6 for b, a in zip(before, now, strict=True))
+        assert all(a.angle <= 1.05 * b.angle + 0.01 for b, a in zip(before, now, strict=True))
+        inner = [np.median([getattr(m, name) for m in now]) for name in ("mean_gap", "mean_angle")]
+        print(f"sewn {sewn}, {options}: mean gap {inner[0]:.1e} mm, mean angle {inner[1]:.1e}°")
