@@ -74,6 +74,10 @@ class Selection(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         bool,
         Meta(description="Pull gaps along seams between edited faces shut."),
     ] = False
+    gap_tolerance: Annotated[
+        str,
+        Meta(description="Gap (a length) that a seam along a trim curve may have after it moved, unless it was wider."),
+    ] = "1e-4mm"
     refine: Annotated[
         bool,
         Meta(description="Insert knots (exactly) where a face has too few free control points."),

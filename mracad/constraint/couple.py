@@ -33,6 +33,7 @@ from mracad.bspline.knots import Side as Limit
 from mracad.bspline.net import Net
 from mracad.bspline.refine import refinement
 from mracad.constraint.seam import Border, Seam
+from mracad.constraint.trimmed import TrimmedSeam, collocation, sites
 from mracad.wavelet.filters import wavelets
 from mracad.wavelet.project import projection
 
@@ -46,6 +47,9 @@ FLOOR = 1e-7
 
 DEPENDENT = 1e-8
 """Singular values below this fraction of the largest count as zero."""
+
+CHEAP, CHEAP_STEPS = 1e-4, 3
+"""The same for conditions that need to hold only as far as that is cheap, and how often they are improved."""
 
 FILTERS = 3
 """How often the part in nearly dependent conditions, where the joints of a vertex contradict each other a little, is
@@ -101,10 +105,9 @@ class Conditions:
         sizes = [net.u.count * net.v.count for net in nets.values()]
         self.first = dict(zip(nets, np.cumsum([0, *sizes[:-1]]).tolist(), strict=True))
         self.size = int(sum(sizes))
-        parts: list[tuple[Array, Array, Array]] = []
-        owner, count = [], 0
+        parts: list[tuple[Array, Array, Array]] = [(np.empty(0, int), np.empty(0, int), np.empty(0))]
+        owner, mended, count = [np.empty(0, int)], [np.empty(0, bool)], 0
         self.sites: list[int] = []
-        mended = []
         for number, seam in enumerate(seams):
             for derivative in range(seam.joint.order + 1):
                 share = _sites(seam, derivative, nets, spaces)
@@ -119,7 +122,7 @@ class Conditions:
                 count += len(share)
         row, column, value = (np.concatenate(x) for x in zip(*parts, strict=True))
         matrix = csr_array((value, (row, column)), shape=(count, self.size))
-        matrix.data[np.abs(matrix.data) < 1e-14 * np.abs(matrix.data).max()] = 0.0
+        matrix.data[np.abs(matrix.data) < 1e-14 * np.abs(matrix.data).max(initial=0.0)] = 0.0
         matrix.eliminate_zeros()
         self.matrix, self.owner = matrix, np.concatenate(owner)
         self.mended = np.concatenate(mended)
@@ -224,9 +227,11 @@ class Restoration:
     diagonal : ndarray (points,)
         d, positive.
     free : ndarray of bool (points,), optional
+    loose : int
+        How many of the last conditions are to hold only as far as that is cheap.
     """
 
-    def __init__(self, matrix: Any, diagonal: Array, free: Array | None = None) -> None:
+    def __init__(self, matrix: Any, diagonal: Array, free: Array | None = None, loose: int = 0) -> None:
         from scipy.sparse import diags_array
         from scipy.sparse.linalg import splu
 
@@ -238,7 +243,7 @@ class Restoration:
         self.rows = diags_array(self.scale).tocsr() @ matrix[self.used]
         self.back = (self.rows @ diags_array(inverse).tocsr()).T.tocsr()
         self.normal = (self.rows @ self.back).tocsr()
-        eye = diags_array(np.full(len(self.used), FLOOR))
+        eye = diags_array(np.where(self.used < matrix.shape[0] - loose, FLOOR, CHEAP))
         self.factor = splu((self.normal + eye).tocsc(), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
 
     def solve(self, residual: Array) -> Array:
@@ -249,12 +254,12 @@ class Restoration:
         """The part of a residual that control points can answer for: nothing in (nearly) dependent conditions."""
         return self.normal @ self.factor.solve(residual)
 
-    def change(self, wanted: Array) -> Array:
-        """c ``(points, 3)`` for ``r`` (conditions, 3)."""
+    def change(self, wanted: Array, steps: int = 20) -> Array:
+        """c ``(points, 3)`` for ``r`` (conditions, 3); a few ``steps`` leave what is costly."""
         right = self.scale[:, None] * wanted[self.used]
         c = np.zeros((self.back.shape[0], right.shape[1]))
         least = np.abs(right).max(initial=0.0)
-        for _ in range(20):
+        for _ in range(steps):
             residual = right - self.rows @ c
             worst = np.abs(residual).max(initial=0.0)
             if worst == 0.0 or (worst > 0.5 * least and c.any()):
@@ -272,12 +277,20 @@ class Coupling:
     patches : mapping of int to Patch
         By surface.
     seams : sequence of Seam
+        Those that hold exactly.
+    trimmed : sequence of TrimmedSeam
+        Those that hold to a tolerance.
     """
 
-    def __init__(self, patches: Mapping[int, Patch], seams: Sequence[Seam]) -> None:
-        self.patches, self.seams = patches, seams
-        nets = {i: p.net for i, p in patches.items()}
-        self.fine = Conditions(nets, seams, {i: (p.net.u, p.net.v) for i, p in patches.items()})
+    def __init__(
+        self, patches: Mapping[int, Patch], seams: Sequence[Seam], trimmed: Sequence[TrimmedSeam] = ()
+    ) -> None:
+        self.patches, self.seams, self.trimmed = patches, seams, trimmed
+        self.nets = {i: p.net for i, p in patches.items()}
+        spaces = {i: (p.net.u, p.net.v) for i, p in patches.items()}
+        self.fine = Conditions(self.nets, seams, spaces)
+        shares = [sites(seam, spaces, dense=True) for seam in trimmed]
+        self.loose, self.orders = collocation(self.nets, self.nets, trimmed, shares)
         self.diagonal = np.concatenate(
             [p.weight * np.outer(*(_lumped(k) for k in (p.net.u, p.net.v))).ravel() for p in patches.values()]
         )
@@ -287,10 +300,18 @@ class Coupling:
         return Restoration(self.fine.matrix, self.diagonal)
 
     @cached_property
-    def goal(self) -> Array:
-        """L δ (conditions, 3): zero, or minus the defects that are to be mended."""
-        f = self.stacked({i: p.net.poles for i, p in self.patches.items()})
-        return np.where(self.fine.mended[:, None], -(self.fine.matrix @ (f - f.mean(axis=0))), 0.0)
+    def mending(self) -> Array:
+        """The smallest change (points, 3) that takes away the defects that are to be mended."""
+        if not self.fine.mended.any():
+            return np.zeros_like(self.centred)
+        defect = np.where(self.fine.mended[:, None], self.fine.matrix @ self.centred, 0.0)
+        return -self.restoration.change(defect)
+
+    @cached_property
+    def centred(self) -> Array:
+        """f, its centroid at the origin."""
+        f = self.stacked({i: net.poles for i, net in self.nets.items()})
+        return f - f.mean(axis=0)
 
     def split(self, stacked: Array) -> dict[int, Array]:
         """Stacked points ``(points, 3)`` as nets."""
@@ -305,8 +326,7 @@ class Coupling:
 
     def displacement(self) -> dict[int, Array]:
         """δ of every surface, over its refined net: L δ = 0, or −L f where defects are mended."""
-        f = self.stacked({i: p.net.poles for i, p in self.patches.items()})
-        f = f - f.mean(axis=0)
+        f = self.centred
         defect = self.fine.matrix @ f
         carried = self.restoration.change(np.where(self.fine.mended[:, None], 0.0, defect))
         nets = self.split(f - carried)
@@ -314,21 +334,22 @@ class Coupling:
         for i, p in self.patches.items():
             in_u = projection(p.lifted[0], p.net.u).coarse(nets[i], 0)
             start[i] = projection(p.lifted[1], p.net.v).coarse(in_u, 1)
-        coarse = self._conditioned(start)
+        coarse = self._conditioned(start, f - carried)
         smooth = {}
         for i, p in self.patches.items():
             in_u = refinement(p.lifted[0], p.net.u).apply(coarse[i], 0)
             smooth[i] = refinement(p.lifted[1], p.net.v).apply(in_u, 1)
         delta = self.stacked(smooth) + carried - f
-        return self.split(delta - self.restoration.change(self.fine.matrix @ delta - self.goal))
+        return self.split(self._restored(delta, None, 1.0))
 
-    def _conditioned(self, start: dict[int, Array]) -> dict[int, Array]:
-        """y from y₀, on the coarse nets."""
-        from scipy.sparse import block_diag
+    def _conditioned(self, start: dict[int, Array], g: Array) -> dict[int, Array]:
+        """y from y₀, on the coarse nets; trimmed seams are shut and keep the tilt of g."""
+        from scipy.sparse import block_diag, vstack
 
         spaces = [_Space(p) for p in self.patches.values()]
         lift = block_diag([space.lift for space in spaces], format="csr")
-        matrix = (self.coarse.matrix @ lift).tocsr()
+        loose, wanted = self._coarse_trimmed(g)
+        matrix = (vstack([self.coarse.matrix, loose]) @ lift).tocsr()
         preconditioner = Restoration(matrix, np.concatenate([space.diagonal for space in spaces]))
         ends = np.cumsum([len(space.diagonal) for space in spaces])[:-1]
 
@@ -337,7 +358,8 @@ class Coupling:
 
         rows = preconditioner.rows
         y0 = np.concatenate([space.project(x) for space, x in zip(spaces, start.values(), strict=True)])
-        residual = rows @ y0
+        wanted = np.concatenate([np.zeros((matrix.shape[0] - len(wanted), 3)), wanted])
+        residual = rows @ y0 - preconditioner.scale[:, None] * wanted[preconditioner.used]
         for _ in range(FILTERS):
             residual = preconditioner.attainable(residual)
         multiplier = np.zeros_like(residual)
@@ -363,16 +385,30 @@ class Coupling:
         ends = np.cumsum([s[0] * s[1] for s in shapes.values()])[:-1]
         return {i: x.reshape(shapes[i]) for i, x in zip(shapes, np.split(y, ends), strict=True)}
 
+    def _coarse_trimmed(self, g: Array) -> tuple[Any, Array]:
+        """Conditions of trimmed seams on the coarse nets and their right-hand sides."""
+        shares = [sites(seam, {i: p.base for i, p in self.patches.items()}, dense=False) for seam in self.trimmed]
+        fine, orders = collocation(self.nets, self.nets, self.trimmed, shares)
+        wanted = np.where(orders[:, None] == 1, fine @ g, 0.0)
+        if self.rational:
+            return fine @ self._refinement(fine), wanted
+        return collocation(self._coarse_nets(), self.nets, self.trimmed, shares)[0], wanted
+
+    @property
+    def rational(self) -> bool:
+        """Whether some surface has weights."""
+        return any(net.weights is not None for net in self.nets.values())
+
+    def _coarse_nets(self) -> dict[int, Net]:
+        return {i: Net(*p.lifted, np.zeros((p.lifted[0].count, p.lifted[1].count, 3))) for i, p in self.patches.items()}
+
     @cached_property
     def coarse(self) -> Conditions:
         """C = L P, asked at the points that the coarse spaces need."""
-        if all(p.net.weights is None for p in self.patches.values()):
-            nets = {
-                i: Net(*p.lifted, np.zeros((p.lifted[0].count, p.lifted[1].count, 3))) for i, p in self.patches.items()
-            }
-            return Conditions(nets, self.seams, {i: p.lifted for i, p in self.patches.items()})
+        if not self.rational:
+            return Conditions(self._coarse_nets(), self.seams, {i: p.lifted for i, p in self.patches.items()})
         spaces = {i: p.lifted if p.net.weights is None else (p.net.u, p.net.v) for i, p in self.patches.items()}
-        conditions = Conditions({i: p.net for i, p in self.patches.items()}, self.seams, spaces)
+        conditions = Conditions(self.nets, self.seams, spaces)
         conditions.matrix = conditions.matrix @ self._refinement(conditions.matrix)
         conditions.first = dict(zip(self.patches, np.cumsum([0, *self._coarse_sizes()[:-1]]).tolist(), strict=True))
         return conditions
@@ -419,9 +455,22 @@ class Coupling:
     def held(self, delta: Mapping[int, Array], free: Mapping[int, Array], amount: float) -> dict[int, Array]:
         """δ with zeros where ``free`` is false, and the conditions (by ``amount``) fulfilled all the same."""
         mask = np.concatenate([free[i].ravel() for i in self.patches])
-        masked = np.where(mask[:, None], self.stacked(delta), 0.0)
-        fix = Restoration(self.fine.matrix, self.diagonal, mask)
-        return self.split(masked - fix.change(self.fine.matrix @ masked - amount * self.goal))
+        return self.split(self._restored(np.where(mask[:, None], self.stacked(delta), 0.0), mask, amount))
+
+    def _restored(self, delta: Array, free: Array | None, amount: float) -> Array:
+        """δ changed on free points so that its conditions hold."""
+        from scipy.sparse import vstack
+
+        mending = self.mending if free is None else np.where(free[:, None], self.mending, 0.0)
+        exact = amount * (self.fine.matrix @ mending)
+        if self.trimmed:
+            both = vstack([self.fine.matrix, self.loose], format="csr")
+            shut = np.where(self.orders[:, None] == 0, -(self.loose @ self.centred), 0.0)
+            goal = np.concatenate([exact, amount * shut])
+            cheap = Restoration(both, self.diagonal, free, self.loose.shape[0])
+            delta = delta - cheap.change(both @ delta - goal, CHEAP_STEPS)
+        fix = self.restoration if free is None else Restoration(self.fine.matrix, self.diagonal, free)
+        return delta - fix.change(self.fine.matrix @ delta - exact)
 
 
 class _Space:

@@ -24,6 +24,9 @@ from mracad.model import Edge, Face, Model, Side
 
 Array = np.ndarray
 
+TRIMMED, UNEVEN, VARYING = "trimmed", "parameters differ along the seam", "ratio varies along the seam"
+"""Reasons for which a seam cannot move exactly, though it may to a tolerance."""
+
 CREASE = np.radians(1.0)
 """A seam along which the normals differ by more anywhere is a crease: it keeps G0 only."""
 
@@ -157,7 +160,7 @@ class Treatment:
         Index in ``Model.edges``.
     faces : tuple of int
         Faces that meet there.
-    how : {"coupled", "frozen"}
+    how : {"coupled", "to tolerance", "frozen"}
     reason : str
         Why it is frozen.
     freedom : int
@@ -247,7 +250,7 @@ def _seam(
             return "neighbour does not move"
     a, b = (border(model, edge, side, use) for use, (edge, side) in enumerate(zip(edges, sides, strict=True)))
     if a is None or b is None:
-        return "trimmed"
+        return TRIMMED
     if edges[0] is not edges[1]:
         apart = [np.abs(points - edges[0].points).max() for points in (edges[1].points, edges[1].points[::-1])]
         if apart[1] < apart[0]:
@@ -341,7 +344,7 @@ def opening(model: Model, a: Border, b: Border) -> tuple[float, float]:
     """Largest distance (mm) and angle between the outward normals of two borders at equal fractions."""
     s, sn, st = jets(model, a, _SAMPLES, 1)
     t, tn, tt = jets(model, b, _SAMPLES, 1)
-    angle = _between(_outward(model, a, sn, st), _outward(model, b, tn, tt))
+    angle = between(_outward(model, a, sn, st), _outward(model, b, tn, tt))
     return float(np.linalg.norm(s - t, axis=1).max()), float(angle.max())
 
 
@@ -351,7 +354,7 @@ def _outward(model: Model, border: Border, across: Array, along: Array) -> Array
     return (-1 if turned else 1) * np.cross(*((across, along) if border.axis == 0 else (along, across)))
 
 
-def _between(one: Array, two: Array) -> Array:
+def between(one: Array, two: Array) -> Array:
     """Angles between vectors."""
     return np.arctan2(np.linalg.norm(np.cross(one, two), axis=1), (one * two).sum(axis=1))
 
@@ -363,12 +366,12 @@ def _joint(model: Model, a: Border, b: Border, wishes: Wishes) -> Joint | str:
     length = np.linalg.norm(st, axis=1).mean()
     slip = np.abs(((s - t) * st).sum(axis=1) / np.maximum(np.linalg.norm(st, axis=1), 1e-12 * length)).max()
     if slip > max(SLIP, 1e-5 * length):
-        return "parameters differ along the seam"
+        return UNEVEN
     normals = _outward(model, a, sn, st), _outward(model, b, tn, tt)
     sizes = [np.linalg.norm(n, axis=1) for n in normals]
     if min(size.min() / max(size.max(), 1e-300) for size in sizes) < 1e-9:
         return "degenerate along the seam"
-    angle = _between(*normals)
+    angle = between(*normals)
     order, close = CONTINUITY[wishes.keep], wishes.close_gaps
     if order == 0 or angle.max() > max(CREASE, wishes.fit):
         return Joint(0, np.ones(1), np.empty(0), close=close)
@@ -383,7 +386,7 @@ def _joint(model: Model, a: Border, b: Border, wishes: Wishes) -> Joint | str:
             if missed <= limit:
                 joint = Joint(1, p, q, missed=missed, close=close, fit=fit)
                 return joint if order == 1 else _bent(joint, sn, st, snn, tnn)
-    return "ratio varies along the seam"
+    return VARYING
 
 
 def _bent(joint: Joint, sn: Array, st: Array, snn: Array, tnn: Array) -> Joint | str:

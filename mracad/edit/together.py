@@ -16,11 +16,12 @@ from mracad.bspline.knots import KnotVector
 from mracad.bspline.net import Net
 from mracad.constraint.couple import Coupling, Patch
 from mracad.constraint.frozen import Separation, jet_support, separate
-from mracad.constraint.seam import Border, Seam, Treatment, Wishes, opening, seams
+from mracad.constraint.seam import TRIMMED, UNEVEN, VARYING, Border, Seam, Treatment, Wishes, opening, seams
 from mracad.constraint.strip import Coarse, Direction, Line, Strip, line, members, strips
+from mracad.constraint.trimmed import TrimmedSeam, parted, trimmed
 from mracad.edit.bound import bounded
 from mracad.model import Model, Surface
-from mracad.options import Smooth
+from mracad.options import Smooth, length
 from mracad.wavelet.ladder import ladder_for_scale, rungs_by_level
 
 Array = np.ndarray
@@ -31,6 +32,10 @@ WIDER = 1e-6
 STEEPER, SHARE = math.radians(0.01), 0.05
 """A seam that was smooth may end up with so much more of an angle, and so much of that it had (a tilt that is carried
 turns with the faces); otherwise it is frozen."""
+
+MENDED, BENT = 0.1, math.radians(0.1)
+"""The same where defects are mended: beside points that stay, the shares that gap and angle may gain are these and the
+gap tolerance."""
 
 LEAST = 0.5
 """A seam with less of the freedom of the smoother of its two sides is frozen."""
@@ -91,27 +96,47 @@ class Together:
     ) -> None:
         self.model, self.movable, self.options = model, movable, options
         self.spans, self.creases = spans, creases
+        self.gap = length(options.gap_tolerance, model.diagonal, "gap-tolerance")
+        self.mending = options.close_gaps or options.fit_g1 is not None
+        self.trimmed: list[TrimmedSeam] = []
         self.found: list[Seam] = []
         self.closing: set[int] = set()
         self.frozen: dict[int, str] = {}
         if options.edges == "coupled":
             wishes = Wishes(options.keep, math.radians(options.fit_g1 or 0.0), options.close_gaps)
             self.found, self.closing, self.frozen = seams(model, movable, wishes)
+            self._try_trimmed(wishes)
         self.freedom: dict[int, int] = {}
         self.inserted: dict[int, tuple[Array, Array]] = {}
+
+    def _try_trimmed(self, wishes: Wishes) -> None:
+        """Let seams that cannot move exactly move to the gap tolerance."""
+        for index, reason in list(self.frozen.items()):
+            edge = self.model.edges[index]
+            if reason in (TRIMMED, UNEVEN, VARYING) and len(edge.sides) == 2:
+                seam = trimmed(self.model, edge, edge.sides, wishes)
+                if isinstance(seam, TrimmedSeam):
+                    self.trimmed.append(seam)
+                    del self.frozen[index]
+                else:
+                    self.frozen[index] = seam
 
     @property
     def moving(self) -> set[int]:
         """Edges that move."""
-        return self.closing | {edge for seam in self.found for edge in (seam.edge, seam.twin)}
+        exact = {edge for seam in self.found for edge in (seam.edge, seam.twin)}
+        return self.closing | exact | {seam.edge for seam in self.trimmed}
 
     def treatments(self) -> tuple[Treatment, ...]:
         """What was done about each edge of a movable face, in edge order."""
+        loose = {seam.edge for seam in self.trimmed}
 
         def of(edge: int) -> Treatment:
             faces = tuple(side.face for side in self.model.edges[edge].sides)
             if edge in self.frozen:
                 return Treatment(edge, faces, "frozen", self.frozen[edge])
+            if edge in loose:
+                return Treatment(edge, faces, "to tolerance")
             return Treatment(edge, faces, "coupled", freedom=self.freedom.get(edge, 0))
 
         return tuple(of(edge) for edge in sorted(self.moving | set(self.frozen)))
@@ -128,7 +153,7 @@ class Together:
         """
         while True:
             lines = [(strip, line(strip, self._knots, self._lengths, self._creases)) for strip in self._strips()]
-            if not self.found:
+            if not self._joined():
                 return {}
             couplings = self._couplings(lines, scale)
             broken = self._locked(couplings[0][1])
@@ -143,6 +168,7 @@ class Together:
         self.frozen |= reasons
         self.frozen |= {seam.twin: reasons[seam.edge] for seam in self.found if seam.edge in reasons}
         self.found = [seam for seam in self.found if seam.edge not in reasons]
+        self.trimmed = [seam for seam in self.trimmed if seam.edge not in reasons]
 
     def _knots(self, direction: Direction) -> KnotVector:
         net = self.model.surfaces[direction[0]].net
@@ -166,7 +192,8 @@ class Together:
         return found + [Strip({direction: (1.0, 0.0)}) for direction in lone]
 
     def _joined(self) -> list[int]:
-        return sorted({border.surface for seam in self.found for border in (seam.a, seam.b)})
+        every: list[Seam | TrimmedSeam] = [*self.found, *self.trimmed]
+        return sorted({side.surface for seam in every for side in (seam.a, seam.b)})
 
     def _couplings(self, lines: list[tuple[Strip, Line]], scale: float | None) -> list[tuple[float, Coupling]]:
         """Coupled projections to blend and their weights; all on the same nets."""
@@ -181,7 +208,7 @@ class Together:
         }
         nets = {i: self.model.surfaces[i].net.refined(*inserted) for i, inserted in self.inserted.items()}
         return [
-            (weight, Coupling({i: self._patch(i, nets[i], (c[i, 0], c[i, 1])) for i in nets}, self.found))
+            (weight, Coupling({i: self._patch(i, nets[i], (c[i, 0], c[i, 1])) for i in nets}, self.found, self.trimmed))
             for (weight, _), c in zip(steps, coarse, strict=True)
         ]
 
@@ -260,10 +287,17 @@ class Together:
         result = {}
         for seam in self.found:
             gap, angle = opening(after, seam.a, seam.b)
-            if gap > seam.gap + WIDER:
+            wider = MENDED * seam.gap + self.gap if self.mending else WIDER
+            if gap > seam.gap + wider:
                 result[seam.edge] = "would gape"
-            elif seam.joint.order and angle > (1 + SHARE) * seam.angle + STEEPER:
+            elif seam.joint.order and angle > (1 + SHARE) * seam.angle + (BENT if self.mending else STEEPER):
                 result[seam.edge] = "would kink"
+        for loose in self.trimmed:
+            gap, angle = parted(after, loose.a, loose.b)
+            if gap > max(loose.gap, self.gap):
+                result[loose.edge] = f"{TRIMMED}: the gap would be {gap:.1g} mm"
+            elif loose.order and angle > (1 + SHARE) * loose.angle + STEEPER:
+                result[loose.edge] = f"{TRIMMED}: would kink by {math.degrees(angle - loose.angle):.1g}°"
         return result
 
 

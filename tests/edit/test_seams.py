@@ -200,7 +200,8 @@ def test_defects_are_carried_or_mended(sewn):
         report = job.run(document, smooth, Smooth(level=1, **options))
         assert coupled(report) == (4 if sewn else 8)
         now = seams(view(document))
-        assert all(a.gap <= 1.01 * b.gap + 1e-6 for b, a in zip(before, now, strict=True))
-        assert all(a.angle <= 1.05 * b.angle + 0.01 for b, a in zip(before, now, strict=True))
+        wider, steeper = (0.1, 0.1) if options else (0.01, 0.01)
+        assert all(a.gap <= (1 + wider) * b.gap + 1e-4 for b, a in zip(before, now, strict=True))
+        assert all(a.angle <= 1.05 * b.angle + steeper for b, a in zip(before, now, strict=True))
         inner = [np.median([getattr(m, name) for m in now]) for name in ("mean_gap", "mean_angle")]
         print(f"sewn {sewn}, {options}: mean gap {inner[0]:.1e} mm, mean angle {inner[1]:.1e}°")
