@@ -284,6 +284,18 @@ class Together:
         for i, m in moved.items():
             surfaces[i] = Surface(i, Net(m.net.u, m.net.v, m.net.poles + m.offset, m.net.weights), surfaces[i].faces)
         after = self.model.with_surfaces(surfaces)
+        worst: dict[int, float] = {}
+        for loose in self.trimmed:
+            gap, angle = parted(after, loose.a, loose.b)
+            excess = gap / max(loose.gap, self.gap)
+            if loose.order:
+                excess = max(excess, angle / ((1 + SHARE) * loose.angle + STEEPER))
+            if excess > 1:
+                worst[loose.edge] = excess
+        if worst:
+            # what is far off spoils its neighbours: try again without it before judging them
+            limit = math.sqrt(max(worst.values()))
+            return {edge: f"{TRIMMED}: not within the tolerance" for edge, x in worst.items() if x >= limit}
         result = {}
         for seam in self.found:
             gap, angle = opening(after, seam.a, seam.b)
@@ -292,12 +304,6 @@ class Together:
                 result[seam.edge] = "would gape"
             elif seam.joint.order and angle > (1 + SHARE) * seam.angle + (BENT if self.mending else STEEPER):
                 result[seam.edge] = "would kink"
-        for loose in self.trimmed:
-            gap, angle = parted(after, loose.a, loose.b)
-            if gap > max(loose.gap, self.gap):
-                result[loose.edge] = f"{TRIMMED}: the gap would be {gap:.1g} mm"
-            elif loose.order and angle > (1 + SHARE) * loose.angle + STEEPER:
-                result[loose.edge] = f"{TRIMMED}: would kink by {math.degrees(angle - loose.angle):.1g}°"
         return result
 
 
