@@ -63,6 +63,21 @@ class Selection(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
             "they were, where both sides are natural boundaries and that is possible."
         ),
     ] = "frozen"
+    fit_g1: Annotated[
+        float | None,
+        Meta(
+            description="Make seams tangent that are meant to be: those between edited faces under this angle (°).",
+            ge=0.0,
+        ),
+    ] = None
+    close_gaps: Annotated[
+        bool,
+        Meta(description="Pull gaps along seams between edited faces shut."),
+    ] = False
+    gap_tolerance: Annotated[
+        str,
+        Meta(description="Gap (a length) that a seam along a trim curve may have after it moved, unless it was wider."),
+    ] = "1e-4mm"
     refine: Annotated[
         bool,
         Meta(description="Insert knots (exactly) where a face has too few free control points."),

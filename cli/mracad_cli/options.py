@@ -14,7 +14,14 @@ from mracad.errors import UsageError
 
 Command = Callable[..., Any]
 
-SHORT = {"max_deviation": "LENGTH", "scale": "LENGTH", "faces": "SEL", "hold": "SEL"}
+SHORT = {
+    "max_deviation": "LENGTH",
+    "scale": "LENGTH",
+    "faces": "SEL",
+    "hold": "SEL",
+    "fit_g1": "DEG",
+    "gap_tolerance": "LENGTH",
+}
 """Placeholders in the help."""
 
 

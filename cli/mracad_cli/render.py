@@ -97,10 +97,12 @@ def edit_lines(report: Report, done: str, quiet: str, written: str) -> list[str]
 
 def edge_words(edges: tuple[Treatment, ...]) -> str:
     """What was done about the edges of the edited faces."""
-    coupled = sum(e.how == "coupled" for e in edges)
+    moved = sum(e.how != "frozen" for e in edges)
+    loose = sum(e.how == "to tolerance" for e in edges)
     why = Counter(e.reason for e in edges if e.reason)
     reasons = ", ".join(f"{count} {reason}" for reason, count in why.most_common())
-    return f"{coupled} of {plural(len(edges), 'edge')} moved with both faces" + (f" (not: {reasons})" if why else "")
+    words = f"{moved} of {plural(len(edges), 'edge')} moved with both faces"
+    return words + (f", {loose} to tolerance" if loose else "") + (f" (not: {reasons})" if why else "")
 
 
 def seam_line(new: SeamSummary, old: SeamSummary | None = None) -> str:

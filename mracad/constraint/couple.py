@@ -4,7 +4,8 @@ With f the control points of all surfaces, P the refinement from the coarse spac
 
     y = argmin ‖g − P y‖²_G   subject to   L P y = 0,      δ = P y − g,      g = f − e,
 
-where e is the smallest change with L e = L f: the defects that the input has are carried unchanged.  Without the
+where e is the smallest change with L e = L f: the defects that the input has are carried unchanged (or, where they are
+to be mended, left out of e).  Without the
 conditions the projection y₀ is separable on each surface; with them
 
     y = y₀ − G_c⁻¹ Cᵀ λ,      (C G_c⁻¹ Cᵀ) λ = C y₀,      C = L P,   G_c = PᵀGP,
@@ -32,6 +33,7 @@ from mracad.bspline.knots import Side as Limit
 from mracad.bspline.net import Net
 from mracad.bspline.refine import refinement
 from mracad.constraint.seam import Border, Seam
+from mracad.constraint.trimmed import TrimmedSeam, collocation, sites
 from mracad.wavelet.filters import wavelets
 from mracad.wavelet.project import projection
 
@@ -42,6 +44,16 @@ ROUNDING = 1e-14
 
 FLOOR = 1e-7
 """Added to the unit diagonal of the conditions' normal matrix, whose rows may be dependent."""
+
+DEPENDENT = 1e-8
+"""Singular values below this fraction of the largest count as zero."""
+
+CHEAP, CHEAP_STEPS = 1e-4, 3
+"""The same for conditions that need to hold only as far as that is cheap, and how often they are improved."""
+
+FILTERS = 3
+"""How often the part in nearly dependent conditions, where the joints of a vertex contradict each other a little, is
+damped."""
 
 SETTLED = 1e-9
 MOST_STEPS = 300
@@ -81,6 +93,10 @@ class Conditions:
         Where the control points of each surface begin.
     owner : ndarray (conditions,)
         Index of the seam that each condition belongs to.
+    mended : ndarray of bool (conditions,)
+        Whether the input's defect is to vanish instead of being carried.
+    sites : list of int
+        How many of the conditions of each seam, the first ones, are on its curve (G0).
     """
 
     def __init__(self, nets: Mapping[int, Net], seams: Sequence[Seam], spaces: Mapping[int, tuple[KnotVector, ...]]):
@@ -89,8 +105,9 @@ class Conditions:
         sizes = [net.u.count * net.v.count for net in nets.values()]
         self.first = dict(zip(nets, np.cumsum([0, *sizes[:-1]]).tolist(), strict=True))
         self.size = int(sum(sizes))
-        parts: list[tuple[Array, Array, Array]] = []
-        owner, count = [], 0
+        parts: list[tuple[Array, Array, Array]] = [(np.empty(0, int), np.empty(0, int), np.empty(0))]
+        owner, mended, count = [np.empty(0, int)], [np.empty(0, bool)], 0
+        self.sites: list[int] = []
         for number, seam in enumerate(seams):
             for derivative in range(seam.joint.order + 1):
                 share = _sites(seam, derivative, nets, spaces)
@@ -98,13 +115,17 @@ class Conditions:
                     column, value = _functional(nets[border.surface], border, share, terms)
                     row = np.repeat(count + np.arange(len(share)), column.shape[1])
                     parts.append((row, self.first[border.surface] + column.ravel(), value.ravel()))
+                if derivative == 0:
+                    self.sites.append(len(share))
                 owner.append(np.full(len(share), number))
+                mended.append(np.full(len(share), (seam.joint.close, seam.joint.fit, False)[derivative]))
                 count += len(share)
         row, column, value = (np.concatenate(x) for x in zip(*parts, strict=True))
         matrix = csr_array((value, (row, column)), shape=(count, self.size))
-        matrix.data[np.abs(matrix.data) < 1e-14 * np.abs(matrix.data).max()] = 0.0
+        matrix.data[np.abs(matrix.data) < 1e-14 * np.abs(matrix.data).max(initial=0.0)] = 0.0
         matrix.eliminate_zeros()
         self.matrix, self.owner = matrix, np.concatenate(owner)
+        self.mended = np.concatenate(mended)
 
 
 def _terms(seam: Seam, derivative: int) -> list[tuple[Border, list[tuple[int, int, Array]]]]:
@@ -206,9 +227,11 @@ class Restoration:
     diagonal : ndarray (points,)
         d, positive.
     free : ndarray of bool (points,), optional
+    loose : int
+        How many of the last conditions are to hold only as far as that is cheap.
     """
 
-    def __init__(self, matrix: Any, diagonal: Array, free: Array | None = None) -> None:
+    def __init__(self, matrix: Any, diagonal: Array, free: Array | None = None, loose: int = 0) -> None:
         from scipy.sparse import diags_array
         from scipy.sparse.linalg import splu
 
@@ -220,19 +243,23 @@ class Restoration:
         self.rows = diags_array(self.scale).tocsr() @ matrix[self.used]
         self.back = (self.rows @ diags_array(inverse).tocsr()).T.tocsr()
         self.normal = (self.rows @ self.back).tocsr()
-        eye = diags_array(np.full(len(self.used), FLOOR))
+        eye = diags_array(np.where(self.used < matrix.shape[0] - loose, FLOOR, CHEAP))
         self.factor = splu((self.normal + eye).tocsc(), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
 
     def solve(self, residual: Array) -> Array:
         """λ with ``(L D⁻¹ Lᵀ) λ = r`` in the scaled rows, nearly; nothing of it in the dependent conditions."""
-        return self.factor.solve(self.normal @ self.factor.solve(residual))
+        return self.factor.solve(self.attainable(residual))
 
-    def change(self, wanted: Array) -> Array:
-        """c ``(points, 3)`` for ``r`` (conditions, 3)."""
+    def attainable(self, residual: Array) -> Array:
+        """The part of a residual that control points can answer for: nothing in (nearly) dependent conditions."""
+        return self.normal @ self.factor.solve(residual)
+
+    def change(self, wanted: Array, steps: int = 20) -> Array:
+        """c ``(points, 3)`` for ``r`` (conditions, 3); a few ``steps`` leave what is costly."""
         right = self.scale[:, None] * wanted[self.used]
         c = np.zeros((self.back.shape[0], right.shape[1]))
         least = np.abs(right).max(initial=0.0)
-        for _ in range(20):
+        for _ in range(steps):
             residual = right - self.rows @ c
             worst = np.abs(residual).max(initial=0.0)
             if worst == 0.0 or (worst > 0.5 * least and c.any()):
@@ -250,12 +277,20 @@ class Coupling:
     patches : mapping of int to Patch
         By surface.
     seams : sequence of Seam
+        Those that hold exactly.
+    trimmed : sequence of TrimmedSeam
+        Those that hold to a tolerance.
     """
 
-    def __init__(self, patches: Mapping[int, Patch], seams: Sequence[Seam]) -> None:
-        self.patches, self.seams = patches, seams
-        nets = {i: p.net for i, p in patches.items()}
-        self.fine = Conditions(nets, seams, {i: (p.net.u, p.net.v) for i, p in patches.items()})
+    def __init__(
+        self, patches: Mapping[int, Patch], seams: Sequence[Seam], trimmed: Sequence[TrimmedSeam] = ()
+    ) -> None:
+        self.patches, self.seams, self.trimmed = patches, seams, trimmed
+        self.nets = {i: p.net for i, p in patches.items()}
+        spaces = {i: (p.net.u, p.net.v) for i, p in patches.items()}
+        self.fine = Conditions(self.nets, seams, spaces)
+        shares = [sites(seam, spaces, dense=True) for seam in trimmed]
+        self.loose, self.orders = collocation(self.nets, self.nets, trimmed, shares)
         self.diagonal = np.concatenate(
             [p.weight * np.outer(*(_lumped(k) for k in (p.net.u, p.net.v))).ravel() for p in patches.values()]
         )
@@ -263,6 +298,20 @@ class Coupling:
     @cached_property
     def restoration(self) -> Restoration:
         return Restoration(self.fine.matrix, self.diagonal)
+
+    @cached_property
+    def mending(self) -> Array:
+        """The smallest change (points, 3) that takes away the defects that are to be mended."""
+        if not self.fine.mended.any():
+            return np.zeros_like(self.centred)
+        defect = np.where(self.fine.mended[:, None], self.fine.matrix @ self.centred, 0.0)
+        return -self.restoration.change(defect)
+
+    @cached_property
+    def centred(self) -> Array:
+        """f, its centroid at the origin."""
+        f = self.stacked({i: net.poles for i, net in self.nets.items()})
+        return f - f.mean(axis=0)
 
     def split(self, stacked: Array) -> dict[int, Array]:
         """Stacked points ``(points, 3)`` as nets."""
@@ -276,31 +325,31 @@ class Coupling:
         return np.concatenate([nets[i].reshape(-1, 3) for i in self.patches])
 
     def displacement(self) -> dict[int, Array]:
-        """δ of every surface, over its refined net: L δ = 0."""
-        f = self.stacked({i: p.net.poles for i, p in self.patches.items()})
-        f = f - f.mean(axis=0)
-        g = f - self.restoration.change(self.fine.matrix @ f)
-        nets = self.split(g)
+        """δ of every surface, over its refined net: L δ = 0, or −L f where defects are mended."""
+        f = self.centred
+        defect = self.fine.matrix @ f
+        carried = self.restoration.change(np.where(self.fine.mended[:, None], 0.0, defect))
+        nets = self.split(f - carried)
         start = {}
         for i, p in self.patches.items():
             in_u = projection(p.lifted[0], p.net.u).coarse(nets[i], 0)
             start[i] = projection(p.lifted[1], p.net.v).coarse(in_u, 1)
-        coarse = self._conditioned(start)
+        coarse = self._conditioned(start, f - carried)
         smooth = {}
         for i, p in self.patches.items():
             in_u = refinement(p.lifted[0], p.net.u).apply(coarse[i], 0)
             smooth[i] = refinement(p.lifted[1], p.net.v).apply(in_u, 1)
-        delta = self.stacked(smooth) - g
-        return self.split(delta - self.restoration.change(self.fine.matrix @ delta))
+        delta = self.stacked(smooth) + carried - f
+        return self.split(self._restored(delta, None, 1.0))
 
-    def _conditioned(self, start: dict[int, Array]) -> dict[int, Array]:
-        """y from y₀, on the coarse nets."""
-        matrix = self.coarse_conditions()
-        from scipy.sparse import block_diag
+    def _conditioned(self, start: dict[int, Array], g: Array) -> dict[int, Array]:
+        """y from y₀, on the coarse nets; trimmed seams are shut and keep the tilt of g."""
+        from scipy.sparse import block_diag, vstack
 
         spaces = [_Space(p) for p in self.patches.values()]
         lift = block_diag([space.lift for space in spaces], format="csr")
-        matrix = (matrix @ lift).tocsr()
+        loose, wanted = self._coarse_trimmed(g)
+        matrix = (vstack([self.coarse.matrix, loose]) @ lift).tocsr()
         preconditioner = Restoration(matrix, np.concatenate([space.diagonal for space in spaces]))
         ends = np.cumsum([len(space.diagonal) for space in spaces])[:-1]
 
@@ -309,7 +358,10 @@ class Coupling:
 
         rows = preconditioner.rows
         y0 = np.concatenate([space.project(x) for space, x in zip(spaces, start.values(), strict=True)])
-        residual = rows @ y0
+        wanted = np.concatenate([np.zeros((matrix.shape[0] - len(wanted), 3)), wanted])
+        residual = rows @ y0 - preconditioner.scale[:, None] * wanted[preconditioner.used]
+        for _ in range(FILTERS):
+            residual = preconditioner.attainable(residual)
         multiplier = np.zeros_like(residual)
         down = np.zeros_like(y0)
         direction = step_of = preconditioner.solve(residual)
@@ -333,17 +385,53 @@ class Coupling:
         ends = np.cumsum([s[0] * s[1] for s in shapes.values()])[:-1]
         return {i: x.reshape(shapes[i]) for i, x in zip(shapes, np.split(y, ends), strict=True)}
 
-    def coarse_conditions(self) -> Any:
+    def _coarse_trimmed(self, g: Array) -> tuple[Any, Array]:
+        """Conditions of trimmed seams on the coarse nets and their right-hand sides."""
+        shares = [sites(seam, {i: p.base for i, p in self.patches.items()}, dense=False) for seam in self.trimmed]
+        fine, orders = collocation(self.nets, self.nets, self.trimmed, shares)
+        wanted = np.where(orders[:, None] == 1, fine @ g, 0.0)
+        if self.rational:
+            return fine @ self._refinement(fine), wanted
+        return collocation(self._coarse_nets(), self.nets, self.trimmed, shares)[0], wanted
+
+    @property
+    def rational(self) -> bool:
+        """Whether some surface has weights."""
+        return any(net.weights is not None for net in self.nets.values())
+
+    def _coarse_nets(self) -> dict[int, Net]:
+        return {i: Net(*p.lifted, np.zeros((p.lifted[0].count, p.lifted[1].count, 3))) for i, p in self.patches.items()}
+
+    @cached_property
+    def coarse(self) -> Conditions:
         """C = L P, asked at the points that the coarse spaces need."""
+        if not self.rational:
+            return Conditions(self._coarse_nets(), self.seams, {i: p.lifted for i, p in self.patches.items()})
         spaces = {i: p.lifted if p.net.weights is None else (p.net.u, p.net.v) for i, p in self.patches.items()}
-        plain = all(p.net.weights is None for p in self.patches.values())
-        if plain:
-            nets = {
-                i: Net(*p.lifted, np.zeros((p.lifted[0].count, p.lifted[1].count, 3))) for i, p in self.patches.items()
-            }
-            return Conditions(nets, self.seams, spaces).matrix
-        fine = Conditions({i: p.net for i, p in self.patches.items()}, self.seams, spaces).matrix
-        return fine @ self._refinement(fine)
+        conditions = Conditions(self.nets, self.seams, spaces)
+        conditions.matrix = conditions.matrix @ self._refinement(conditions.matrix)
+        conditions.first = dict(zip(self.patches, np.cumsum([0, *self._coarse_sizes()[:-1]]).tolist(), strict=True))
+        return conditions
+
+    def _coarse_sizes(self) -> list[int]:
+        return [p.lifted[0].count * p.lifted[1].count for p in self.patches.values()]
+
+    def freedom(self, number: int) -> int:
+        """Degrees of freedom of the curve of a seam in the coarse space, its own conditions alone holding.
+
+        The rank of the curve as a function of the coarse nets on which all conditions of the seam vanish.
+        """
+        seam = self.seams[number]
+        rows = self.coarse.matrix[self.coarse.owner == number]
+        used = np.unique(rows.indices)
+        patch = self.patches[seam.a.surface]
+        begin = self.coarse.first[seam.a.surface]
+        own = (used >= begin) & (used < begin + patch.lifted[0].count * patch.lifted[1].count)
+        dense = rows[:, used].toarray()
+        curve = np.where(own, dense, 0.0)[: self.coarse.sites[number]]
+        _, size, right = np.linalg.svd(dense)
+        free = right[np.count_nonzero(size > DEPENDENT * size[0]) :]
+        return int(np.linalg.matrix_rank(curve @ free.T, tol=DEPENDENT * np.linalg.norm(curve)))
 
     def _refinement(self, matrix: Any) -> Any:
         """Rows of P, the refinement of all surfaces, for the points that ``matrix`` uses."""
@@ -364,12 +452,25 @@ class Coupling:
         row, column, value = (np.concatenate(x) for x in zip(*parts, strict=True))
         return csr_array((value, (row, column)), shape=(self.fine.size, start))
 
-    def held(self, delta: Mapping[int, Array], free: Mapping[int, Array]) -> dict[int, Array]:
-        """δ with zeros where ``free`` is false, and L δ = 0 all the same."""
+    def held(self, delta: Mapping[int, Array], free: Mapping[int, Array], amount: float) -> dict[int, Array]:
+        """δ with zeros where ``free`` is false, and the conditions (by ``amount``) fulfilled all the same."""
         mask = np.concatenate([free[i].ravel() for i in self.patches])
-        masked = np.where(mask[:, None], self.stacked(delta), 0.0)
-        fix = Restoration(self.fine.matrix, self.diagonal, mask)
-        return self.split(masked - fix.change(self.fine.matrix @ masked))
+        return self.split(self._restored(np.where(mask[:, None], self.stacked(delta), 0.0), mask, amount))
+
+    def _restored(self, delta: Array, free: Array | None, amount: float) -> Array:
+        """δ changed on free points so that its conditions hold."""
+        from scipy.sparse import vstack
+
+        mending = self.mending if free is None else np.where(free[:, None], self.mending, 0.0)
+        exact = amount * (self.fine.matrix @ mending)
+        if self.trimmed:
+            both = vstack([self.fine.matrix, self.loose], format="csr")
+            shut = np.where(self.orders[:, None] == 0, -(self.loose @ self.centred), 0.0)
+            goal = np.concatenate([exact, amount * shut])
+            cheap = Restoration(both, self.diagonal, free, self.loose.shape[0])
+            delta = delta - cheap.change(both @ delta - goal, CHEAP_STEPS)
+        fix = self.restoration if free is None else Restoration(self.fine.matrix, self.diagonal, free)
+        return delta - fix.change(self.fine.matrix @ delta - exact)
 
 
 class _Space:

@@ -11,17 +11,21 @@ conditions on a displacement; what the input misses them by (gap, tilt) is then 
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from mracad.bspline.knots import Side as Limit
 from mracad.bspline.net import Net
+from mracad.constraint.coincide import GAP, coinciding
 from mracad.constraint.frozen import CONTINUITY, ISO, local_span
 from mracad.model import Edge, Face, Model, Side
 
 Array = np.ndarray
+
+TRIMMED, UNEVEN, VARYING = "trimmed", "parameters differ along the seam", "ratio varies along the seam"
+"""Reasons for which a seam cannot move exactly, though it may to a tolerance."""
 
 CREASE = np.radians(1.0)
 """A seam along which the normals differ by more anywhere is a crease: it keeps G0 only."""
@@ -29,7 +33,7 @@ CREASE = np.radians(1.0)
 AFFINE = 1e-7
 """Largest deviation, as a fraction of the seam, from an affine map between the parameters along it."""
 
-SLIP = 1e-3
+SLIP = 1e-2
 """Largest distance, mm, between points of equal parameter measured along the seam (or 1e-5 of its length)."""
 
 EXACT, CLOSE = 1e-8, 2e-3
@@ -38,6 +42,23 @@ then grows by at most CLOSE of the angle by which the normal turns."""
 
 _SAMPLES = 0.5 - 0.5 * np.cos(np.pi * (np.arange(33) + 0.5) / 33)
 _SHAPES = ((0, -1), (0, 0), (1, -1), (1, 1), (2, -1), (2, 2))
+
+
+@dataclass(frozen=True)
+class Wishes:
+    """What seams are to keep, and what is to be mended.
+
+    Attributes
+    ----------
+    keep : {"g0", "g1", "g2"}
+    fit : float
+        Seams whose normals differ by up to this angle anywhere are made tangent.
+    close_gaps : bool
+    """
+
+    keep: str = "g1"
+    fit: float = 0.0
+    close_gaps: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,6 +110,8 @@ class Joint:
         r and s.
     missed : float
         Largest part of T_n within the tangent plane that a S_n + b S_t misses, relative.
+    close, fit : bool
+        Whether the gap and the tilt of the input are to be pulled shut instead of carried.
     """
 
     order: int
@@ -97,6 +120,8 @@ class Joint:
     bend: float = 0.0
     shear: float = 0.0
     missed: float = 0.0
+    close: bool = False
+    fit: bool = False
 
     @property
     def varying(self) -> bool:
@@ -110,11 +135,14 @@ class Seam:
 
     Attributes
     ----------
+    edge, twin : int
+        The edge; twice, or the two free edges that coincide in an unsewn model.
     gap, angle : float
-        Largest gap, mm, and angle between the outward normals.
+        Largest distance at equal fractions, mm, and angle between the outward normals.
     """
 
     edge: int
+    twin: int
     a: Border
     b: Border
     joint: Joint
@@ -132,7 +160,7 @@ class Treatment:
         Index in ``Model.edges``.
     faces : tuple of int
         Faces that meet there.
-    how : {"coupled", "frozen"}
+    how : {"coupled", "to tolerance", "frozen"}
     reason : str
         Why it is frozen.
     freedom : int
@@ -146,7 +174,7 @@ class Treatment:
     freedom: int = 0
 
 
-def seams(model: Model, movable: Collection[int], keep: str) -> tuple[list[Seam], set[int], dict[int, str]]:
+def seams(model: Model, movable: Collection[int], wishes: Wishes) -> tuple[list[Seam], set[int], dict[int, str]]:
     """Seams that can move exactly.
 
     Parameters
@@ -154,7 +182,7 @@ def seams(model: Model, movable: Collection[int], keep: str) -> tuple[list[Seam]
     model : Model
     movable : collection of int
         Faces that the edit may move.
-    keep : {"g0", "g1", "g2"}
+    wishes : Wishes
 
     Returns
     -------
@@ -167,7 +195,6 @@ def seams(model: Model, movable: Collection[int], keep: str) -> tuple[list[Seam]
     found: list[Seam] = []
     closing: set[int] = set()
     frozen: dict[int, str] = {}
-    pairs = {e.index: (e, *e.sides) for e in model.edges if len(e.sides) == 2}
     for edge in model.edges:
         if not any(side.face in movable for side in edge.sides):
             continue
@@ -178,28 +205,56 @@ def seams(model: Model, movable: Collection[int], keep: str) -> tuple[list[Seam]
         elif len(edge.sides) > 2:
             frozen[edge.index] = "more than two faces"
         else:
-            result = _seam(model, movable, *pairs[edge.index], keep)
+            result = _seam(model, movable, wishes, (edge, edge), edge.sides)
             if isinstance(result, Seam):
                 found.append(result)
             elif result:
                 frozen[edge.index] = result
             else:
                 closing.add(edge.index)
+    for edge, one, two in coinciding(model):
+        other = _twin(model, edge, two.face)
+        if edge.index not in frozen or (other and other.index not in frozen):
+            continue
+        result = "coincides with a part of another edge"
+        if other:
+            result = _seam(model, movable, wishes, (edge, other), (one, other.sides[0]))
+        if isinstance(result, Seam):
+            found.append(result)
+            del frozen[result.edge], frozen[result.twin]
+        else:
+            frozen[edge.index] = result
     return found, closing, frozen
 
 
-def _seam(model: Model, movable: Collection[int], edge: Edge, one: Side, two: Side, keep: str) -> Seam | str:
+def _twin(model: Model, edge: Edge, face: int) -> Edge | None:
+    """The free edge of a face that coincides with another free edge as a whole."""
+    limit = max(GAP, 1e-6 * model.diagonal)
+    for other in model.edges:
+        if other.free and other.sides[0].face == face and other.points.shape == edge.points.shape:
+            apart = [np.abs(points - edge.points).max() for points in (other.points, other.points[::-1])]
+            if min(apart) <= limit:
+                return other
+    return None
+
+
+def _seam(
+    model: Model, movable: Collection[int], wishes: Wishes, edges: tuple[Edge, Edge], sides: Sequence[Side]
+) -> Seam | str:
     """The seam, why there is none, or ``""`` where a periodic space closes it."""
-    for side in (one, two):
+    for side in sides:
         face = model.faces[side.face]
         if face.surface is None:
             return f"{face.kind} neighbour"
         if side.face not in movable:
             return "neighbour does not move"
-    borders = [border(model, edge, side, use) for use, side in enumerate((one, two))]
-    a, b = borders
+    a, b = (border(model, edge, side, use) for use, (edge, side) in enumerate(zip(edges, sides, strict=True)))
     if a is None or b is None:
-        return "trimmed"
+        return TRIMMED
+    if edges[0] is not edges[1]:
+        apart = [np.abs(points - edges[0].points).max() for points in (edges[1].points, edges[1].points[::-1])]
+        if apart[1] < apart[0]:
+            b = replace(b, start=b.stop, stop=b.start)
     fa, fb = model.faces[a.face], model.faces[b.face]
     if not np.allclose(fa.frame[:3, :3], fb.frame[:3, :3], rtol=0, atol=1e-12):
         return "faces are placed differently"
@@ -208,8 +263,10 @@ def _seam(model: Model, movable: Collection[int], edge: Edge, one: Side, two: Si
         knots = (net.u, net.v)[a.axis]
         if knots.periodic and abs(abs(a.at - b.at) - knots.period) <= ISO * knots.period:
             return ""
-    joint = _joint(model, edge, a, b, CONTINUITY[keep])
-    return joint if isinstance(joint, str) else Seam(edge.index, a, b, joint, *opening(model, a, b))
+    joint = _joint(model, a, b, wishes)
+    if isinstance(joint, str):
+        return joint
+    return Seam(edges[0].index, edges[1].index, a, b, joint, *opening(model, a, b))
 
 
 def border(model: Model, edge: Edge, side: Side, use: int) -> Border | None:
@@ -284,13 +341,11 @@ def jets(model: Model, border: Border, share: Array, order: int) -> tuple[Array,
 
 
 def opening(model: Model, a: Border, b: Border) -> tuple[float, float]:
-    """Largest gap (mm, differences along the seam left out) and angle between the outward normals of two borders."""
+    """Largest distance (mm) and angle between the outward normals of two borders at equal fractions."""
     s, sn, st = jets(model, a, _SAMPLES, 1)
     t, tn, tt = jets(model, b, _SAMPLES, 1)
-    way = st / np.linalg.norm(st, axis=1, keepdims=True)
-    apart = s - t - ((s - t) * way).sum(axis=1, keepdims=True) * way
-    angle = _between(_outward(model, a, sn, st), _outward(model, b, tn, tt))
-    return float(np.linalg.norm(apart, axis=1).max()), float(angle.max())
+    angle = between(_outward(model, a, sn, st), _outward(model, b, tn, tt))
+    return float(np.linalg.norm(s - t, axis=1).max()), float(angle.max())
 
 
 def _outward(model: Model, border: Border, across: Array, along: Array) -> Array:
@@ -299,26 +354,28 @@ def _outward(model: Model, border: Border, across: Array, along: Array) -> Array
     return (-1 if turned else 1) * np.cross(*((across, along) if border.axis == 0 else (along, across)))
 
 
-def _between(one: Array, two: Array) -> Array:
+def between(one: Array, two: Array) -> Array:
     """Angles between vectors."""
     return np.arctan2(np.linalg.norm(np.cross(one, two), axis=1), (one * two).sum(axis=1))
 
 
-def _joint(model: Model, edge: Edge, a: Border, b: Border, order: int) -> Joint | str:
+def _joint(model: Model, a: Border, b: Border, wishes: Wishes) -> Joint | str:
     """The joint between two borders, or why it cannot be kept."""
     s, sn, st, snn = jets(model, a, _SAMPLES, 2)
     t, tn, tt, tnn = jets(model, b, _SAMPLES, 2)
     length = np.linalg.norm(st, axis=1).mean()
     slip = np.abs(((s - t) * st).sum(axis=1) / np.maximum(np.linalg.norm(st, axis=1), 1e-12 * length)).max()
     if slip > max(SLIP, 1e-5 * length):
-        return "parameters differ along the seam"
+        return UNEVEN
     normals = _outward(model, a, sn, st), _outward(model, b, tn, tt)
     sizes = [np.linalg.norm(n, axis=1) for n in normals]
     if min(size.min() / max(size.max(), 1e-300) for size in sizes) < 1e-9:
         return "degenerate along the seam"
-    angle = _between(*normals)
-    if order == 0 or angle.max() > CREASE:
-        return Joint(0, np.ones(1), np.empty(0))
+    angle = between(*normals)
+    order, close = CONTINUITY[wishes.keep], wishes.close_gaps
+    if order == 0 or angle.max() > max(CREASE, wishes.fit):
+        return Joint(0, np.ones(1), np.empty(0), close=close)
+    fit = bool(angle.max() <= wishes.fit)
     across, along = _components(sn, st, tn)
     size = np.linalg.norm(tn, axis=1)
     for limit in (EXACT, CLOSE):
@@ -327,9 +384,9 @@ def _joint(model: Model, edge: Edge, a: Border, b: Border, order: int) -> Joint 
             off = sn * (across - _value(p))[:, None] + st * (along - _value(q))[:, None]
             missed = float((np.linalg.norm(off, axis=1) / size).max())
             if missed <= limit:
-                joint = Joint(1, p, q, missed=missed)
+                joint = Joint(1, p, q, missed=missed, close=close, fit=fit)
                 return joint if order == 1 else _bent(joint, sn, st, snn, tnn)
-    return "ratio varies along the seam"
+    return VARYING
 
 
 def _bent(joint: Joint, sn: Array, st: Array, snn: Array, tnn: Array) -> Joint | str:

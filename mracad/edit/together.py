@@ -16,17 +16,29 @@ from mracad.bspline.knots import KnotVector
 from mracad.bspline.net import Net
 from mracad.constraint.couple import Coupling, Patch
 from mracad.constraint.frozen import Separation, jet_support, separate
-from mracad.constraint.seam import Seam, Treatment, opening, seams
+from mracad.constraint.seam import TRIMMED, UNEVEN, VARYING, Border, Seam, Treatment, Wishes, opening, seams
 from mracad.constraint.strip import Coarse, Direction, Line, Strip, line, members, strips
+from mracad.constraint.trimmed import TrimmedSeam, parted, trimmed
 from mracad.edit.bound import bounded
 from mracad.model import Model, Surface
-from mracad.options import Smooth
+from mracad.options import Smooth, length
 from mracad.wavelet.ladder import ladder_for_scale, rungs_by_level
 
 Array = np.ndarray
 
-WIDER, STEEPER = 1e-6, math.radians(0.01)
-"""A seam that was smooth may end up with so much more gap (mm) and angle; otherwise it is frozen."""
+WIDER = 1e-6
+"""A seam may end up with so much more of a gap, mm; otherwise it is frozen."""
+
+STEEPER, SHARE = math.radians(0.01), 0.05
+"""A seam that was smooth may end up with so much more of an angle, and so much of that it had (a tilt that is carried
+turns with the faces); otherwise it is frozen."""
+
+MENDED, BENT = 0.1, math.radians(0.1)
+"""The same where defects are mended: beside points that stay, the shares that gap and angle may gain are these and the
+gap tolerance."""
+
+LEAST = 0.5
+"""A seam with less of the freedom of the smoother of its two sides is frozen."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,25 +96,47 @@ class Together:
     ) -> None:
         self.model, self.movable, self.options = model, movable, options
         self.spans, self.creases = spans, creases
+        self.gap = length(options.gap_tolerance, model.diagonal, "gap-tolerance")
+        self.mending = options.close_gaps or options.fit_g1 is not None
+        self.trimmed: list[TrimmedSeam] = []
         self.found: list[Seam] = []
         self.closing: set[int] = set()
         self.frozen: dict[int, str] = {}
         if options.edges == "coupled":
-            self.found, self.closing, self.frozen = seams(model, movable, options.keep)
+            wishes = Wishes(options.keep, math.radians(options.fit_g1 or 0.0), options.close_gaps)
+            self.found, self.closing, self.frozen = seams(model, movable, wishes)
+            self._try_trimmed(wishes)
         self.freedom: dict[int, int] = {}
+        self.inserted: dict[int, tuple[Array, Array]] = {}
+
+    def _try_trimmed(self, wishes: Wishes) -> None:
+        """Let seams that cannot move exactly move to the gap tolerance."""
+        for index, reason in list(self.frozen.items()):
+            edge = self.model.edges[index]
+            if reason in (TRIMMED, UNEVEN, VARYING) and len(edge.sides) == 2:
+                seam = trimmed(self.model, edge, edge.sides, wishes)
+                if isinstance(seam, TrimmedSeam):
+                    self.trimmed.append(seam)
+                    del self.frozen[index]
+                else:
+                    self.frozen[index] = seam
 
     @property
     def moving(self) -> set[int]:
         """Edges that move."""
-        return self.closing | {seam.edge for seam in self.found}
+        exact = {edge for seam in self.found for edge in (seam.edge, seam.twin)}
+        return self.closing | exact | {seam.edge for seam in self.trimmed}
 
     def treatments(self) -> tuple[Treatment, ...]:
         """What was done about each edge of a movable face, in edge order."""
+        loose = {seam.edge for seam in self.trimmed}
 
         def of(edge: int) -> Treatment:
             faces = tuple(side.face for side in self.model.edges[edge].sides)
             if edge in self.frozen:
                 return Treatment(edge, faces, "frozen", self.frozen[edge])
+            if edge in loose:
+                return Treatment(edge, faces, "to tolerance")
             return Treatment(edge, faces, "coupled", freedom=self.freedom.get(edge, 0))
 
         return tuple(of(edge) for edge in sorted(self.moving | set(self.frozen)))
@@ -119,17 +153,22 @@ class Together:
         """
         while True:
             lines = [(strip, line(strip, self._knots, self._lengths, self._creases)) for strip in self._strips()]
-            if not self.found:
+            if not self._joined():
                 return {}
-            moved = self._attempt(lines, scale, bound)
-            broken = self._broken(moved)
+            couplings = self._couplings(lines, scale)
+            broken = self._locked(couplings[0][1])
+            if not broken:
+                moved = self._moved(couplings, bound)
+                broken = self._broken(moved)
             if not broken:
                 return moved
             self._freeze(broken)
 
     def _freeze(self, reasons: Mapping[int, str]) -> None:
         self.frozen |= reasons
+        self.frozen |= {seam.twin: reasons[seam.edge] for seam in self.found if seam.edge in reasons}
         self.found = [seam for seam in self.found if seam.edge not in reasons]
+        self.trimmed = [seam for seam in self.trimmed if seam.edge not in reasons]
 
     def _knots(self, direction: Direction) -> KnotVector:
         net = self.model.surfaces[direction[0]].net
@@ -153,36 +192,62 @@ class Together:
         return found + [Strip({direction: (1.0, 0.0)}) for direction in lone]
 
     def _joined(self) -> list[int]:
-        return sorted({border.surface for seam in self.found for border in (seam.a, seam.b)})
+        every: list[Seam | TrimmedSeam] = [*self.found, *self.trimmed]
+        return sorted({side.surface for seam in every for side in (seam.a, seam.b)})
 
-    def _attempt(self, lines: list[tuple[Strip, Line]], scale: float | None, bound: float | None) -> dict[int, Moved]:
+    def _couplings(self, lines: list[tuple[Strip, Line]], scale: float | None) -> list[tuple[float, Coupling]]:
+        """Coupled projections to blend and their weights; all on the same nets."""
         if scale is not None:
             steps = [(1.0, [_at_scale(each, scale) for _, each in lines])]
         else:
             steps = _at_level([each for _, each in lines], self.options.level or 0.0)
         coarse = [self._members(lines, knots) for _, knots in steps]
-        moving = self.moving
-        nets, extra = {}, {}
-        for i in self._joined():
-            inserted = _union([c[i, 0].inserted for c in coarse]), _union([c[i, 1].inserted for c in coarse])
-            extra[i] = inserted
-            nets[i] = self.model.surfaces[i].net.refined(*inserted)
+        self.inserted = {
+            i: (_union([c[i, 0].inserted for c in coarse]), _union([c[i, 1].inserted for c in coarse]))
+            for i in self._joined()
+        }
+        nets = {i: self.model.surfaces[i].net.refined(*inserted) for i, inserted in self.inserted.items()}
+        return [
+            (weight, Coupling({i: self._patch(i, nets[i], (c[i, 0], c[i, 1])) for i in nets}, self.found, self.trimmed))
+            for (weight, _), c in zip(steps, coarse, strict=True)
+        ]
+
+    def _locked(self, coupling: Coupling) -> dict[int, str]:
+        """Seams whose conditions leave too little freedom; counts the freedom of all."""
+        result = {}
+        for number, seam in enumerate(self.found):
+            whole = min(self._functions(coupling.patches[b.surface].base, b) for b in (seam.a, seam.b))
+            degrees = {coupling.patches[b.surface].base[1 - b.axis].degree for b in (seam.a, seam.b)}
+            plain = len(degrees) == 1 and not seam.joint.varying
+            self.freedom[seam.edge] = whole if plain else coupling.freedom(number)
+            if self.freedom[seam.edge] < LEAST * whole:
+                result[seam.edge] = f"would lock ({self.freedom[seam.edge]} of {whole} degrees of freedom)"
+        return result
+
+    @staticmethod
+    def _functions(base: tuple[KnotVector, KnotVector], border: Border) -> int:
+        """Coarse functions that a border depends on."""
+        knots = base[1 - border.axis]
+        low, high = sorted((border.start, border.stop))
+        inside = (knots.breaks > low) & (knots.breaks < high)
+        return min(int(knots.multiplicities[inside].sum()) + knots.degree + 1, knots.count)
+
+    def _moved(self, couplings: list[tuple[float, Coupling]], bound: float | None) -> dict[int, Moved]:
+        coupling = couplings[0][1]
+        nets = {i: patch.net for i, patch in coupling.patches.items()}
         change: dict[int, Array] = {}
-        for (weight, _), spaces in zip(steps, coarse, strict=True):
-            patches = {i: self._patch(i, nets[i], (spaces[i, 0], spaces[i, 1])) for i in nets}
-            coupling = Coupling(patches, self.found)
-            for i, delta in coupling.displacement().items():
+        for weight, each in couplings:
+            for i, delta in each.displacement().items():
                 change[i] = weight * delta + change.get(i, 0.0)
-        separations = {i: self._separated(self.model.surfaces[i], nets[i], moving) for i in nets}
+        separations = {i: self._separated(self.model.surfaces[i], net, self.moving) for i, net in nets.items()}
         free = {i: s.free for i, s in separations.items()}
-        offsets = coupling.held({i: self.options.amount * x for i, x in change.items()}, free)
+        amount = self.options.amount
+        offsets = coupling.held({i: amount * x for i, x in change.items()}, free, amount)
         if bound is not None:
-            offsets = coupling.held({i: bounded(x, bound) for i, x in offsets.items()}, free)
+            offsets = coupling.held({i: bounded(x, bound) for i, x in offsets.items()}, free, amount)
             largest = max(float(np.linalg.norm(x, axis=-1).max()) for x in offsets.values())
             offsets = {i: min(1.0, bound / max(largest, 1e-300)) * x for i, x in offsets.items()}
-        for seam in self.found:
-            self.freedom[seam.edge] = min(spaces[b.surface, 1 - b.axis].base.count for b in (seam.a, seam.b))
-        return {i: Moved(nets[i], extra[i], separations[i], change[i], offsets[i]) for i in nets}
+        return {i: Moved(net, self.inserted[i], separations[i], change[i], offsets[i]) for i, net in nets.items()}
 
     def _members(self, lines: list[tuple[Strip, Line]], coarse: list[KnotVector]) -> dict[Direction, Coarse]:
         """Coarse knots and knots to insert of every direction."""
@@ -219,12 +284,25 @@ class Together:
         for i, m in moved.items():
             surfaces[i] = Surface(i, Net(m.net.u, m.net.v, m.net.poles + m.offset, m.net.weights), surfaces[i].faces)
         after = self.model.with_surfaces(surfaces)
+        worst: dict[int, float] = {}
+        for loose in self.trimmed:
+            gap, angle = parted(after, loose.a, loose.b)
+            excess = gap / max(loose.gap, self.gap)
+            if loose.order:
+                excess = max(excess, angle / ((1 + SHARE) * loose.angle + STEEPER))
+            if excess > 1:
+                worst[loose.edge] = excess
+        if worst:
+            # what is far off spoils its neighbours: try again without it before judging them
+            limit = math.sqrt(max(worst.values()))
+            return {edge: f"{TRIMMED}: not within the tolerance" for edge, x in worst.items() if x >= limit}
         result = {}
         for seam in self.found:
             gap, angle = opening(after, seam.a, seam.b)
-            if gap > seam.gap + WIDER:
+            wider = MENDED * seam.gap + self.gap if self.mending else WIDER
+            if gap > seam.gap + wider:
                 result[seam.edge] = "would gape"
-            elif seam.joint.order and angle > seam.angle + STEEPER:
+            elif seam.joint.order and angle > (1 + SHARE) * seam.angle + (BENT if self.mending else STEEPER):
                 result[seam.edge] = "would kink"
         return result
 

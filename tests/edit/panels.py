@@ -87,20 +87,25 @@ def elevated(net, axis, times=1):
         old = (net.u, net.v)[axis]
         new = KnotVector.from_multiplicities(old.breaks, old.multiplicities + 1, old.degree + 1)
         at = new.greville()
-        values = _dense(old, at) @ np.moveaxis(net.poles, axis, 0).reshape(old.count, -1)
-        poles = np.linalg.solve(_dense(new, at), values)
+        poles = interpolated(new, at, values(old, at) @ np.moveaxis(net.poles, axis, 0).reshape(old.count, -1))
         shape = (new.count, *np.moveaxis(net.poles, axis, 0).shape[1:])
         poles = np.moveaxis(poles.reshape(shape), 0, axis)
         net = Net(new, net.v, poles) if axis == 0 else Net(net.u, new, poles)
     return net
 
 
-def _dense(knots, at):
-    first, values = basis(knots, at)
+def values(knots, at):
+    """The dense matrix of basis functions at parameters."""
+    first, local = basis(knots, at)
     matrix = np.zeros((len(at), knots.count))
     for k in range(knots.degree + 1):
-        matrix[np.arange(len(at)), first + k] = values[:, k]
+        matrix[np.arange(len(at)), first + k] = local[:, k]
     return matrix
+
+
+def interpolated(knots, at, wanted):
+    """Poles of the spline that takes values at parameters."""
+    return np.linalg.solve(values(knots, at), wanted)
 
 
 def turned(patch, how):
@@ -120,15 +125,17 @@ def _mirrored(knots):
     return KnotVector((low + high - knots.knots)[::-1], knots.degree)
 
 
-def document(patches):
-    """The patches as a document with one shell; edges run along the growing parameter of the unsplit panel."""
+def document(patches, sewn=True):
+    """The patches as a document, in one shell or each with edges of its own.
+
+    Edges run along the growing parameter of the unsplit panel.
+    """
     corners, edges = {}, {}
     grid = [max(k[axis] for k in patches) + 1 for axis in (0, 1)]
 
     def corner(i, j):
         if (i, j) not in corners:
-            key = min(i, grid[0] - 1), min(j, grid[1] - 1)
-            patch = patches[key]
+            patch = patches[min(i, grid[0] - 1), min(j, grid[1] - 1)]
             at = patch.place((SIZE * i, SIZE * j))
             corners[i, j] = make.vertex(patch.net.evaluate([at])[0])
         return corners[i, j]
@@ -141,6 +148,8 @@ def document(patches):
 
     faces = []
     for (i, j), patch in sorted(patches.items()):
+        if not sewn:
+            corners, edges, grid = {}, {}, (i + 1, j + 1)
         ring = [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)]
         loop = []
         for k in range(4):
@@ -185,3 +194,26 @@ def rms(nets, patches, clean, count=40):
         own = np.stack(patch.place(original.T), axis=1)
         total.append(((nets[key].evaluate(own) - clean.evaluate(original)) ** 2).sum(axis=1))
     return float(np.sqrt(np.mean(total)))
+
+
+def pair(left, right):
+    """Two nets over the unit square, that share the curve u = 0, as a document."""
+    ends = [make.vertex(left.poles[0, 0]), make.vertex(left.poles[0, -1])]
+    common = make.edge(make.curve(right.poles[0], right.v.knots, right.v.degree), ends, (0.0, 1.0))
+    faces = []
+    for net in (left, right):
+        far = [make.vertex(net.poles[-1, 0]), make.vertex(net.poles[-1, -1])]
+        rails = [
+            make.edge(make.curve(net.poles[:, k], net.u.knots, net.u.degree), (ends[k], far[k]), (0.0, 1.0))
+            for k in (0, -1)
+        ]
+        end = make.edge(make.curve(net.poles[-1], net.v.knots, net.v.degree), far, (0.0, 1.0))
+        loop = [
+            make.Side(rails[0], make.line2d((0.0, 0.0), (1, 0))),
+            make.Side(end, make.line2d((1.0, 0.0), (0, 1))),
+            make.Side(rails[1], make.line2d((0.0, 1.0), (1, 0)), False),
+            make.Side(common, make.line2d((0.0, 0.0), (0, 1)), False),
+        ]
+        on = make.surface(net.poles, net.u.knots, net.v.knots, (net.u.degree, net.v.degree))
+        faces.append(make.face(on, [loop]))
+    return make.single(make.shell([faces[0].Reversed(), faces[1]]), "pair")
