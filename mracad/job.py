@@ -1,24 +1,27 @@
-"""One document on its way through the program: read, view, edit, apply, check, write; and the report of it."""
+"""A document on its way through the steps of a recipe: viewed, edited, checked in memory; and the report of it."""
 
 from __future__ import annotations
 
+import importlib
 import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from mracad.audit.continuity import SeamMeasure, key, seams
+from mracad.audit.continuity import SeamMeasure, key, seams, summary
 from mracad.audit.deviation import Deviation, deviations
+from mracad.audit.verdict import Verdict
 from mracad.edit.result import Edit
 from mracad.errors import EditError
 from mracad.model import Model
-from mracad.options import Selection
+from mracad.options import Check, Selection, length
 from mracad.select import NURBS, select
 
 if TYPE_CHECKING:
     from mracad.occ.check import Validity
     from mracad.occ.document import Document
+    from mracad.recipe import Step
 
 Progress = Callable[[str, int, int], None]
 """Called with the name of a stage, the steps done and the steps in all."""
@@ -51,6 +54,86 @@ class Report:
     def smooth_seams(self) -> frozenset[tuple[int, tuple[int, int]]]:
         """Keys of the seams that were smooth before."""
         return frozenset(key(m) for m in self.before if m.smooth)
+
+
+@dataclass(frozen=True)
+class Inspection:
+    """What ``check`` looked at: the seams, those of them meant to be smooth, and the kernel's verdict."""
+
+    model: Model
+    seams: list[SeamMeasure]
+    meant: list[SeamMeasure]
+    valid: Validity
+
+
+def play(
+    document: Document, steps: Sequence[Step], *, progress: Progress | None = None, apply: bool = True
+) -> list[Report | Verdict]:
+    """Take a document through steps, in memory, up to the first check that fails.
+
+    Parameters
+    ----------
+    document : Document
+        Changed in place.
+    steps : sequence of Step
+    apply : bool
+        False for a dry run, after which the document must not be written: the last step is not put into it.
+
+    Returns
+    -------
+    list of Report and Verdict
+        One for each step that was done.
+
+    Raises
+    ------
+    EditError
+        As :func:`run`.
+    """
+    results: list[Report | Verdict] = []
+    for step in steps:
+        module, _, name = step.options.function.partition(":")
+        function = getattr(importlib.import_module(module), name)
+        result: Report | Verdict
+        if isinstance(step.options, Selection):
+            put = apply or step is not steps[-1]
+            result = run(document, function, step.options, progress=progress, apply=put)
+        else:
+            result = function(document, step.options, progress=progress)
+        results.append(result)
+        if isinstance(result, Verdict) and not result.passed:
+            break
+    return results
+
+
+def check(document: Document, options: Check, *, progress: Progress | None = None) -> Verdict:
+    """Check validity and continuity of a document against limits; the facts are an :class:`Inspection`."""
+    from mracad.occ.check import check as valid_by_kernel
+    from mracad.occ.view import view
+
+    model = view(document)
+    widest = None if options.max_gap is None else length(options.max_gap, model.diagonal, "max-gap")
+    measures = seams(model)
+    if progress:
+        progress("checking", 0, 1)
+    valid = valid_by_kernel(document)
+    meant = [m for m in measures if m.angle < options.kink]
+    failures = []
+    if "invalid" in options.fail_on and not valid.valid:
+        failures += [str(failure) for failure in valid.failures] or ["not valid"]
+    if "free-edges" in options.fail_on and valid.free_edges:
+        failures.append(f"{valid.free_edges} free edge{'s' * (valid.free_edges > 1)}")
+    unsewn = summary(measures).unsewn
+    if "unsewn" in options.fail_on and unsewn:
+        failures.append(f"{unsewn} seam{'s' * (unsewn > 1)} not sewn")
+    if widest is not None:
+        failures += [f"gap {m.gap:.3g} mm between {_sides(m)}" for m in measures if m.gap > widest]
+    if options.max_angle is not None:
+        failures += [f"angle {m.angle:.2g}° between {_sides(m)}" for m in meant if m.angle > options.max_angle]
+    return Verdict(failures, Inspection(model, measures, meant, valid))
+
+
+def _sides(measure: SeamMeasure) -> str:
+    return "#{} and #{}".format(*(face + 1 for face in measure.faces))
 
 
 def run(

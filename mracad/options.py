@@ -1,16 +1,19 @@
-"""The options of every edit, declared once: command line, recipes, schemas and documentation come from here.
+"""The options of every step, declared once: command line, recipes, schemas and documentation come from here.
 
-A ``Struct`` per edit; a field's ``Meta`` carries its help.  This module imports no numerical library, so that the
-command line can show its help at once.
+A ``Struct`` per edit or check, listed in ``STEPS``; a field's ``Meta`` carries its help.  This module imports no
+numerical library, so that the command line can show its help at once.
 """
 
 from __future__ import annotations
 
 import math
 import re
-from typing import Annotated, Literal
+import types
+import typing
+from functools import cache
+from typing import Annotated, Any, ClassVar, Literal
 
-from msgspec import Meta, Struct
+from msgspec import Meta, Struct, structs
 
 from mracad.errors import UsageError
 
@@ -38,7 +41,68 @@ def length(text: str, diagonal: float, name: str) -> float:
     return value
 
 
-class Selection(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+Length = Annotated[
+    str,
+    Meta(
+        extra_json_schema={
+            "pattern": rf"^\s*\+?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?\s*({'|'.join(MILLIMETRES)}|%)?\s*$"
+        }
+    ),
+]
+"""The type of a field that :func:`length` reads."""
+
+
+@cache
+def lengths(struct: type[Struct]) -> frozenset[str]:
+    """The fields of a struct that hold a length."""
+    return frozenset(name for name, kind in plain_types(struct).items() if kind is Length)
+
+
+@cache
+def plain_types(struct: type[Struct]) -> dict[str, Any]:
+    """The type of each field, without its help and without None."""
+    hints = typing.get_type_hints(struct, include_extras=True)
+    return {name: _plain(hints[name]) for name in struct.__struct_fields__}
+
+
+def _plain(hint: Any) -> Any:
+    """``T`` from ``Annotated[T | None, …]``; :data:`Length` stays what it is."""
+    if hint is Length:
+        return hint
+    if typing.get_origin(hint) is Annotated:
+        return _plain(hint.__origin__)
+    if typing.get_origin(hint) in (types.UnionType, typing.Union):
+        return _plain(next(member for member in typing.get_args(hint) if member is not type(None)))
+    return hint
+
+
+class Options(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What every step is asked with.
+
+    Attributes
+    ----------
+    function : str
+        Where the step is done, ``"module:function"``.
+    """
+
+    function: ClassVar[str]
+
+    def __post_init__(self) -> None:
+        for name in lengths(type(self)):
+            if (text := getattr(self, name)) is not None:
+                length(text, 1.0, name.replace("_", "-"))
+
+    def given(self) -> dict[str, Any]:
+        """The options that differ from their defaults, by name."""
+        every = {field.name: (getattr(self, field.name), field.default) for field in structs.fields(self)}
+        return {name: value for name, (value, default) in every.items() if value != default}
+
+    def files(self) -> tuple[str, ...]:
+        """Files that the options name, beside the model: what the result depends on, too."""
+        return ()
+
+
+class Selection(Options, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Which faces an edit may touch and how their edges are treated; shared by every edit."""
 
     faces: Annotated[
@@ -65,34 +129,72 @@ class Selection(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         Meta(description="How much of the edit: 1 is all of it, 0 none.", ge=0.0, le=1.0),
     ] = 1.0
     max_deviation: Annotated[
-        str | None,
+        Length | None,
         Meta(description="Bound on the displacement (a length): the edit is blended back locally until it holds."),
     ] = None
 
 
+    quiet: ClassVar[str]
+
+    @property
+    def done(self) -> str:
+        """What was done to an edited face, ``"smoothed at 5mm"``; ``quiet`` is what an unchanged one is."""
+        raise NotImplementedError
+
+
 class Smooth(Selection, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Remove detail finer than a scale from NURBS faces."""
+    """Remove detail finer than a scale from the NURBS faces of a STEP file."""
+
+    function: ClassVar[str] = "mracad.edit.smooth:smooth"
+    quiet: ClassVar[str] = "already smooth there"
 
     scale: Annotated[
-        str | None,
+        Length | None,
         Meta(
             description="Wavelength (5mm, 0.2in, or 2% of the model's diagonal): ripples up to half of it go, "
             "ripples of three times it stay."
         ),
     ] = None
     level: Annotated[
-        float | None,
+        Annotated[float, Meta(gt=0.0)] | None,
         Meta(
             description="Instead of --scale: how many levels of the face's own knot ladder to remove, 2.5 for two "
-            "and a half.",
-            gt=0.0,
+            "and a half."
         ),
     ] = None
 
+    @property
+    def done(self) -> str:
+        return f"smoothed at {self.scale if self.scale is not None else f'level {self.level:g}'}"
+
     def __post_init__(self) -> None:
+        super().__post_init__()
         if (self.scale is None) == (self.level is None):
             raise UsageError("smooth needs either a scale or a level", "give --scale 5mm, --scale 2% or --level 2.5")
         if self.level is not None and not (math.isfinite(self.level) and self.level > 0):
             raise UsageError(f"level: {self.level} is not greater than zero", "give --level 1, 2 or 2.5")
         if not (math.isfinite(self.amount) and 0 <= self.amount <= 1):
             raise UsageError(f"amount: {self.amount} is not between 0 and 1", "give --amount 0.5")
+
+
+class Check(Options, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Check validity and continuity of a STEP file; exit code 1 when something asked for does not hold."""
+
+    function: ClassVar[str] = "mracad.job:check"
+
+    max_gap: Annotated[Length | None, Meta(description="Largest gap along any seam of a NURBS face.")] = None
+    max_angle: Annotated[
+        Annotated[float, Meta(ge=0.0)] | None,
+        Meta(description="Largest angle (degrees) along seams that are meant to be smooth."),
+    ] = None
+    kink: Annotated[
+        float, Meta(description="A seam with a smaller angle (degrees) is meant to be smooth.", ge=0.0)
+    ] = 1.0
+    fail_on: Annotated[
+        tuple[Literal["invalid", "free-edges", "unsewn", "nothing"], ...],
+        Meta(description="What else fails the check; repeatable."),
+    ] = ("invalid",)
+
+
+STEPS: dict[str, type[Options]] = {"smooth": Smooth, "check": Check}
+"""Every step by the name of its command: edits (subclasses of ``Selection``) and checks."""
