@@ -1,3 +1,64 @@
-"""Multiresolution editing for CAD models."""
+"""Multiresolution editing for CAD models.
+
+>>> import mracad
+>>> document = mracad.read("panel.step")
+>>> model = mracad.snapshot(document)
+>>> edit = mracad.smooth(model, mracad.Smooth(scale="5mm"))
+>>> mracad.apply(document, model, edit.displacement)
+>>> mracad.write(document, "smooth.step")
+
+Names are loaded on first use, so that importing the package loads no CAD kernel.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from mracad.audit.continuity import seams
+    from mracad.audit.deviation import deviations
+    from mracad.edit.smooth import smooth
+    from mracad.errors import MracadError
+    from mracad.job import run
+    from mracad.model import Displacement, Model
+    from mracad.occ.apply import apply
+    from mracad.occ.check import check
+    from mracad.occ.mesh import write_stl
+    from mracad.occ.read import read_step as read
+    from mracad.occ.view import view as snapshot
+    from mracad.occ.write import write_step as write
+    from mracad.options import Smooth
 
 __version__ = "0.1.0"
+
+_HOMES = {
+    "Displacement": "model",
+    "Model": "model",
+    "MracadError": "errors",
+    "Smooth": "options",
+    "apply": "occ.apply",
+    "check": "occ.check",
+    "deviations": "audit.deviation",
+    "read": "occ.read:read_step",
+    "run": "job",
+    "seams": "audit.continuity",
+    "smooth": "edit.smooth",
+    "snapshot": "occ.view:view",
+    "write": "occ.write:write_step",
+    "write_stl": "occ.mesh",
+}
+
+__all__ = [
+    "Displacement", "Model", "MracadError", "Smooth", "apply", "check", "deviations", "read", "run", "seams", "smooth", "snapshot",
+    "write", "write_stl",
+]  # fmt: skip
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module 'mracad' has no attribute {name!r}")
+    module, _, attribute = _HOMES[name].partition(":")
+    value = getattr(import_module(f"mracad.{module}"), attribute or name)
+    globals()[name] = value
+    return value

@@ -36,21 +36,16 @@ class Gram:
     @cached_property
     def rows(self) -> Rows:
         """The full matrix by rows."""
-        width, n = self.bands.shape
-        d = width - 1
-        values = np.zeros((n, 2 * d + 1))
-        values[:, d:] = self.bands.T
-        for k in range(1, width):
-            values[:, d - k] = np.roll(self.bands[k], k)
+        d, n = self.bands.shape[0] - 1, self.bands.shape[1]
         if self.periodic:
+            values = np.empty((n, 2 * d + 1))
+            for reach, band in enumerate(self.bands):
+                values[:, d - reach], values[:, d + reach] = np.roll(band, reach), band
             return Rows(np.arange(n) - d, values, n, periodic=True)
-        first = np.clip(np.arange(n) - d, 0, max(n - 2 * d - 1, 0))
-        column = np.arange(n)[:, None] + np.arange(-d, d + 1)
-        inside = (column >= 0) & (column < n)
-        shifted = np.zeros((n, min(2 * d + 1, n)))
-        row = np.nonzero(inside)[0]
-        shifted[row, column[inside] - first[row]] = values[inside]
-        return Rows(first, shifted, n)
+        k, i = np.nonzero(self.bands)
+        value, mirrored = self.bands[k, i], k > 0
+        row, column = np.concatenate([i, (i + k)[mirrored]]), np.concatenate([i + k, i[mirrored]])
+        return Rows.from_coo(row, column, np.concatenate([value, value[mirrored]]), (n, n))
 
     def diagonal(self) -> Array:
         """Diagonal of the matrix, ``(n,)``."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import comb
 
 import numpy as np
 
@@ -161,7 +162,9 @@ class Net:
         full = np.matmul(in_v[:, None], partial)
         return np.array([full[:, r, s] for r, s in orders])
 
-    def grid(self, us: Array, vs: Array, derivatives: int = 0, side: tuple[Side, Side] = ("right", "right")):
+    def grid(
+        self, us: Array, vs: Array, derivatives: int = 0, side: tuple[Side, Side] = ("right", "right")
+    ) -> Array | tuple[Array, ...]:
         """Points and first derivatives on the tensor product of two lists of parameters.
 
         Returns
@@ -187,7 +190,7 @@ class Net:
         uv = np.asarray(uv, dtype=float).reshape(-1, 2)
         _, su, sv = self.evaluate(uv, 1, side)
         lengths = [np.linalg.norm(x, axis=1) for x in (su, sv)]
-        floor = [1e-9 * (self._extent / kv.period) for kv in (self.u, self.v)]
+        floor = [1e-7 * (self._extent / kv.period) for kv in (self.u, self.v)]
         normal = np.cross(su, sv)
         bad = ~(np.linalg.norm(normal, axis=1) > 1e-9 * lengths[0] * lengths[1])
         bad |= (lengths[0] < floor[0]) | (lengths[1] < floor[1])
@@ -273,8 +276,6 @@ def _euclidean(poles: Array, rational: bool) -> tuple[Array, Array | None]:
 
 def _curve_quotient(stack: Array) -> Array:
     """Derivatives of ``A / w`` from those of ``(A, w)``, by Leibniz' rule."""
-    from math import comb
-
     top, w = stack[..., :-1].copy(), stack[..., -1:]
     for r in range(len(stack)):
         for i in range(1, r + 1):

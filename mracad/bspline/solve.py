@@ -62,14 +62,16 @@ class BandSolver:
         """Magnitudes on the diagonal of the factor U, in column order."""
         return np.abs(self._factor[self._below + self._above])
 
-    def solve(self, b: Array, axis: int = 0) -> Array:
-        """The solution of ``A x = b`` along ``axis``."""
+    def solve(self, b: Array, axis: int = 0, overwrite: bool = False) -> Array:
+        """The solution of ``A x = b`` along ``axis``; it may take the place of ``b`` if ``overwrite`` says so."""
         b = np.asarray(b, dtype=float)
         if b.size >= LARGE:
             from mracad.bspline import sweeps
 
+            x = b if overwrite else np.empty(b.shape)
             lower, upper, inverse, rows = self.triangles
-            return sweeps.solve(lower, upper, inverse, rows, self.column_order, b, axis % b.ndim)
+            sweeps.solve(lower, upper, inverse, rows, self.column_order, b, axis % b.ndim, x)
+            return x
         from scipy.linalg.lapack import dgbtrs
 
         moved = np.moveaxis(b, axis, 0)

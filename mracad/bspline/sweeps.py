@@ -16,7 +16,7 @@ _LINES = 48
 _UNROLL = 4
 # One signature a kernel, for arrays of any layout: each is compiled once, and kept on disk.
 _LINES_IN = types.Array(types.float64, 3, "A", readonly=True)
-_LINES_OUT = types.float64[:, :, ::1]
+_LINES_OUT = types.float64[:, :, :]
 _TAPS = types.Array(types.float64, 2, "C", readonly=True)
 _REAL = types.Array(types.float64, 1, "C", readonly=True)
 _INDEX = types.Array(types.int64, 1, "C", readonly=True)
@@ -26,26 +26,30 @@ def apply(start: Array, values: Array, c: Array, axis: int) -> Array:
     """The matrix with runs ``values`` from columns ``start`` times ``c`` along ``axis``."""
     c3 = _three(c, axis)
     out = np.empty((c3.shape[0], len(start), c3.shape[2]))
-    _product(c3, c3[:, :0], np.arange(c3.shape[1]), start, _padded(values), np.arange(len(start)), out)
+    _product(c3, c3[:, :0], np.arange(c3.shape[1]), start, *_padded(values), np.arange(len(start)), out)
     return out.reshape((*c.shape[:axis], len(start), *c.shape[axis + 1 :]))
 
 
-def combine(matrix: Rows, columns: Array, rows: Array, coarse: Array, detail: Array, axis: int) -> Array:
-    """``c[rows] = A x[columns]`` along ``axis``, with ``x`` the coarse values followed by the details."""
-    first, second = _three(coarse, axis), _three(detail, axis)
-    out = np.empty((first.shape[0], len(rows), first.shape[2]))
-    _product(first, second, np.argsort(columns), matrix.start, _padded(matrix.values), np.argsort(rows), out)
-    return out.reshape((*coarse.shape[:axis], len(rows), *coarse.shape[axis + 1 :]))
+def combine(matrix: Rows, columns: Array, rows: Array, coarse: Array, detail: Array, axis: int, out: Array) -> None:
+    """``out[rows] = A x[columns]`` along ``axis``, with ``x`` the coarse values followed by the details.
+
+    ``out`` may be the array of which ``coarse`` and ``detail`` are the two parts.
+    """
+    first, second, place = _three(coarse, axis), _three(detail, axis), np.argsort(columns)
+    _product(first, second, place, matrix.start, *_padded(matrix.values), np.argsort(rows), _three(out, axis))
 
 
-def solve(lower: Rows, upper: Rows, inverse: Array, rows: Array, columns: Array, b: Array, axis: int) -> Array:
-    """``x`` with ``L U x[columns] = b[rows]`` along ``axis``; the triangles come without their diagonals."""
-    b3 = _three(b, axis)
-    out = np.empty(b3.shape)
+def solve(
+    lower: Rows, upper: Rows, inverse: Array, rows: Array, columns: Array, b: Array, axis: int, out: Array
+) -> None:
+    """``L U out[columns] = b[rows]`` along ``axis``; the triangles come without their diagonals.
+
+    ``out`` may be ``b``.
+    """
     low, below = _window(lower, before=True)
     high, above = _window(upper, before=False)
-    _solve(b3, np.argsort(rows), np.argsort(columns), -low, below, -high, above, inverse, out)
-    return out.reshape(b.shape)
+    place, target = np.argsort(rows), np.argsort(columns)
+    _solve(_three(b, axis), place, target, -low, below, -high, above, inverse, _three(out, axis))
 
 
 def scatter(start: Array, values: Array, columns: int, c: Array, axis: int) -> Array:
@@ -57,14 +61,19 @@ def scatter(start: Array, values: Array, columns: int, c: Array, axis: int) -> A
 
 
 def _three(c: Array, axis: int) -> Array:
-    """The array as (before, along, after); ``axis`` is not negative."""
+    """A view as (before, along, after); ``axis`` is not negative.
+
+    The axes of ``before``, and those of ``after``, must lie in memory as one, as in any part along one axis.
+    """
     before, along = int(np.prod(c.shape[:axis])), c.shape[axis]
     return c.reshape(before, along, -1)
 
 
-def _padded(values: Array) -> Array:
-    """Runs as wide as a multiple of the unrolling."""
-    return np.pad(values, ((0, 0), (0, -values.shape[1] % _UNROLL)))
+def _padded(values: Array) -> tuple[Array, Array]:
+    """Runs as wide as a multiple of the unrolling, and how far each has to be followed."""
+    taps = np.pad(values, ((0, 0), (0, -values.shape[1] % _UNROLL)))
+    length = taps.shape[1] - np.argmax(taps[:, ::-1] != 0, axis=1)
+    return taps, -(-length // _UNROLL) * _UNROLL
 
 
 def _window(triangle: Rows, before: bool) -> tuple[Array, Array]:
@@ -168,12 +177,12 @@ def _solve(b, place, target, low, below, high_taps, above, inverse, out):
             _spread(x, target + lead, a0, a1, b0, b1, out)
 
 
-@njit(types.void(_LINES_IN, _LINES_IN, _INDEX, _INDEX, _TAPS, _INDEX, _LINES_OUT), cache=True)
-def _product(first, second, place, head, taps, target, out):
+@njit(types.void(_LINES_IN, _LINES_IN, _INDEX, _INDEX, _TAPS, _INDEX, _INDEX, _LINES_OUT), cache=True)
+def _product(first, second, place, head, taps, reach, target, out):
     before, _, after = out.shape
-    m, rows, reach = first.shape[1], head.size, taps.shape[1]
+    m, rows = first.shape[1], head.size
     high, wide = _blocks(before, after)
-    x = np.zeros((place.size + reach, _LINES))
+    x = np.zeros((place.size + taps.shape[1], _LINES))
     y = np.zeros((rows, _LINES))
     for a0 in range(0, before, high):
         a1 = min(a0 + high, before)
@@ -183,6 +192,6 @@ def _product(first, second, place, head, taps, target, out):
             _gather(second, a0, a1, b0, b1, place[m:], x)
             for i in range(rows):
                 y[i] = 0.0
-                for k in range(0, reach, _UNROLL):
+                for k in range(0, reach[i], _UNROLL):
                     _axpy4(y[i], taps[i], k, x, head[i] + k)
             _spread(y, target, a0, a1, b0, b1, out)

@@ -63,29 +63,36 @@ class Step:
         probe = np.cos(np.arange(len(self._row_order)) ** 2.0)
         return bool(np.abs(probe - self.synthesise(*self.analyse(probe))).max() < 0.1 * _EXACT)
 
-    def analyse(self, c: Array, axis: int = 0) -> tuple[Array, Array]:
-        """Coarse poles and details of poles ``c`` along ``axis``."""
+    def analyse(self, c: Array, axis: int = 0, overwrite: bool = False) -> tuple[Array, Array]:
+        """Coarse poles and details of poles ``c`` along ``axis``; they may take its place if ``overwrite`` says so."""
         c = np.asarray(c, dtype=float)
         if c.shape[axis] != self.fine.count:
             raise UsageError(f"{c.shape[axis]} poles along axis {axis} where the knots want {self.fine.count}")
-        both = self._solver.solve(c, axis)
+        both = self._solver.solve(c, axis, overwrite)
         return _part(both, axis, slice(None, self._m)), _part(both, axis, slice(self._m, None))
 
-    def synthesise(self, coarse: Array, detail: Array, axis: int = 0) -> Array:
-        """The poles with the given coarse poles and details along ``axis``."""
+    def synthesise(self, coarse: Array, detail: Array, axis: int = 0, out: Array | None = None) -> Array:
+        """The poles with the given coarse poles and details along ``axis``.
+
+        They are written to ``out`` if it is given, which may be the array of which the two are the parts.
+        """
         if (coarse.shape[axis], detail.shape[axis]) != (self._m, self.fine.count - self._m):
             raise UsageError(
                 f"{coarse.shape[axis]} coarse poles and {detail.shape[axis]} details along axis {axis} where the "
                 f"knots want {self._m} and {self.fine.count - self._m}"
             )
-        if coarse.size + detail.size >= LARGE:
+        axis %= coarse.ndim
+        if out is None:
+            out = np.empty((*coarse.shape[:axis], self.fine.count, *coarse.shape[axis + 1 :]))
+        if out.size >= LARGE:
             from mracad.bspline import sweeps
 
-            axis %= coarse.ndim
-            return sweeps.combine(self._matrix, self._column_order, self._row_order, coarse, detail, axis)
-        both = np.concatenate([coarse, detail], axis=axis)
-        mixed = self._matrix.apply(np.take(both, self._column_order, axis=axis), axis)
-        return np.take(mixed, _inverse(self._row_order), axis=axis)
+            sweeps.combine(self._matrix, self._column_order, self._row_order, coarse, detail, axis, out)
+        else:
+            both = np.concatenate([coarse, detail], axis=axis)
+            mixed = self._matrix.apply(np.take(both, self._column_order, axis=axis), axis)
+            np.take(mixed, _inverse(self._row_order), axis=axis, out=out)
+        return out
 
 
 class Chain:
@@ -99,20 +106,21 @@ class Chain:
     def exact(self) -> bool:
         return all(each.exact for each in self.steps)
 
-    def analyse(self, c: Array, axis: int = 0) -> tuple[Array, Array]:
-        """Coarse poles and details of poles ``c`` along ``axis``."""
+    def analyse(self, c: Array, axis: int = 0, overwrite: bool = False) -> tuple[Array, Array]:
+        """Coarse poles and details of poles ``c`` along ``axis``; they may take its place if ``overwrite`` says so."""
         details = []
         for each in self.steps:
-            c, detail = each.analyse(c, axis)
+            c, detail = each.analyse(c, axis, overwrite)
             details.append(detail)
         return c, np.concatenate(details, axis=axis)
 
-    def synthesise(self, coarse: Array, detail: Array, axis: int = 0) -> Array:
-        """The poles with the given coarse poles and details along ``axis``."""
+    def synthesise(self, coarse: Array, detail: Array, axis: int = 0, out: Array | None = None) -> Array:
+        """The poles with the given coarse poles and details along ``axis``, written to ``out`` if it is given."""
         end = detail.shape[axis]
         for each in reversed(self.steps):
             begin = end - (each.fine.count - each.coarse.count)
-            coarse = each.synthesise(coarse, _part(detail, axis, slice(begin, end)), axis)
+            here = out if each is self.steps[0] else None
+            coarse = each.synthesise(coarse, _part(detail, axis, slice(begin, end)), axis, here)
             end = begin
         return coarse
 
@@ -178,15 +186,19 @@ class Level:
 
     def synthesise(self, coarse: Array) -> Array:
         """Poles of the finer net from those of the coarser one."""
-        poles = coarse
-        if self.v is not None:
+        if self.u is not None and self.v is not None:
+            poles = np.empty((self.u.fine.count, self.v.fine.count, *coarse.shape[2:]))
+            low, high = poles[: len(coarse)], poles[len(coarse) :]
+            self.v.synthesise(coarse, self.bands["LH"], 1, low)
+            self.v.synthesise(self.bands["HL"], self.bands["HH"], 1, high)
+            self.u.synthesise(low, high, 0, poles)
+        elif self.u is not None:
+            poles = self.u.synthesise(coarse, self.bands["HL"], 0)
+        elif self.v is not None:
             poles = self.v.synthesise(coarse, self.bands["LH"], 1)
-        if self.u is not None:
-            high = self.bands["HL"]
-            if self.v is not None:
-                high = self.v.synthesise(high, self.bands["HH"], 1)
-            poles = self.u.synthesise(poles, high, 0)
-        return poles if self.residual is None else poles + self.residual
+        if self.residual is not None:
+            poles += self.residual
+        return poles
 
 
 @dataclass(frozen=True, eq=False)
@@ -239,7 +251,8 @@ def decompose(poles: Array, ladder_u: Sequence[KnotVector], ladder_v: Sequence[K
     steps = [[step(b, a) for a, b in pairwise(ladder)] for ladder in ladders]
     flat = poles.reshape(-1, poles.shape[-1])
     centroid = np.full(len(flat), 1.0 / len(flat)) @ flat
-    c = _moved(poles, -centroid)
+    c = np.array(poles, order="C")
+    _move(c, -centroid)
     pairs = [(pair[0], pair[1] if len(pair) > 1 else None) for pair in zip_longest(*steps)]
     c, levels = _analysed(c, pairs)
     return Pyramid(c, tuple(levels), centroid)
@@ -259,17 +272,19 @@ def reconstruct(pyramid: Pyramid, level: float = 0.0) -> Array:
     """
     if not 0 <= level <= len(pyramid.levels):
         raise UsageError(f"level {level} is outside 0 … {len(pyramid.levels)}")
-    poles = pyramid.coarse
+    poles = np.array(pyramid.coarse, order="C")
     for index in reversed(range(len(pyramid.levels))):
         gain = min(max(index + 1 - level, 0.0), 1.0)
         each = pyramid.levels[index]
         poles = (each if gain == 1.0 else each.scaled(gain)).synthesise(poles)
-    return _moved(poles, pyramid.centroid)
+    _move(poles, pyramid.centroid)
+    return poles
 
 
-def _moved(poles: Array, offset: Array) -> Array:
-    """``poles + offset``; whole lines at a time, which is faster than point by point."""
-    return (poles.reshape(len(poles), -1) + np.tile(offset, poles[0].size // len(offset))).reshape(poles.shape)
+def _move(poles: Array, offset: Array) -> None:
+    """Add ``offset`` to every pole of a contiguous array, whole lines at a time: faster than point by point."""
+    lines = poles.reshape(len(poles), -1)
+    lines += np.tile(offset, lines.shape[1] // len(offset))
 
 
 def _analysed(c: Array, pairs: list[tuple[Step | Chain | None, Step | Chain | None]]) -> tuple[Array, list[Level]]:
@@ -283,7 +298,7 @@ def _analysed(c: Array, pairs: list[tuple[Step | Chain | None, Step | Chain | No
     small = 0.0 if exact else _EXACT * np.abs(c).max(initial=0)
     nets, levels = [], []
     for u, v in pairs:
-        coarse, bands = _bands(c, u, v)
+        coarse, bands = _bands(c, u, v, overwrite=exact)
         level = Level(u, v, bands)
         if not exact:
             nets.append(c)
@@ -302,15 +317,17 @@ def _analysed(c: Array, pairs: list[tuple[Step | Chain | None, Step | Chain | No
     return c, levels
 
 
-def _bands(c: Array, u: Step | Chain | None, v: Step | Chain | None) -> tuple[Array, dict[str, Array]]:
+def _bands(
+    c: Array, u: Step | Chain | None, v: Step | Chain | None, overwrite: bool = False
+) -> tuple[Array, dict[str, Array]]:
     """Coarse poles and bands of one level."""
     bands = {}
     if u is not None:
-        c, bands["HL"] = u.analyse(c, 0)
+        c, bands["HL"] = u.analyse(c, 0, overwrite)
     if v is not None:
-        c, bands["LH"] = v.analyse(c, 1)
+        c, bands["LH"] = v.analyse(c, 1, overwrite)
         if u is not None:
-            bands["HL"], bands["HH"] = v.analyse(bands["HL"], 1)
+            bands["HL"], bands["HH"] = v.analyse(bands["HL"], 1, overwrite)
     return c, bands
 
 

@@ -165,7 +165,7 @@ def kept(kv, coarse, at, wavelength):
     return (w * before * after)[middle].sum() / (w * before * before)[middle].sum()
 
 
-@pytest.mark.parametrize(("name", "spans", "multiplicity", "degree"), parameterisations())
+@pytest.mark.parametrize(("name", "spans", "multiplicity", "degree"), list(parameterisations()))
 @pytest.mark.parametrize("warp", [0.0, 40.0])
 def test_scale_is_a_wavelength(name, spans, multiplicity, degree, warp):
     arc = np.concatenate([[0.0], np.cumsum(spans)])

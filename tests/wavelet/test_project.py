@@ -43,6 +43,20 @@ def test_weighted_projection_is_orthogonal_in_its_own_product(kind, degree):
     assert projection(coarse, fine, weights) is projection(coarse, fine, weights.copy())
 
 
+@pytest.mark.parametrize("degree", [3, 7])
+def test_weights_of_an_unclamped_space(degree):
+    fine = random_knots(degree, "unclamped", 14, 2)
+    coarse = rungs_by_level(fine)[-2]
+    weights = np.random.default_rng(1).uniform(0.1, 10, fine.spans)
+    y = np.random.default_rng(0).standard_normal((coarse.count, 3))
+    found = projection(coarse, fine, weights).coarse(refinement(coarse, fine).apply(y))
+    np.testing.assert_allclose(found, y, atol=1e-11)
+    c = np.random.default_rng(0).standard_normal(fine.count)
+    plain = projection(coarse, fine).apply(c)
+    np.testing.assert_allclose(projection(coarse, fine, np.full(fine.spans, 5.0)).apply(c), plain, atol=1e-11)
+    assert np.abs(projection(coarse, fine, weights).apply(c) - plain).max() > 1e-3
+
+
 @pytest.mark.parametrize("degree", [1, 2, 3, 5, 9, 15, 22])
 @pytest.mark.parametrize("kind", ["clamped", "periodic", "unclamped"])
 def test_smoothing_commutes_with_motions(degree, kind):

@@ -1,0 +1,184 @@
+"""The commands on the samples: what they print, what they write, what they leave alone."""
+
+import json
+import os
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+from tests.judge import judge
+
+
+def test_the_four_lines(mracad, samples, tmp_path):
+    result = mracad("smooth", samples / "panel.step", "--scale", "16mm", "-o", tmp_path / "out.step")
+    assert result.code == 0 and result.err == ""
+    found, deviation, seams, valid = result.out.splitlines()
+    assert found == "panel.step: 6 NURBS faces: 6 smoothed at 16mm"
+    assert deviation.startswith("deviation: max 0.") and " on #" in deviation
+    assert seams.startswith("seams: 7 smooth of 7, angle ≤ ") and "(was " in seams
+    assert valid.startswith("valid: yes (was yes); wrote out.step, ")
+
+
+def test_frozen_poles_are_bit_identical_in_the_file(mracad, samples, tmp_path):
+    out = tmp_path / "out.step"
+    assert mracad("smooth", samples / "panel.step", "--scale", "16mm", "-o", out).code == 0
+    for before, after in zip(judge(samples / "panel.step").model.surfaces, judge(out).model.surfaces, strict=True):
+        border = np.ones(before.net.poles.shape[:2], bool)
+        border[2:-2, 2:-2] = False
+        assert np.array_equal(before.net.poles[border], after.net.poles[border])
+        assert not np.array_equal(before.net.poles, after.net.poles)
+
+
+@pytest.mark.parametrize("name", ["panel", "trimmed", "bottle", "blade", "assembly"])
+def test_every_sample_smooths_and_stays_valid(mracad, samples, tmp_path, name):
+    out, report = tmp_path / "out.step", tmp_path / "report.json"
+    source = samples / f"{name}.step"
+    result = mracad("smooth", source, "--scale", "5%", "-o", out, "--report", report)
+    assert result.code == 0, result.err
+    body = json.loads(report.read_text())
+    assert body["counts"]["edited"] >= 1 and body["deviation"]
+    new, old = judge(out), judge(source)
+    assert new.validity.valid and old.validity.valid
+    assert new.tolerance <= old.tolerance + 1e-7
+    for field in ("solids", "shells", "faces", "free_edges"):
+        assert getattr(new.validity, field) == getattr(old.validity, field)
+    assert max(m.gap for m in new.seams) <= max(m.gap for m in old.seams) + 1e-7
+
+
+@pytest.mark.parametrize("name", ["assembly", "bottle"])
+def test_amount_zero_changes_nothing(mracad, samples, tmp_path, name):
+    out, source = tmp_path / "out.step", samples / f"{name}.step"
+    result = mracad("smooth", source, "--scale", "5%", "--amount", "0", "-o", out)
+    assert result.code == 0 and "nothing changed" in result.out
+    new, old = judge(out).model, judge(source).model
+    assert (new.unit, new.products, len(new.faces)) == (old.unit, old.products, len(old.faces))
+    for a, b in zip(new.faces, old.faces, strict=True):
+        assert (a.name, a.product, a.colour, a.kind, a.instances) == (b.name, b.product, b.colour, b.kind, b.instances)
+    for a, b in zip(new.surfaces, old.surfaces, strict=True):
+        assert np.array_equal(a.net.poles, b.net.poles)
+
+
+def test_selection_and_hold(mracad, samples, tmp_path):
+    panel, out = samples / "panel.step", tmp_path / "out.step"
+    for words, edited in (
+        (["--faces", "#2"], {1}),
+        (["--faces", "!#2", "--faces", "!#3"], {0, 3, 4, 5}),
+        (["--faces", "near:10,10,40"], None),
+        (["--hold", "#1", "--hold", "#6"], {1, 2, 3, 4}),
+        (["--faces", "type:bspline"], set(range(6))),
+    ):
+        result = mracad("smooth", panel, "--scale", "16mm", *words, "--dry-run", "--json", "-o", out)
+        assert result.code == 0 and not out.exists()
+        found = {face["face"] - 1 for face in json.loads(result.out)["faces"] if face["status"] == "edited"}
+        assert found == edited if edited is not None else len(found) == 1
+
+
+def test_dry_run_writes_only_the_report(mracad, samples, tmp_path):
+    out, report = tmp_path / "out.step", tmp_path / "report.json"
+    result = mracad("smooth", samples / "panel.step", "--scale", "16mm", "--dry-run", "-o", out, "--report", report)
+    assert result.code == 0 and "dry run, nothing written" in result.out
+    assert report.exists() and not out.exists()
+
+
+def test_the_report_says_everything(mracad, samples, tmp_path):
+    result = mracad("smooth", samples / "panel.step", "--scale", "16mm", "--json", "-o", tmp_path / "out.step")
+    body = json.loads(result.out)
+    assert body["written"] == ["out.step"] and body["options"]["scale"] == "16mm"
+    assert body["valid"]["before"]["valid"] is True and body["valid"]["after"]["valid"] is True
+    assert len(body["faces"]) == 6 and all(face["fairing"] > 0 for face in body["faces"])
+    assert len(body["seams"]["each"]) == 7 and {"gap", "angle", "after"} <= body["seams"]["each"][0].keys()
+    assert len(body["deviation"]) == 6 and all(d["largest"] <= d["bound"] + 1e-12 for d in body["deviation"])
+
+
+def test_info(mracad, samples):
+    result = mracad("info", samples / "trimmed.step", "--scale", "5%")
+    assert result.code == 0 and result.err == ""
+    assert "unit mm" in result.out and "valid: yes" in result.out and "changes by" in result.out
+    body = json.loads(mracad("info", samples / "bottle.step", "--json").out)
+    nurbs = [face for face in body["faces"] if face["kind"] == "bspline"]
+    assert any(face["periodic"][0] or face["periodic"][1] for face in nurbs)
+    assert all(face["reason"] or face["smoothing"] == "changes" for face in body["faces"])
+    assert "nothing" not in result.out
+
+
+def test_info_lists_everything_on_request(mracad, samples):
+    short, long = (mracad("info", samples / "assembly.step", *words).out for words in ([], ["--all"]))
+    assert len(long.splitlines()) > len(short.splitlines()) and "edge#" in long
+    assert "unit in" in short
+
+
+def test_check(mracad, samples, tmp_path):
+    panel = samples / "panel.step"
+    assert mracad("check", panel).code == 0
+    failed = mracad("check", panel, "--max-angle", "1e-12", "--max-gap", "1e-15mm")
+    assert failed.code == 1 and "failed: " in failed.out
+    assert mracad("check", panel, "--fail-on", "free-edges").code == 1
+    body = json.loads(mracad("check", samples / "bottle.step", "--fail-on", "free-edges", "--json").out)
+    assert body["passed"] and body["valid"]["solids"] == 1
+
+
+def test_convert(mracad, samples, tmp_path):
+    stl, text, ap = tmp_path / "a.stl", tmp_path / "b.stl", tmp_path / "c.stp"
+    assert mracad("convert", samples / "bottle.step", "-o", stl, "-o", ap, "--schema", "AP242").code == 0
+    assert (
+        mracad("convert", samples / "bottle.step", "-o", text, "--ascii", "--chord", "1mm", "--angle", "30").code == 0
+    )
+    assert text.read_bytes().startswith(b"solid") and b"AP242" in ap.read_bytes()[:2000]
+    triangles = np.frombuffer(stl.read_bytes()[84:], np.dtype([("n", "<f4", 3), ("p", "<f4", (3, 3)), ("a", "<u2")]))[
+        "p"
+    ]
+    assert text.read_text().count("facet normal") < len(triangles)
+    sides = np.concatenate([triangles[:, [i, (i + 1) % 3]] for i in range(3)]).reshape(-1, 6)
+    _, uses = np.unique(np.concatenate([sides, sides[:, [3, 4, 5, 0, 1, 2]]]), axis=0, return_counts=True)
+    assert (uses == 2).all()  # watertight: each side once in each direction
+
+
+def run(*words, **settings):
+    return subprocess.run([sys.executable, "-m", "mracad_cli", *map(str, words)], capture_output=True, **settings)
+
+
+def test_streams_and_equal_bytes_in_any_process(samples, tmp_path):
+    words = ["smooth", "-", "--scale", "16mm", "-o", "-"]
+    data = (samples / "panel.step").read_bytes()
+    one, two = run(*words, input=data), run(*words, input=data, env={**os.environ, "PYTHONHASHSEED": "7"})
+    assert one.returncode == two.returncode == 0
+    assert one.stdout.startswith(b"ISO-10303-21;") and one.stdout == two.stdout
+    assert b"smoothed at 16mm" in one.stderr and str(tmp_path).encode() not in one.stdout
+    header = one.stdout[: one.stdout.index(b"DATA;")]
+    assert b"scale=16mm" in header and b"mracad" in header
+
+
+def test_help_is_quick_and_loads_no_kernel():
+    probe = (
+        "import sys; from mracad_cli.__main__ import main; code = main(['--help']); "
+        "sys.exit(code or any(m in sys.modules for m in ('OCP', 'numpy', 'scipy', 'cadquery', 'numba')))"
+    )
+    assert subprocess.run([sys.executable, "-c", probe], capture_output=True).returncode == 0
+    times = []
+    for _ in range(5):
+        start = time.perf_counter()
+        assert run("--help").returncode == 0
+        times.append(time.perf_counter() - start)
+    print(f"mracad --help: {min(times):.3f} s")
+
+
+def test_importing_the_library_loads_no_kernel():
+    probe = "import sys, mracad; mracad.Smooth; sys.exit('OCP' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", probe]).returncode == 0
+
+
+def test_the_library_does_what_the_command_does(mracad, samples, tmp_path):
+    import mracad as library
+
+    out = tmp_path / "out.step"
+    assert mracad("smooth", samples / "panel.step", "--scale", "16mm", "-o", out).code == 0
+    document = library.read(samples / "panel.step")
+    model = library.snapshot(document)
+    edit = library.smooth(model, library.Smooth(scale="16mm"))
+    library.apply(document, model, edit.displacement)
+    library.write(document, tmp_path / "library.step")
+    for a, b in zip(judge(out).model.surfaces, judge(tmp_path / "library.step").model.surfaces, strict=True):
+        assert np.array_equal(a.net.poles, b.net.poles)

@@ -1,0 +1,107 @@
+"""Bad input: one line that says what is wrong and what to do, the exit code, and no file written or touched."""
+
+import json
+
+import pytest
+
+BAD_FILES = {
+    "empty": b"",
+    "not STEP": b"solid stl\nendsolid\n",
+    "truncated": b"ISO-10303-21;\nHEADER;\nFILE_DESCRIPTION((''),'2;1');\n",
+    "no geometry": b"ISO-10303-21;\nHEADER;\nFILE_DESCRIPTION((''),'2;1');\nFILE_NAME('','',(''),(''),'','','');\n"
+    b"FILE_SCHEMA(('AUTOMOTIVE_DESIGN'));\nENDSEC;\nDATA;\n#1=CARTESIAN_POINT('',(0.,0.,0.));\nENDSEC;\nEND-ISO-10303-21;\n",
+    "garbage after the header": b"ISO-10303-21;\nHEADER;\nENDSEC;\nDATA;\n#1=FOO(((;\nENDSEC;\nEND-ISO-10303-21;\n",
+}
+
+
+def one_line(result, code):
+    assert result.code == code, result
+    assert result.out == ""
+    assert result.err.startswith("mracad: ") and result.err.count("\n") == 1
+    assert "Traceback" not in result.err
+
+
+@pytest.mark.parametrize("kind", BAD_FILES)
+@pytest.mark.parametrize("command", ["smooth", "info", "convert"])
+def test_a_bad_file(mracad, tmp_path, kind, command):
+    source, out = tmp_path / "in.step", tmp_path / "out.step"
+    source.write_bytes(BAD_FILES[kind])
+    out.write_text("precious")
+    words = {"smooth": ["--scale", "5mm"], "info": [], "convert": []}[command]
+    words += [] if command == "info" else ["-o", out, "--overwrite"]
+    one_line(mracad(command, source, *words), 3)
+    assert out.read_text() == "precious"
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["in.step", "out.step"]
+
+
+def test_a_missing_file_and_a_directory(mracad, tmp_path):
+    one_line(mracad("smooth", tmp_path / "none.step", "--scale", "5mm", "-o", tmp_path / "out.step"), 3)
+    one_line(mracad("info", tmp_path), 3)
+    assert not (tmp_path / "out.step").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "says"),
+    [
+        (["--scale", "0"], 2, "greater than zero"),
+        (["--scale", "nan"], 2, "not a length"),
+        (["--scale", "1e999"], 2, "greater than zero"),
+        (["--scale", "5 bananas"], 2, "not a length"),
+        (["--level", "nan"], 2, "level"),
+        ([], 2, "scale or a level"),
+        (["--scale", "5mm", "--level", "2"], 2, "scale or a level"),
+        (["--scale", "5mm", "--amount", "nan"], 2, "amount"),
+        (["--scale", "5mm", "--amount", "2"], 2, "amount"),
+        (["--scale", "5mm", "--max-deviation", "-1"], 2, "max-deviation"),
+        (["--scale", "5mm", "--faces", "#99"], 2, "#1 to #6"),
+        (["--scale", "5mm", "--faces", "#x"], 2, "face number"),
+        (["--scale", "5mm", "--faces", "nobody"], 2, "no face matches"),
+        (["--scale", "5mm", "--faces", "near:1,2"], 2, "not a point"),
+        (["--scale", "5mm", "--faces", "near:nan,0,0"], 2, "not a point"),
+        (["--scale", "5mm", "--hold", "edge#999"], 2, "edges"),
+        (["--scale", "5mm", "--keep", "g7"], 2, "g7"),
+        (["--scale", "5mm", "--input-unit", "parsec"], 2, "unit"),
+        (["--scale", "5mm", "--frobnicate"], 2, "--frobnicate"),
+    ],
+)
+def test_a_bad_option(mracad, samples, tmp_path, words, code, says):
+    out = tmp_path / "out.step"
+    result = mracad("smooth", samples / "panel.step", *words, "-o", out)
+    one_line(result, code)
+    assert says in result.err
+    assert not list(tmp_path.iterdir())
+
+
+def test_bad_outputs(mracad, samples, tmp_path):
+    panel, taken = samples / "panel.step", tmp_path / "taken.step"
+    taken.write_text("precious")
+    one_line(mracad("smooth", panel, "--scale", "5mm", "-o", taken), 2)
+    one_line(mracad("smooth", panel, "--scale", "5mm", "-o", tmp_path / "no" / "out.step"), 3)
+    one_line(mracad("smooth", panel, "--scale", "5mm", "-o", tmp_path / "out.docx"), 3)
+    one_line(mracad("smooth", panel, "--scale", "5mm", "--overwrite", "-o", tmp_path), 3)
+    one_line(mracad("convert", panel, "-o", tmp_path / "a.stl", "-o", tmp_path / "a.stl"), 2)
+    assert taken.read_text() == "precious" and [p.name for p in tmp_path.iterdir()] == ["taken.step"]
+
+
+def test_errors_as_json(mracad, tmp_path):
+    result = mracad("info", tmp_path / "none.step", "--json")
+    assert result.code == 3
+    error = json.loads(result.out)["error"]
+    assert error["code"] == 3 and "none.step" in error["message"] and error["hint"]
+
+
+def test_an_unknown_command_names_the_nearest(mracad):
+    result = mracad("smoth")
+    one_line(result, 2)
+    assert "'smooth'" in result.err
+
+
+def test_a_model_on_which_nothing_can_move(mracad, tmp_path):
+    from tests.cli.shapes import ruled_strip
+
+    source, out = ruled_strip(tmp_path / "strip.step"), tmp_path / "out.step"
+    result = mracad("smooth", source, "--scale", "8mm", "-o", out)
+    one_line(result, 4)
+    assert "--refine" in result.err and not out.exists()
+    result = mracad("smooth", source, "--scale", "8mm", "--refine", "-o", out)
+    assert result.code == 0 and out.exists() and "1 smoothed" in result.out
