@@ -52,6 +52,11 @@ Length = Annotated[
 """The type of a field that :func:`length` reads."""
 
 
+def dashed(name: str) -> str:
+    """An option's name as on the command line."""
+    return name.replace("_", "-")
+
+
 @cache
 def lengths(struct: type[Struct]) -> frozenset[str]:
     """The fields of a struct that hold a length."""
@@ -90,7 +95,7 @@ class Options(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     def __post_init__(self) -> None:
         for name in lengths(type(self)):
             if (text := getattr(self, name)) is not None:
-                length(text, 1.0, name.replace("_", "-"))
+                length(text, 1.0, dashed(name))
 
     def given(self) -> dict[str, Any]:
         """The options that differ from their defaults, by name."""

@@ -14,16 +14,13 @@ recipe is found before a model is read, and named with its place::
 
 from __future__ import annotations
 
-import difflib
 import json
 import os
 import re
 import shlex
-import tomllib
 import typing
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from importlib import metadata
 from pathlib import Path
 from typing import Any, Literal
 
@@ -32,7 +29,7 @@ from msgspec import structs
 
 from mracad import __version__
 from mracad.errors import FileError, UsageError
-from mracad.options import STEPS, Options, lengths, plain_types
+from mracad.options import STEPS, Options, dashed, lengths, plain_types
 
 OWN = ("use", "id")
 """The keys of a step that are not options."""
@@ -86,17 +83,19 @@ class Recipe:
 
     Attributes
     ----------
-    name : str
-        Name of the file, or ``"pipeline"``.
-    folder : Path
-        What relative files in it are relative to.
     tables : tuple
         The steps as they are written.
+    file : Path or None
+        Where it was read from; files that its options name are relative to its folder.
     """
 
-    name: str
-    folder: Path
     tables: tuple[_Table, ...]
+    file: Path | None = None
+
+    @property
+    def name(self) -> str:
+        """Name of the file, or ``"pipeline"``."""
+        return self.file.name if self.file else "pipeline"
 
     @property
     def ids(self) -> list[str]:
@@ -129,7 +128,7 @@ class Recipe:
                 raise UsageError(f"--set {text}: no step {name!r} in {self.name}", nearest(name, self.ids))
             index = self.ids.index(name)
             tables[index] = tables[index].assigned(dashed(option), _toml_value(value), f"--set {text}")
-        recipe = Recipe(self.name, self.folder, tuple(tables))
+        recipe = Recipe(tuple(tables), self.file)
         recipe._check()
         return recipe
 
@@ -142,6 +141,7 @@ class Recipe:
             For a value that an option does not take.
         """
         path = Path("stdin" if source == "-" else source)
+        folder = self.file.parent if self.file else Path()
         variables = {"name": path.stem, "folder": str(path.parent)}
         found = []
         for name, table in zip(self.ids, self.tables, strict=True):
@@ -151,7 +151,7 @@ class Recipe:
                 if key not in OWN
             }
             given = options(table.values["use"], values, table.place)
-            given = relocated(given, {file: os.path.normpath(self.folder / file) for file in given.files()})
+            given = relocated(given, {file: os.path.normpath(folder / file) for file in given.files()})
             found.append(Step(name, table.values["use"], given))
         return tuple(found)
 
@@ -183,6 +183,8 @@ def load(path: str | os.PathLike) -> Recipe:
     UsageError
         When it is not a recipe; the message begins with the file and the line.
     """
+    import tomllib
+
     file = Path(path)
     try:
         text = file.read_text(encoding="utf-8")
@@ -208,7 +210,7 @@ def load(path: str | os.PathLike) -> Recipe:
         _Table({dashed(key): value for key, value in step.items()}, places[i] if i < len(places) else first)
         for i, step in enumerate(steps)
     )
-    recipe = Recipe(file.name, file.parent, tables)
+    recipe = Recipe(tables, file)
     recipe._check()
     return recipe
 
@@ -236,7 +238,7 @@ def pipeline(text: str) -> Recipe:
             parts.append([])
         else:
             parts[-1].append(word)
-    recipe = Recipe("pipeline", Path(), tuple(_table(part, f"step {i}") for i, part in enumerate(parts, 1)))
+    recipe = Recipe(tuple(_table(part, f"step {i}") for i, part in enumerate(parts, 1)))
     recipe._check()
     return recipe
 
@@ -330,7 +332,7 @@ def relocated(options: Options, files: Mapping[str, str]) -> Options:
     return structs.replace(options, **{k: moved(v) for k, v in structs.asdict(options).items()}) if files else options
 
 
-def record(steps: Iterable[Step]) -> str:
+def record_of(steps: Iterable[Step]) -> str:
     """The steps as a recipe with every option resolved and the versions of what did them."""
     lines = ["[versions]", *(f"{json.dumps(name)} = {json.dumps(version)}" for name, version in versions().items())]
     for step in steps:
@@ -345,6 +347,8 @@ def record(steps: Iterable[Step]) -> str:
 
 def versions() -> dict[str, str]:
     """Versions of what decides the result."""
+    from importlib import metadata  # slow to load, as the command line's help need not be
+
     return {"mracad": __version__, **{name: metadata.version(name) for name in ("cadquery-ocp", "numpy", "scipy")}}
 
 
@@ -414,18 +418,17 @@ def reference() -> str:
 
 def nearest(word: str, known: Iterable[str], otherwise: str = "") -> str:
     """``did you mean 'scale'?``, or what else to do."""
+    import difflib
+
     names = list(known)
     near = difflib.get_close_matches(word, names, n=1, cutoff=0.5)
     return f"did you mean {near[0]!r}?" if near else otherwise or "use one of " + ", ".join(names)
 
 
-def dashed(name: str) -> str:
-    """An option's name as on the command line."""
-    return name.replace("_", "-")
-
-
 def _toml_value(text: str) -> Any:
     """A text as the TOML value that it is, or as itself."""
+    import tomllib
+
     try:
         return tomllib.loads(f"value = {text}")["value"]
     except tomllib.TOMLDecodeError:

@@ -14,17 +14,20 @@ import click
 import mracad
 from mracad.errors import Code, MracadError
 from mracad_cli import commands
+from mracad_cli.steps import edit_command, edits
 
 
 class Commands(click.Group):
-    """A group whose commands are the modules of ``mracad_cli.commands``."""
+    """A group whose commands are the modules of ``mracad_cli.commands`` and the edits of ``mracad.options``."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        return sorted(module.name for module in pkgutil.iter_modules(commands.__path__))
+        return sorted({*_modules(), *edits()})
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name not in self.list_commands(ctx):
             return None
+        if cmd_name not in _modules():
+            return edit_command(cmd_name)
         command = importlib.import_module(f"mracad_cli.commands.{cmd_name}").command
         return command if isinstance(command, click.Command) else None
 
@@ -37,6 +40,10 @@ class Commands(click.Group):
             near = difflib.get_close_matches(args[0], self.list_commands(ctx), n=1)
             raise click.UsageError(f"no command {args[0]!r}" + (f", did you mean {near[0]!r}?" if near else ""))
         return super().resolve_command(ctx, args)
+
+
+def _modules() -> set[str]:
+    return {module.name for module in pkgutil.iter_modules(commands.__path__)}
 
 
 @click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 120})
