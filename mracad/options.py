@@ -43,11 +43,7 @@ def length(text: str, diagonal: float, name: str) -> float:
 
 Length = Annotated[
     str,
-    Meta(
-        extra_json_schema={
-            "pattern": rf"^\s*\+?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?\s*({'|'.join(MILLIMETRES)}|%)?\s*$"
-        }
-    ),
+    Meta(extra_json_schema={"pattern": rf"^\s*\+?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?\s*({'|'.join(MILLIMETRES)}|%)?\s*$"}),
 ]
 """The type of a field that :func:`length` reads."""
 
@@ -138,7 +134,6 @@ class Selection(Options, frozen=True, kw_only=True, forbid_unknown_fields=True):
         Meta(description="Bound on the displacement (a length): the edit is blended back locally until it holds."),
     ] = None
 
-
     quiet: ClassVar[str]
 
     @property
@@ -192,9 +187,9 @@ class Check(Options, frozen=True, kw_only=True, forbid_unknown_fields=True):
         Annotated[float, Meta(ge=0.0)] | None,
         Meta(description="Largest angle (degrees) along seams that are meant to be smooth."),
     ] = None
-    kink: Annotated[
-        float, Meta(description="A seam with a smaller angle (degrees) is meant to be smooth.", ge=0.0)
-    ] = 1.0
+    kink: Annotated[float, Meta(description="A seam with a smaller angle (degrees) is meant to be smooth.", ge=0.0)] = (
+        1.0
+    )
     fail_on: Annotated[
         tuple[Literal["invalid", "free-edges", "unsewn", "nothing"], ...],
         Meta(description="What else fails the check; repeatable."),

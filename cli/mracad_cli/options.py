@@ -84,7 +84,9 @@ schema = click.option(
     show_default=True,
     help="STEP schema to write.",
 )
-chord = click.option("--chord", metavar="LENGTH", help="STL: largest distance of triangles from the surface.  [default: 0.02%]")
+chord = click.option(
+    "--chord", metavar="LENGTH", help="STL: largest distance of triangles from the surface.  [default: 0.02%]"
+)
 angle = click.option(
     "--angle",
     type=float,

@@ -64,9 +64,7 @@ def conversion(document: Document, index: int) -> Conversion:
     return document.conversions[index]
 
 
-def lay(
-    face: TopoDS_Face, surface: Geom_Surface, pcurves: Sequence[Geom2d_Curve], tolerances: Sequence[float]
-) -> None:
+def lay(face: TopoDS_Face, surface: Geom_Surface, pcurves: Sequence[Geom2d_Curve], tolerances: Sequence[float]) -> None:
     """Put a face on another surface of the same shape.
 
     Parameters

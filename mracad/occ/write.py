@@ -99,9 +99,7 @@ def _head(model: StepData_StepModel, name: str, options_text: str) -> None:
 
 def _ascii(text: str) -> str:
     """A text as STEP encodes it: what is not plain ASCII as ``\\X2\\…\\X0\\``."""
-    return re.sub(
-        r"[^\x20-\x7e]+", lambda run: "\\X2\\" + run[0].encode("utf-16-be").hex().upper() + "\\X0\\", text
-    )
+    return re.sub(r"[^\x20-\x7e]+", lambda run: "\\X2\\" + run[0].encode("utf-16-be").hex().upper() + "\\X0\\", text)
 
 
 def _tidy(text: bytes) -> bytes:

@@ -43,9 +43,7 @@ def placed(angle, *shift):
 def kernel_poles(document, face):
     """The poles as the kernel gives them one by one, in memory units."""
     surface = basis(BRep_Tool.Surface_s(document.faces[face], TopLoc_Location()))
-    table = [
-        [surface.Pole(i, j) for j in range(1, surface.NbVPoles() + 1)] for i in range(1, surface.NbUPoles() + 1)
-    ]
+    table = [[surface.Pole(i, j) for j in range(1, surface.NbVPoles() + 1)] for i in range(1, surface.NbUPoles() + 1)]
     return np.array([[(p.X(), p.Y(), p.Z()) for p in row] for row in table])
 
 
