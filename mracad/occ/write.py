@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import math
 import os
 import re
 from datetime import UTC, datetime
@@ -21,7 +20,7 @@ from mracad.errors import FileError, UsageError
 from mracad.occ.document import Document
 from mracad.occ.output import put
 from mracad.occ.settings import exchange, quiet
-from mracad.occ.units import UNITS, metres
+from mracad.occ.units import UNITS
 
 _MODES = ("Name", "Color", "Layer", "DimTol", "Material", "Props", "SHUO")
 _SCHEMAS = {"AP203": "AP203", "AP214": "AP214IS", "AP242": "AP242DIS"}
@@ -49,7 +48,7 @@ def write_step(
     FileError
         When the target cannot be written.
     UsageError
-        For an unknown schema.
+        For an unknown schema, or a SOURCE_DATE_EPOCH that is no number.
     """
     schema = schema or ("AP242" if document.schema == "AP242" else "AP214")
     if schema not in _SCHEMAS:
@@ -72,7 +71,7 @@ def _text(document: Document, schema: str, name: str, options_text: str) -> byte
         for mode in _MODES:
             getattr(writer, f"Set{mode}Mode")(True)
         model = writer.Writer().Model()
-        model.SetWriteLengthUnit(math.ldexp(metres(document.unit_mm) * 1000.0, document.units.exponent))
+        model.SetWriteLengthUnit(document.units.mm)
         if not writer.Transfer(document.xcaf, STEPControl_AsIs):
             raise FileError(f"the kernel cannot express '{document.name}' as STEP", "check its geometry")
         _head(model, name, options_text)
@@ -89,7 +88,11 @@ def _text(document: Document, schema: str, name: str, options_text: str) -> byte
 def _head(model: StepData_StepModel, name: str, options_text: str) -> None:
     """Fill the header: nothing in it depends on where, when or how often it is written."""
     header = APIHeaderSection_MakeHeader(model)
-    moment = datetime.fromtimestamp(int(os.environ.get("SOURCE_DATE_EPOCH", "0")), UTC)
+    epoch = os.environ.get("SOURCE_DATE_EPOCH", "0")
+    try:
+        moment = datetime.fromtimestamp(int(epoch), UTC)
+    except (ValueError, OverflowError) as error:
+        raise UsageError(f"SOURCE_DATE_EPOCH is '{epoch}'", "give it whole seconds since 1970, or unset it") from error
     header.SetName(TCollection_HAsciiString(_ascii(name)))
     header.SetTimeStamp(TCollection_HAsciiString(moment.strftime("%Y-%m-%dT%H:%M:%S")))
     header.SetOriginatingSystem(TCollection_HAsciiString(f"mracad {__version__}"))
