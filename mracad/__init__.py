@@ -50,8 +50,8 @@ _HOMES = {
 }
 
 __all__ = [
-    "Displacement", "Model", "MracadError", "Smooth", "apply", "check", "deviations", "read", "run", "seams", "smooth", "snapshot",
-    "write", "write_stl",
+    "Displacement", "Model", "MracadError", "Smooth", "apply", "check", "deviations", "read", "run", "seams", "smooth",
+    "snapshot", "write", "write_stl",
 ]  # fmt: skip
 
 

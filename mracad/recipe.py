@@ -160,9 +160,8 @@ class Recipe:
         for table in self.tables:
             use = table.values.get("use")
             if not isinstance(use, str):
-                raise UsageError(
-                    f"{table.place('use')}: the step does not say what it uses", f'write use = "{[*STEPS][0]}"'
-                )
+                hint = f'write use = "{next(iter(STEPS))}"'
+                raise UsageError(f"{table.place('use')}: the step does not say what it uses", hint)
             if use not in STEPS:
                 raise UsageError(f"{table.place('use')}: no step {use!r}", nearest(use, STEPS))
             known = [*OWN, *map(dashed, STEPS[use].__struct_fields__)]
@@ -172,9 +171,8 @@ class Recipe:
                     raise UsageError(f"{table.place(key)}: {use} has no option {key!r}", hint)
         for index, name in enumerate(self.ids):
             if name in self.ids[:index]:
-                raise UsageError(
-                    f"{self.tables[index].place('id')}: another step has the id {name!r}", "give it another"
-                )
+                place = self.tables[index].place("id")
+                raise UsageError(f"{place}: another step has the id {name!r}", "give it another")
 
 
 def load(path: str | os.PathLike) -> Recipe:

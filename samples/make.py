@@ -386,7 +386,7 @@ def blank(text: str, units: Units | None = None) -> Document:
     """Return an empty document, in millimetres by default."""
     units = units or Units()
     xcaf = TDocStd_Document(TCollection_ExtendedString("BinXCAF"))
-    XCAFDoc_DocumentTool.SetLengthUnit_s(xcaf, metres(units.memory_mm))
+    XCAFDoc_DocumentTool.SetLengthUnit_s(xcaf, metres(1.0))
     return Document(xcaf, text, units)
 
 
@@ -718,7 +718,7 @@ def assembly() -> Document:
 
     Parts and instances have names; each part has a colour, the top of the pad its own; the base plate is on a layer.
     """
-    made = blank("fixture", Units("in", 0, 25.4, 25.4))
+    made = blank("fixture", Units("in", 25.4))
     shapes = made.shape_tool
     colours = XCAFDoc_DocumentTool.ColorTool_s(made.xcaf.Main())
     layers = XCAFDoc_DocumentTool.LayerTool_s(made.xcaf.Main())

@@ -62,7 +62,7 @@ class Outputs:
         overwrite: bool,
         if_changed: bool,
         schema: str,
-        chord: str | None,
+        chord: str,
         angle: float,
         ascii_stl: bool,
     ) -> None:
@@ -115,12 +115,12 @@ class Outputs:
             sys.stdout.buffer.flush()
         self._sizes = [f"{self._name(path)}, {_size(len(data))}" for path, data in made.items()]
 
-    def _chord(self, document: Document) -> float | None:
+    def _chord(self, document: Document) -> float:
         """The chord in millimetres; it may be a share of the diagonal."""
         from mracad.occ.view import view
         from mracad.options import length
 
-        return None if self.chord is None else length(self.chord, view(document).diagonal, "chord")
+        return length(self.chord, view(document).diagonal, "chord")
 
     def say(self, line: str) -> None:
         """Print a line of the result."""

@@ -85,7 +85,11 @@ schema = click.option(
     help="STEP schema to write.",
 )
 chord = click.option(
-    "--chord", metavar="LENGTH", help="STL: largest distance of triangles from the surface.  [default: 0.02%]"
+    "--chord",
+    metavar="LENGTH",
+    default="0.02%",
+    show_default=True,
+    help="STL: largest distance of triangles from the surface.",
 )
 angle = click.option(
     "--angle",

@@ -111,7 +111,7 @@ def run_steps(
                 targets.say(line)
         targets.say(end)
     else:
-        for line in render.edit_lines(results[0], steps[0].options, end):
+        for line in render.edit_lines(results[0], steps[0].options, end):  # type: ignore[arg-type]  # it is an edit
             targets.say(line)
     return 1 if failed else 0
 

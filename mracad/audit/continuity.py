@@ -129,7 +129,7 @@ def _evaluate(model: Model, sides: list[Side]) -> list[Array]:
             by_surface[_surface(model.faces[side.face])].append(i)
     for surface, members in by_surface.items():
         net = model.surfaces[surface].net
-        uv = np.concatenate([sides[i].uv for i in members])  # type: ignore[misc]
+        uv = np.concatenate([sides[i].uv for i in members])
         jets = np.stack([net.evaluate(uv), net.normals(uv)])
         ends = np.cumsum([len(sides[i].uv) for i in members])[:-1]  # type: ignore[arg-type]
         for i, jet in zip(members, np.split(jets, ends, axis=1), strict=True):

@@ -14,9 +14,11 @@ from mracad.bspline.rows import Rows
 
 _LINES = 48
 _UNROLL = 4
-# One signature a kernel, for arrays of any layout: each is compiled once, and kept on disk.
-_LINES_IN = types.Array(types.float64, 3, "A", readonly=True)
-_LINES_OUT = types.float64[:, :, :]
+# One signature a kernel, so that each is compiled once, and kept on disk.  Lines come as flat memory and its layout:
+# sizes (before, along, after) and the steps of the first two.
+_FLAT_IN = types.Array(types.float64, 1, "C", readonly=True)
+_FLAT_OUT = types.float64[::1]
+_LAYOUT = types.UniTuple(types.int64, 5)
 _TAPS = types.Array(types.float64, 2, "C", readonly=True)
 _REAL = types.Array(types.float64, 1, "C", readonly=True)
 _INDEX = types.Array(types.int64, 1, "C", readonly=True)
@@ -24,10 +26,18 @@ _INDEX = types.Array(types.int64, 1, "C", readonly=True)
 
 def apply(start: Array, values: Array, c: Array, axis: int) -> Array:
     """The matrix with runs ``values`` from columns ``start`` times ``c`` along ``axis``."""
-    c3 = _three(c, axis)
-    out = np.empty((c3.shape[0], len(start), c3.shape[2]))
-    _product(c3, c3[:, :0], np.arange(c3.shape[1]), start, *_padded(values), np.arange(len(start)), out)
-    return out.reshape((*c.shape[:axis], len(start), *c.shape[axis + 1 :]))
+    out = np.empty((*c.shape[:axis], len(start), *c.shape[axis + 1 :]))
+    place, target = np.arange(c.shape[axis]), np.arange(len(start))
+    nothing = _lines(c[(slice(None),) * axis + (slice(0),)], axis)
+    _product(*_lines(c, axis), *nothing, place, start, *_padded(values), target, *_lines(out, axis))
+    return out
+
+
+def scatter(start: Array, values: Array, columns: int, c: Array, axis: int) -> Array:
+    """The transpose of the matrix with runs ``values`` from columns ``start`` times ``c`` along ``axis``."""
+    out = np.empty((*c.shape[:axis], columns, *c.shape[axis + 1 :]))
+    _scatter(*_lines(c, axis), start, values, *_lines(out, axis))
+    return out
 
 
 def combine(matrix: Rows, columns: Array, rows: Array, coarse: Array, detail: Array, axis: int, out: Array) -> None:
@@ -35,8 +45,8 @@ def combine(matrix: Rows, columns: Array, rows: Array, coarse: Array, detail: Ar
 
     ``out`` may be the array of which ``coarse`` and ``detail`` are the two parts.
     """
-    first, second, place = _three(coarse, axis), _three(detail, axis), np.argsort(columns)
-    _product(first, second, place, matrix.start, *_padded(matrix.values), np.argsort(rows), _three(out, axis))
+    first, second, place = _lines(coarse, axis), _lines(detail, axis), np.argsort(columns)
+    _product(*first, *second, place, matrix.start, *_padded(matrix.values), np.argsort(rows), *_target(out, axis))
 
 
 def solve(
@@ -49,24 +59,30 @@ def solve(
     low, below = _window(lower, before=True)
     high, above = _window(upper, before=False)
     place, target = np.argsort(rows), np.argsort(columns)
-    _solve(_three(b, axis), place, target, -low, below, -high, above, inverse, _three(out, axis))
+    _solve(*_lines(b, axis), place, target, -low, below, -high, above, inverse, *_target(out, axis))
 
 
-def scatter(start: Array, values: Array, columns: int, c: Array, axis: int) -> Array:
-    """The transpose of the matrix with runs ``values`` from columns ``start`` times ``c`` along ``axis``."""
-    c3 = _three(c, axis)
-    out = np.empty((c3.shape[0], columns, c3.shape[2]))
-    _scatter(c3, start, values, out)
-    return out.reshape((*c.shape[:axis], columns, *c.shape[axis + 1 :]))
+def _lines(c: Array, axis: int) -> tuple[Array, tuple[int, ...]]:
+    """Memory of the array from its first value on, and its layout; ``axis`` is not negative.
 
-
-def _three(c: Array, axis: int) -> Array:
-    """A view as (before, along, after); ``axis`` is not negative.
-
-    The axes of ``before``, and those of ``after``, must lie in memory as one, as in any part along one axis.
+    The axes before ``axis`` must lie in memory as one, and those after it densely, as in any part of an array along
+    one axis; what does not is copied.
     """
-    before, along = int(np.prod(c.shape[:axis])), c.shape[axis]
-    return c.reshape(before, along, -1)
+    lines = c.reshape(int(np.prod(c.shape[:axis])), c.shape[axis], int(np.prod(c.shape[axis + 1 :])))
+    steps = [step // c.itemsize for step in lines.strides]
+    if lines.size and (steps[2] != 1 or min(steps) < 0):
+        lines = np.ascontiguousarray(lines)
+        steps = [step // c.itemsize for step in lines.strides]
+    extent = sum((n - 1) * step for n, step in zip(lines.shape, steps, strict=True)) + 1 if lines.size else 0
+    return np.lib.stride_tricks.as_strided(lines, (extent,), (c.itemsize,)), (*lines.shape, steps[0], steps[1])
+
+
+def _target(out: Array, axis: int) -> tuple[Array, tuple[int, ...]]:
+    """The same of an array that is to be written to."""
+    flat, layout = _lines(out, axis)
+    if not np.may_share_memory(flat, out):
+        raise ValueError("results cannot be written to an array of this layout")
+    return flat, layout
 
 
 def _padded(values: Array) -> tuple[Array, Array]:
@@ -93,25 +109,27 @@ def _window(triangle: Rows, before: bool) -> tuple[Array, Array]:
 
 
 @njit(cache=True)
-def _gather(c, a0, a1, b0, b1, place, buffer):
+def _gather(flat, layout, a0, a1, b0, b1, place, buffer):
     """Lines ``[a0:a1, :, b0:b1]`` into the rows ``place`` of the buffer."""
     width = b1 - b0
     for i in range(place.size):
+        row = buffer[place[i]]
         for a in range(a0, a1):
-            at = (a - a0) * width
+            source, at = a * layout[3] + i * layout[4] + b0, (a - a0) * width
             for b in range(width):
-                buffer[place[i], at + b] = c[a, i, b0 + b]
+                row[at + b] = flat[source + b]
 
 
 @njit(cache=True)
-def _spread(buffer, place, a0, a1, b0, b1, out):
+def _spread(buffer, place, a0, a1, b0, b1, flat, layout):
     """Rows ``place`` of the buffer to lines ``[a0:a1, :, b0:b1]``."""
     width = b1 - b0
     for i in range(place.size):
+        row = buffer[place[i]]
         for a in range(a0, a1):
-            at = (a - a0) * width
+            target, at = a * layout[3] + i * layout[4] + b0, (a - a0) * width
             for b in range(width):
-                out[a, i, b0 + b] = buffer[place[i], at + b]
+                flat[target + b] = row[at + b]
 
 
 @njit(cache=True, fastmath={"contract", "nsz"})
@@ -124,17 +142,17 @@ def _axpy4(y, w, k, x, r):
 
 
 @njit(cache=True)
-def _blocks(before, after):
+def _blocks(layout):
     """Sizes of the blocks of lines."""
-    width = min(after, _LINES)
+    width = min(layout[2], _LINES)
     return max(_LINES // width, 1), width
 
 
-@njit(types.void(_LINES_IN, _INDEX, _TAPS, _LINES_OUT), cache=True)
-def _scatter(c, head, taps, out):
-    before, along, after = c.shape
-    columns, reach = out.shape[1], taps.shape[1]
-    high, wide = _blocks(before, after)
+@njit(types.void(_FLAT_IN, _LAYOUT, _INDEX, _TAPS, _FLAT_OUT, _LAYOUT), cache=True)
+def _scatter(c, layout, head, taps, out, out_layout):
+    before, along, after = layout[:3]
+    columns, reach = out_layout[1], taps.shape[1]
+    high, wide = _blocks(layout)
     x = np.zeros((along, _LINES))
     y = np.zeros((columns + reach, _LINES))
     identity, targets = np.arange(along), np.arange(columns)
@@ -142,7 +160,7 @@ def _scatter(c, head, taps, out):
         a1 = min(a0 + high, before)
         for b0 in range(0, after, wide):
             b1 = min(b0 + wide, after)
-            _gather(c, a0, a1, b0, b1, identity, x)
+            _gather(c, layout, a0, a1, b0, b1, identity, x)
             y[:] = 0.0
             for i in range(along):
                 for k in range(reach):
@@ -151,20 +169,22 @@ def _scatter(c, head, taps, out):
                         row = y[head[i] + k]
                         for j in range(_LINES):
                             row[j] += tap * x[i, j]
-            _spread(y, targets, a0, a1, b0, b1, out)
+            _spread(y, targets, a0, a1, b0, b1, out, out_layout)
 
 
-@njit(types.void(_LINES_IN, _INDEX, _INDEX, _TAPS, _INDEX, _TAPS, _INDEX, _REAL, _LINES_OUT), cache=True)
-def _solve(b, place, target, low, below, high_taps, above, inverse, out):
-    before, along, after = b.shape
+@njit(
+    types.void(_FLAT_IN, _LAYOUT, _INDEX, _INDEX, _TAPS, _INDEX, _TAPS, _INDEX, _REAL, _FLAT_OUT, _LAYOUT), cache=True
+)
+def _solve(b, layout, place, target, low, below, high_taps, above, inverse, out, out_layout):
+    before, along, after = layout[:3]
     lead, tail = low.shape[1], high_taps.shape[1]
-    high, wide = _blocks(before, after)
+    high, wide = _blocks(layout)
     x = np.zeros((lead + along + tail, _LINES))
     for a0 in range(0, before, high):
         a1 = min(a0 + high, before)
         for b0 in range(0, after, wide):
             b1 = min(b0 + wide, after)
-            _gather(b, a0, a1, b0, b1, place + lead, x)
+            _gather(b, layout, a0, a1, b0, b1, place + lead, x)
             for i in range(along):
                 for k in range(below[i], lead, _UNROLL):
                     _axpy4(x[lead + i], low[i], k, x, i + k)
@@ -174,24 +194,27 @@ def _solve(b, place, target, low, below, high_taps, above, inverse, out):
                     _axpy4(y, high_taps[i], k, x, lead + i + 1 + k)
                 for j in range(_LINES):
                     y[j] *= inverse[i]
-            _spread(x, target + lead, a0, a1, b0, b1, out)
+            _spread(x, target + lead, a0, a1, b0, b1, out, out_layout)
 
 
-@njit(types.void(_LINES_IN, _LINES_IN, _INDEX, _INDEX, _TAPS, _INDEX, _INDEX, _LINES_OUT), cache=True)
-def _product(first, second, place, head, taps, reach, target, out):
-    before, _, after = out.shape
-    m, rows = first.shape[1], head.size
-    high, wide = _blocks(before, after)
+@njit(
+    types.void(_FLAT_IN, _LAYOUT, _FLAT_IN, _LAYOUT, _INDEX, _INDEX, _TAPS, _INDEX, _INDEX, _FLAT_OUT, _LAYOUT),
+    cache=True,
+)
+def _product(first, first_layout, second, second_layout, place, head, taps, reach, target, out, layout):
+    before, _, after = layout[:3]
+    m, rows = first_layout[1], head.size
+    high, wide = _blocks(layout)
     x = np.zeros((place.size + taps.shape[1], _LINES))
     y = np.zeros((rows, _LINES))
     for a0 in range(0, before, high):
         a1 = min(a0 + high, before)
         for b0 in range(0, after, wide):
             b1 = min(b0 + wide, after)
-            _gather(first, a0, a1, b0, b1, place[:m], x)
-            _gather(second, a0, a1, b0, b1, place[m:], x)
+            _gather(first, first_layout, a0, a1, b0, b1, place[:m], x)
+            _gather(second, second_layout, a0, a1, b0, b1, place[m:], x)
             for i in range(rows):
                 y[i] = 0.0
                 for k in range(0, reach[i], _UNROLL):
                     _axpy4(y[i], taps[i], k, x, head[i] + k)
-            _spread(y, target, a0, a1, b0, b1, out)
+            _spread(y, target, a0, a1, b0, b1, out, layout)

@@ -143,7 +143,7 @@ class Fairing:
 
         def precondition(residual: Array) -> Array:
             result = np.zeros_like(residual)
-            result[frame] = _both(*inverse, residual[frame])
+            result[frame] = _both(inverse[0], inverse[1], residual[frame])
             return result * mask
 
         origin = target.mean(axis=(0, 1))

@@ -178,7 +178,7 @@ def _mark(net: Net, boxes: Array) -> Array:
     np.add.at(wide, (first_u, last_v + 1), -1)
     np.add.at(wide, (last_u + 1, first_v), -1)
     met = wide.cumsum(0).cumsum(1)[: 2 * cells[0], : 2 * cells[1]] > 0
-    return met.reshape(2, cells[0], 2, cells[1]).any(axis=(0, 2))
+    return np.asarray(met.reshape(2, cells[0], 2, cells[1]).any(axis=(0, 2)))
 
 
 def _covered(net: Net, chords: Array) -> Array:

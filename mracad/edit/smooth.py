@@ -34,8 +34,15 @@ KINK = math.radians(0.1)
 DETAIL = 1e-7
 """Least change of a control point, mm, that counts as detail: the kernel's coincidence tolerance."""
 
-REFINED_POINTS = 40_000
+REFINED_POINTS = 10_000
 """Most control points to which a net is refined in search of free ones."""
+
+REFINED_SHARE = 1 / 16
+"""Share of the visible points that should be free after refinement."""
+
+OVERSHOOT = 1.25
+"""A result that deviates by more than this many times what smoothing the whole surface does is refused: at high
+degrees control points lie far from the surface, and leaving some of them breaks the cancellation among them."""
 
 
 def smooth(
@@ -109,7 +116,7 @@ class _SurfaceSmoothing:
         self.separation = separate(net, faces, edited, options.keep)
         inside = np.logical_or.reduce(list(self.separation.reach.values()))
         self.creases = (_crease_lines(net, 0, inside), _crease_lines(net, 1, inside))
-        self.fairing, self.inserted, self.offset = 0.0, 0, None
+        self.fairing, self.inserted, self.offset, self.entangled = 0.0, 0, None, False
         self.change = self.moved = np.zeros(net.poles.shape)
         target = self._target(scale)
         self.coarser = target is not None
@@ -128,6 +135,9 @@ class _SurfaceSmoothing:
             moved, extra_u, extra_v = refined
             self.inserted = len(extra_u) + len(extra_v)
         else:
+            return
+        if _deviation(net.refined(extra_u, extra_v), moved) > OVERSHOOT * _deviation(net, self.change):
+            self.fairing, self.inserted, self.entangled = 0.0, 0, True
             return
         moved = options.amount * moved
         if bound is not None:
@@ -155,6 +165,8 @@ class _SurfaceSmoothing:
             status, reason = "unchanged", "amount 0"
         elif self.offset is None or moved == 0.0:
             status, reason = "stuck", "no free poles" if not free else "no free poles where the detail is"
+            if self.entangled:
+                reason = "its poles cannot move one by one"
         else:
             status, reason = "edited", ""
         return FaceOutcome(
@@ -228,7 +240,7 @@ class _SurfaceSmoothing:
         return np.where(free[..., None], x - f, 0.0)
 
     def _refine(self, faces: list[Face], edited: Collection[int], target: _Target) -> tuple[Array, Array, Array] | None:
-        """Halve knot spans, the longer ones first, until an eighth of the visible points is free."""
+        """Halve knot spans, the longer ones first, until enough of the visible points are free."""
         net = self.net
         u_knots, v_knots = np.empty(0), np.empty(0)
         best = None
@@ -250,11 +262,10 @@ class _SurfaceSmoothing:
                 continue
             spans = arc_lengths(net, 0), arc_lengths(net, 1)
             best = net, spans, separation, _Target(net.poles + fine[0], fine[1], fine[2], target.scale)
-            if separation.free.sum() >= separation.visible.sum() / 8:
+            if separation.free.sum() >= REFINED_SHARE * separation.visible.sum():
                 break
         if best is None:
             return None
-        self.separation_refined = best[2]
         return self._solve(*best), u_knots, v_knots
 
     def _window(self, moved: Array) -> tuple[int, int]:
@@ -264,6 +275,12 @@ class _SurfaceSmoothing:
 
 def _pair(net: Net) -> tuple[KnotVector, KnotVector]:
     return net.u, net.v
+
+
+def _deviation(net: Net, change: Array) -> float:
+    """Largest displacement, mm, at the Greville points of ``net`` when its poles move by ``change``."""
+    delta = Net(net.u, net.v, change, net.weights)
+    return float(np.linalg.norm(delta.grid(net.u.greville(), net.v.greville()), axis=-1).max())
 
 
 def _largest(change: Array, points: Array | None = None) -> float:

@@ -50,7 +50,7 @@ def apply(document: Document, model: Model, displacement: Displacement) -> None:
             handle = _handle(document, surface, refined=bool(offset.u_knots.size or offset.v_knots.size))
             if isinstance(handle, Geom_BSplineSurface):
                 _refine(handle, offset)
-            _move(handle, offset, document.unit_mm)
+            _move(handle, offset)
         if displacement.offsets:
             _forget(document)
             follow(document, _moved_edges(model, displacement))
@@ -87,13 +87,13 @@ def _refine(surface: Geom_BSplineSurface, offset: Offset) -> None:
             insert(places, times, 0.0, True)
 
 
-def _move(surface: Geom_BSplineSurface | Geom_BezierSurface, offset: Offset, unit_mm: float) -> None:
+def _move(surface: Geom_BSplineSurface | Geom_BezierSurface, offset: Offset) -> None:
     """Add an offset to the control points of a surface."""
     poles = nets([surface])[0].poles
     if poles.shape != offset.poles.shape:
         raise MracadError(f"offsets of shape {offset.poles.shape} for a surface of {poles.shape} control points")
     moved = np.argwhere(offset.poles.any(axis=2))
-    new = poles[tuple(moved.T)] + offset.poles[tuple(moved.T)] / unit_mm
+    new = poles[tuple(moved.T)] + offset.poles[tuple(moved.T)]
     for (i, j), pole in zip((moved + 1).tolist(), new.tolist(), strict=True):
         surface.SetPole(i, j, gp_Pnt(*pole))
 

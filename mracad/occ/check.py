@@ -98,7 +98,6 @@ def check(document: Document, faces: Iterable[int] | None = None, distances: boo
         analyzer = BRepCheck_Analyzer(subject, True, True)
         failures = () if analyzer.IsValid() else tuple(_failures(analyzer, subject, chosen, members))
         tolerance = ShapeAnalysis_ShapeTolerance()
-        unit = document.unit_mm
         shells = [shell for part in document.parts for shell in _inside(part.shape, TopAbs_SHELL)]
         return Validity(
             valid=not failures,
@@ -108,9 +107,9 @@ def check(document: Document, faces: Iterable[int] | None = None, distances: boo
             faces=len(document.faces),
             open_shells=sum(not BRep_Tool.IsClosed_s(shell) for shell in shells),
             free_edges=_free_edges(document),
-            edge_tolerance=tolerance.Tolerance(subject, 1, TopAbs_EDGE) * unit,
-            vertex_tolerance=tolerance.Tolerance(subject, 1, TopAbs_VERTEX) * unit,
-            curve_distance=max(map(_distance, members), default=0.0) * unit if distances else None,
+            edge_tolerance=tolerance.Tolerance(subject, 1, TopAbs_EDGE),
+            vertex_tolerance=tolerance.Tolerance(subject, 1, TopAbs_VERTEX),
+            curve_distance=max(map(_distance, members), default=0.0) if distances else None,
         )
 
 

@@ -108,11 +108,6 @@ class Document:
         return self.units.name
 
     @property
-    def unit_mm(self) -> float:
-        """Millimetres in one unit of the numbers in memory."""
-        return self.units.memory_mm
-
-    @property
     def shape_tool(self) -> XCAFDoc_ShapeTool:
         return XCAFDoc_DocumentTool.ShapeTool_s(self.xcaf.Main())
 
@@ -230,7 +225,8 @@ def _described(label: TDF_Label, faces: TopTools_IndexedMapOfShape) -> tuple[dic
         if shape.ShapeType() == TopAbs_FACE:
             position = faces.FindIndex(shape) - 1
             if position >= 0:
-                if name := label_name(sub):
+                name = label_name(sub)
+                if name and name != "NONE":  # what some systems write for no name
                     names[position] = name
                 if colour:
                     colours[position] = colour

@@ -35,21 +35,19 @@ def is_nurbs(surface: Geom_Surface) -> bool:
     return isinstance(surface, Geom_BSplineSurface | Geom_BezierSurface)
 
 
-def nets(surfaces: Sequence[Geom_Surface], scale: float = 1.0) -> list[Net]:
+def nets(surfaces: Sequence[Geom_Surface]) -> list[Net]:
     """The control nets of B-spline and Bézier surfaces.
 
     Parameters
     ----------
     surfaces : sequence of Geom_BSplineSurface or Geom_BezierSurface
         All different.
-    scale : float
-        Factor on the poles (memory unit to mm).
     """
     collection = BinTools_SurfaceSet()
     for surface in surfaces:
         collection.Add(surface)
     stream = _Stream(collection)
-    return [_net(stream, isinstance(surface, Geom_BezierSurface), scale) for surface in surfaces]
+    return [_net(stream, isinstance(surface, Geom_BezierSurface)) for surface in surfaces]
 
 
 def curves(pieces: Sequence[tuple[Geom2d_Curve, float, float]]) -> list[Curve]:
@@ -84,7 +82,7 @@ class _Stream:
         return values
 
 
-def _net(stream: _Stream, bezier: bool, scale: float) -> Net:
+def _net(stream: _Stream, bezier: bool) -> Net:
     """The next surface."""
     if bezier:
         _, u_rational, v_rational = stream.take("u1", 3).tolist()
@@ -98,7 +96,7 @@ def _net(stream: _Stream, bezier: bool, scale: float) -> Net:
         poles, weights = _poles(stream, (nu, nv), 3, u_rational or v_rational)
         u = _knots(stream, mu, p, bool(u_periodic))
         v = _knots(stream, mv, q, bool(v_periodic))
-    return Net(u, v, poles if scale == 1.0 else poles * scale, weights)
+    return Net(u, v, poles, weights)
 
 
 def _curve(stream: _Stream) -> Curve:

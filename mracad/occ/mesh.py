@@ -8,9 +8,11 @@ from pathlib import Path
 from typing import BinaryIO
 
 import numpy as np
+from OCP.BRep import BRep_Tool
 from OCP.BRepMesh import BRepMesh_IncrementalMesh
 from OCP.BRepTools import BRepTools
 from OCP.StlAPI import StlAPI_Writer
+from OCP.TopLoc import TopLoc_Location
 
 from mracad import __version__
 from mracad.errors import FileError, UsageError
@@ -32,7 +34,7 @@ def write_stl(
     ascii: bool = False,
     chord: float | None = None,
     angle: float | None = None,
-) -> None:
+) -> tuple[int, ...]:
     """Write all placed parts as one STL mesh, in mm.
 
     Parameters
@@ -47,6 +49,11 @@ def write_stl(
     angle : float, optional
         How far neighbouring triangles may turn along a curve, degrees; by default 12.
 
+    Returns
+    -------
+    tuple of int
+        Faces that the kernel could not mesh: the mesh has holes there.
+
     Raises
     ------
     UsageError
@@ -56,20 +63,23 @@ def write_stl(
     """
     if (chord is not None and not chord > 0) or (angle is not None and not angle > 0):
         raise UsageError("chord and angle of a mesh must be positive", "leave them out for the defaults")
-    triangles = _triangles(document, chord, _ANGLE if angle is None else angle)
+    triangles, missing = _triangles(document, chord, _ANGLE if angle is None else angle)
     if not len(triangles):
         raise FileError(f"'{document.name}' gives no triangles", "check its geometry")
     put(_text(triangles) if ascii else _binary(triangles), target)
+    return missing
 
 
-def _triangles(document: Document, chord: float | None, angle: float) -> Array:
-    """Normals and corners of all triangles, mm."""
+def _triangles(document: Document, chord: float | None, angle: float) -> tuple[Array, tuple[int, ...]]:
+    """Normals and corners of all triangles, mm, and the faces that have none."""
     shape = document.shape
     with quiet(), tempfile.TemporaryDirectory() as folder:
         BRepTools.Clean_s(shape)
         corners = box(shape)
-        deflection = chord / document.unit_mm if chord else _CHORD * float(np.linalg.norm(corners[1] - corners[0]))
+        deflection = chord if chord else _CHORD * float(np.linalg.norm(corners[1] - corners[0]))
         BRepMesh_IncrementalMesh(shape, deflection, False, float(np.radians(angle)), False)
+        nowhere = TopLoc_Location()
+        missing = tuple(i for i, face in enumerate(document.faces) if BRep_Tool.Triangulation_s(face, nowhere) is None)
         raw = Path(folder, "mesh.stl")
         writer = StlAPI_Writer()
         writer.ASCIIMode = False
@@ -77,8 +87,7 @@ def _triangles(document: Document, chord: float | None, angle: float) -> Array:
         BRepTools.Clean_s(shape)
         data = raw.read_bytes() if raw.exists() else b""
     triangles = np.frombuffer(data[84:], _TRIANGLES).copy()
-    triangles["corners"] *= document.unit_mm
-    return _welded(triangles)
+    return _welded(triangles), missing
 
 
 def _welded(triangles: Array) -> Array:

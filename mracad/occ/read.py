@@ -54,7 +54,7 @@ def read_step(source: str | os.PathLike | BinaryIO, input_unit: str | None = Non
         units = of_file(reader.Reader().StepModel(), text, input_unit)
         _set_unit(xcaf, units.kernel_mm)
         done = reader.Transfer(xcaf)
-        _set_unit(xcaf, units.memory_mm)
+        _set_unit(xcaf, 1.0)
     document = Document(xcaf, name, units, _schema(text))
     if not done or not any(part.faces.Extent() for part in document.parts):
         raise FileError(f"'{name}' holds no faces", "the file needs surfaces or solids, not only curves or meshes")
@@ -73,7 +73,7 @@ def _load(source: str | os.PathLike | BinaryIO) -> tuple[bytes, str]:
             why = reason.get(type(error), error.strerror or str(error))
             raise FileError(f"cannot read '{path}': {why}", "give the path of a STEP file") from error
     else:
-        name = Path(getattr(source, "name", "") or "stdin").name.strip("<>")
+        name = Path(str(getattr(source, "name", "stdin"))).name.strip("<>")
         text = source.read()
     if not text.strip():
         raise FileError(f"'{name}' is empty", "export it again")

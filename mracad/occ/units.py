@@ -1,8 +1,9 @@
-"""Length units of STEP files, and the in-memory unit that makes their conversion exact.
+"""Length units of STEP files.
 
-The kernel multiplies every length it reads by (file unit / memory unit) and divides by it on writing.  Numbers return
-bit-identical when that factor is a power of two, so the memory unit is the file's unit divided by the power of two
-that brings it closest to a millimetre.
+The kernel works in millimetres: it multiplies every length that it reads by the file's unit and divides by it on
+writing.  With x = fl(a f) in memory, fl(fl(x / f) f) = x for every a and f in double precision (where the quotients are
+spaced closer than x asks for, the product rounds back to x; where they are not, a is the nearest quotient), so numbers
+that nothing moved read back bit-identical.
 """
 
 from __future__ import annotations
@@ -30,30 +31,31 @@ UNITS = {
     "uin": (2.54e-5, "UIN"),
 }
 _ALIASES = {"inch": "in", "foot": "ft", "feet": "ft", "metre": "m", "meter": "m", "micron": "um", "µm": "um"}
+# dimensions and tolerances, which the kernel writes as it holds them in memory, whatever the unit of the output is
+_TOLERANCES = re.compile(rb"\b(GEOMETRIC_TOLERANCE|DIMENSIONAL_SIZE|DIMENSIONAL_LOCATION)\b")
 _SAME = 1e-9  # relative difference below which two factors are the same unit
 
 
 @dataclass(frozen=True)
 class Units:
-    """How a file's numbers are held in memory.  The default, plain millimetres, serves files that mix units or use one
-    that cannot be written.
+    """The length unit of a file.
+
+    The default, millimetres, serves files that mix units, use one that cannot be written, or hold dimensions and
+    tolerances.
 
     Attributes
     ----------
     name : str
-        The file's length unit, a key of ``UNITS``.
-    exponent : int
-        One file unit is ``2**exponent`` memory units.
-    memory_mm : float
-        The memory unit in mm, as geometry has it.
+        The unit in which the file is written again, a key of ``UNITS``.
+    mm : float
+        Millimetres in one unit, as the kernel computes them.
     kernel_mm : float
-        The memory unit in mm, as the kernel must be told on reading; differs from ``memory_mm`` only where the file
-        states a wrong unit.
+        What the kernel must be told on reading that its own unit is, mm; differs from 1 only where the file states a
+        wrong unit.
     """
 
     name: str = "mm"
-    exponent: int = 0
-    memory_mm: float = 1.0
+    mm: float = 1.0
     kernel_mm: float = 1.0
 
 
@@ -94,8 +96,9 @@ def of_file(model: StepData_StepModel, text: bytes, override: str | None = None)
         name = next((key for key, (mm, _) in UNITS.items() if abs(stated / mm - 1) < _SAME), None)
     if not name:
         return Units()
-    exponent = round(math.log2(UNITS[name][0]))
-    return Units(name, exponent, math.ldexp(UNITS[name][0], -exponent), math.ldexp(stated, -exponent))
+    mm = UNITS[name][0] if override else stated
+    kernel_mm = stated / mm
+    return Units(kernel_mm=kernel_mm) if _TOLERANCES.search(text) else Units(name, mm, kernel_mm)
 
 
 def metres(mm: float) -> float:

@@ -91,15 +91,14 @@ def view(document: Document, convert: Iterable[int] = ()) -> Model:
             raise UsageError(f"there is no face #{face + 1}", f"the faces are #1 to #{len(document.faces)}")
     with quiet():
         found = _walk(document, chosen)
-        scale = document.unit_mm
         kinds = [_KINDS.get(type(surface).__name__, "other") for surface in found.grounds]
-        control = nets(list(found.surfaces), scale)
-        boxes = [box(face) * scale for face in found.faces]
+        control = nets(list(found.surfaces))
+        boxes = [box(face) for face in found.faces]
         trims = _trims(found)
         faces = tuple(
             Face(
                 index, kinds[index], found.surface_of[index], trims.get(index, ()),
-                face.Orientation() == TopAbs_REVERSED, _scaled(found.frames[index], scale), boxes[index],
+                face.Orientation() == TopAbs_REVERSED, found.frames[index], boxes[index],
                 part.face_names.get(index - part.first, ""), part.product,
                 part.face_colours.get(index - part.first, part.colour), len(part.placements),
             )
@@ -158,7 +157,6 @@ def _trims(found: _Found) -> dict[int, tuple[Trim, ...]]:
 
 def _edges(document: Document, found: _Found) -> Iterator[Edge]:
     """All edges with their samples."""
-    scale = document.unit_mm
     part_of = np.repeat(np.arange(len(document.parts)), [part.edges.Extent() for part in document.parts]).tolist()
     by_edge: list[list[_Use]] = [[] for _ in document.edges]
     for use in found.uses:
@@ -175,15 +173,15 @@ def _edges(document: Document, found: _Found) -> Iterator[Edge]:
                 sides.append(Side(use.face, points=_NONE, normals=_NONE))
             else:
                 feet, normals = walls[use.face](use, points)
-                sides.append(Side(use.face, points=feet * scale, normals=normals))
+                sides.append(Side(use.face, points=feet, normals=normals))
         yield Edge(
-            index, points * scale, tangents, tuple(sides), BRep_Tool.Tolerance_s(edge) * scale, degenerate,
+            index, points, tangents, tuple(sides), BRep_Tool.Tolerance_s(edge), degenerate,
             part_of[index],
         )  # fmt: skip
 
 
 def _along(edge: TopoDS_Edge) -> tuple[Array, Array]:
-    """Points (memory units) and unit tangents along an edge."""
+    """Points and unit tangents along an edge."""
     curve = BRepAdaptor_Curve(edge)
     first, last = curve.FirstParameter(), curve.LastParameter()
     place = first + (last - first) * _SPREAD
@@ -240,13 +238,6 @@ def _unit(vectors: Array) -> Array:
     return vectors / np.where(lengths > 0, lengths, 1.0)
 
 
-def _scaled(frame: Array, scale: float) -> Array:
-    """A frame whose translation is in memory units, in mm."""
-    out = frame.copy()
-    out[:3, 3] *= scale
-    return out
-
-
 def _diagonal(document: Document, boxes: list[Array]) -> float:
     """Diagonal of the box around all placed face boxes, mm."""
     corners = []
@@ -257,7 +248,7 @@ def _diagonal(document: Document, boxes: list[Array]) -> float:
         # the eight corners of every box: each axis low or high
         grid = np.stack([own[:, [a, b, c], [0, 1, 2]] for a in (0, 1) for b in (0, 1) for c in (0, 1)])
         for placement in part.placements:
-            frame = _scaled(matrix(placement), document.unit_mm)
+            frame = matrix(placement)
             corners.append(grid.reshape(-1, 3) @ frame[:3, :3].T + frame[:3, 3])
     everything = np.concatenate(corners)
     return float(np.linalg.norm(everything.max(axis=0) - everything.min(axis=0)))

@@ -21,6 +21,7 @@ from mracad.bspline.rows import LARGE, Rows
 from mracad.bspline.solve import BandSolver, folded
 from mracad.errors import UsageError
 from mracad.wavelet.filters import wavelets
+from mracad.wavelet.project import projection
 
 _EXACT = 1e-13
 
@@ -32,7 +33,9 @@ class Step:
     ----------
     coarse, fine : KnotVector
     exact : bool
-        Whether analysis and synthesis give a signal back to rounding; where not, :func:`decompose` keeps a residual.
+        Whether solving for poles and details gives a signal back to rounding.  Where it does not, the coarse poles come
+        from the projection, which is the better conditioned, details that would make things worse are left out, and
+        :func:`decompose` keeps a residual.
     """
 
     def __init__(self, coarse: KnotVector, fine: KnotVector) -> None:
@@ -61,15 +64,24 @@ class Step:
     @cached_property
     def exact(self) -> bool:
         probe = np.cos(np.arange(len(self._row_order)) ** 2.0)
-        return bool(np.abs(probe - self.synthesise(*self.analyse(probe))).max() < 0.1 * _EXACT)
+        both = self._solver.solve(probe)
+        return bool(np.abs(probe - self.synthesise(both[: self._m], both[self._m :])).max() < 0.1 * _EXACT)
 
     def analyse(self, c: Array, axis: int = 0, overwrite: bool = False) -> tuple[Array, Array]:
         """Coarse poles and details of poles ``c`` along ``axis``; they may take its place if ``overwrite`` says so."""
         c = np.asarray(c, dtype=float)
         if c.shape[axis] != self.fine.count:
             raise UsageError(f"{c.shape[axis]} poles along axis {axis} where the knots want {self.fine.count}")
-        both = self._solver.solve(c, axis, overwrite)
-        return _part(both, axis, slice(None, self._m)), _part(both, axis, slice(self._m, None))
+        coarse, detail = slice(None, self._m), slice(self._m, None)
+        if self.exact:
+            both = self._solver.solve(c, axis, overwrite)
+            return _part(both, axis, coarse), _part(both, axis, detail)
+        best = projection(self.coarse, self.fine).coarse(c, axis)
+        rest = c - refinement(self.coarse, self.fine).apply(best, axis)
+        found = _part(self._solver.solve(rest, axis), axis, detail)
+        left = rest - self.synthesise(np.zeros_like(best), found, axis)
+        helps = np.abs(left).max(initial=0) < 0.1 * np.abs(rest).max(initial=0)
+        return best, found if helps else np.zeros_like(found)
 
     def synthesise(self, coarse: Array, detail: Array, axis: int = 0, out: Array | None = None) -> Array:
         """The poles with the given coarse poles and details along ``axis``.

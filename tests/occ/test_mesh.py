@@ -31,7 +31,7 @@ def is_watertight(triangles):
 @pytest.mark.parametrize("unit", ["MM", "M"])
 def test_a_box_is_watertight_and_in_millimetres(tmp_path, unit):
     document = occ.read_step(shapes.save(BRepPrimAPI_MakeBox(1, 2, 3).Shape(), tmp_path / "in.step", unit))
-    occ.write_stl(document, tmp_path / "out.stl")
+    assert occ.write_stl(document, tmp_path / "out.stl") == ()
     triangles = corners(tmp_path / "out.stl")
     assert is_watertight(triangles) and len(triangles) == 12
     assert triangles.reshape(-1, 3).max(axis=0) == pytest.approx([1, 2, 3], rel=1e-6)
@@ -51,6 +51,12 @@ def test_finer_settings_give_more_triangles_and_text_says_the_same(tmp_path):
     occ.write_stl(document, tmp_path / "text.stl", ascii=True)
     text = (tmp_path / "text.stl").read_text()
     assert text.startswith("solid mracad\n") and text.count("facet normal") == sizes[3]
+
+
+def test_a_face_that_cannot_be_meshed_is_named(tmp_path):
+    box = BRepPrimAPI_MakeBox(1, 2, 3).Shape()
+    bare = shapes.document(box).faces[2].EmptyCopied()  # no boundary at all
+    assert occ.write_stl(shapes.document(shapes.compound(box, bare)), tmp_path / "out.stl") == (6,)
 
 
 def test_bad_settings_and_targets(tmp_path):

@@ -8,7 +8,7 @@ from mracad.bspline.knots import KnotVector
 from mracad.bspline.refine import refinement
 from mracad.errors import UsageError
 from mracad.wavelet import transform as module
-from mracad.wavelet.ladder import rungs_by_level
+from mracad.wavelet.ladder import ladder_for_scale, rungs_by_level
 from mracad.wavelet.project import projection
 from mracad.wavelet.transform import Chain, decompose, reconstruct, step
 from tests.bspline.spaces import KINDS, random_knots
@@ -38,6 +38,18 @@ def test_perfect_reconstruction_with_near_duplicate_knots(degree, gap):
     c = np.random.default_rng(0).standard_normal((kv.count, 3))
     for lengths in (None, np.diff(breaks)):
         assert relative(reconstruct(decompose(c, rungs_by_level(kv, lengths=lengths))), c) < 1e-12
+
+
+@pytest.mark.parametrize("degree", [3, 9, 15, 22])
+def test_spans_of_all_sizes(degree):
+    # Wavelets are all but dependent here at high degree: reconstruction and the coarse surface must not suffer.
+    spans = 10 ** np.random.default_rng(0).uniform(-4, 0.3, 150)
+    fine = KnotVector.clamped(np.concatenate([[0], np.cumsum(spans)]), degree)
+    coarse = ladder_for_scale(fine, spans, 20.0)
+    c = np.random.default_rng(0).standard_normal((fine.count, 3))
+    pyramid = decompose(c, [fine, coarse])
+    assert relative(reconstruct(pyramid), c) < 1e-12
+    assert relative(reconstruct(pyramid, 1), projection(coarse, fine).apply(c)) < 1e-3
 
 
 @given(pairs())

@@ -43,9 +43,8 @@ def command(source: str, input_unit: str | None, as_json: bool, **given: Any) ->
         f"{model.name}: {render.plural(valid.solids, 'solid')}, {render.plural(valid.shells, 'shell')}, "
         f"{render.plural(valid.faces, 'face')}, {render.plural(valid.free_edges, 'free edge')}"
     )
-    print(
-        f"valid: {render.verdict(valid.valid)}; largest tolerance {render.mm(max(valid.edge_tolerance, valid.vertex_tolerance))}"
-    )
+    tolerance = max(valid.edge_tolerance, valid.vertex_tolerance)
+    print(f"valid: {render.verdict(valid.valid)}; largest tolerance {render.mm(tolerance)}")
     print(render.seam_line(totals))
     for failure in failures:
         print(f"failed: {failure}")
