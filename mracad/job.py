@@ -7,11 +7,10 @@ import time
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from mracad.audit.continuity import SeamMeasure, key, seams, summary
 from mracad.audit.deviation import Deviation, deviations
-from mracad.audit.verdict import Verdict
 from mracad.edit.result import Edit
 from mracad.errors import EditError
 from mracad.model import Model
@@ -57,6 +56,26 @@ class Report:
 
 
 @dataclass(frozen=True)
+class Checked:
+    """What a check found.
+
+    Attributes
+    ----------
+    failures : sequence of str
+        What does not hold, one line each; empty when the check is passed.
+    facts : object
+        What was measured, as the check has it.
+    """
+
+    failures: Sequence[str]
+    facts: Any
+
+    @property
+    def passed(self) -> bool:
+        return not self.failures
+
+
+@dataclass(frozen=True)
 class Inspection:
     """What ``check`` looked at: the seams, those of them meant to be smooth, and the kernel's verdict."""
 
@@ -68,7 +87,7 @@ class Inspection:
 
 def play(
     document: Document, steps: Sequence[Step], *, progress: Progress | None = None, apply: bool = True
-) -> list[Report | Verdict]:
+) -> list[Report | Checked]:
     """Take a document through steps, in memory, up to the first check that fails.
 
     Parameters
@@ -81,7 +100,7 @@ def play(
 
     Returns
     -------
-    list of Report and Verdict
+    list of Report and Checked
         One for each step that was done.
 
     Raises
@@ -89,23 +108,23 @@ def play(
     EditError
         As :func:`run`.
     """
-    results: list[Report | Verdict] = []
+    results: list[Report | Checked] = []
     for step in steps:
         module, _, name = step.options.function.partition(":")
         function = getattr(importlib.import_module(module), name)
-        result: Report | Verdict
+        result: Report | Checked
         if isinstance(step.options, Selection):
             put = apply or step is not steps[-1]
             result = run(document, function, step.options, progress=progress, apply=put)
         else:
             result = function(document, step.options, progress=progress)
         results.append(result)
-        if isinstance(result, Verdict) and not result.passed:
+        if isinstance(result, Checked) and not result.passed:
             break
     return results
 
 
-def check(document: Document, options: Check, *, progress: Progress | None = None) -> Verdict:
+def check(document: Document, options: Check, *, progress: Progress | None = None) -> Checked:
     """Check validity and continuity of a document against limits; the facts are an :class:`Inspection`."""
     from mracad.occ.check import check as valid_by_kernel
     from mracad.occ.view import view
@@ -129,7 +148,7 @@ def check(document: Document, options: Check, *, progress: Progress | None = Non
         failures += [f"gap {m.gap:.3g} mm between {_sides(m)}" for m in measures if m.gap > widest]
     if options.max_angle is not None:
         failures += [f"angle {m.angle:.2g}° between {_sides(m)}" for m in meant if m.angle > options.max_angle]
-    return Verdict(failures, Inspection(model, measures, meant, valid))
+    return Checked(failures, Inspection(model, measures, meant, valid))
 
 
 def _sides(measure: SeamMeasure) -> str:
@@ -164,6 +183,7 @@ def run(
         The document must then not be written.
     """
     from mracad.occ.apply import apply as put
+    from mracad.occ.apply import restore
     from mracad.occ.check import check
     from mracad.occ.select import select_cq
     from mracad.occ.view import view
@@ -184,20 +204,46 @@ def run(
     convertible = {i for i in chosen - held if model.faces[i].surface is None}
     if convertible:
         model = view(document, convert=convertible)
-    before = seams(model)
-    stage("checking the input")(0, 1)
-    valid_before = check(document)
-    result = edit(model, options, faces=chosen, held=held, progress=stage("editing"))
-    _refuse_if_stuck(model, result)
-    after = seams(result.displacement.applied(model))
-    moved = deviations(model, result.displacement)
-    valid_after = valid_before
-    if apply and result.displacement.offsets:
+    before: list[SeamMeasure] = []
+    valid_before: Validity | None = None
+    spoiled: set[int] = set()
+    while True:
+        result = edit(model, options, faces=chosen, held=held | spoiled, progress=stage("editing"))
+        result = _named(result, spoiled)
+        _refuse_if_stuck(model, result)
+        if valid_before is None:
+            before = seams(model)
+            stage("checking the input")(0, 1)
+            valid_before = check(document)
+        valid_after = valid_before
+        if not (apply and result.displacement.offsets):
+            break
         put(document, model, result.displacement)
         stage("checking the result")(0, 1)
         touched = {f for i in result.displacement.offsets for f in model.surfaces[i].faces}
-        valid_after = _judged(model, valid_before, check(document, faces=touched), touched)
-    return Report(model, result, moved, before, after, valid_before, valid_after, time.perf_counter() - start)
+        moved = check(document, faces=touched)
+        worse = _worse(valid_before, moved)
+        if not worse:
+            valid_after = _verdict(valid_before, moved, touched)
+            break
+        restore(document, model, result.displacement)
+        if not worse <= touched - spoiled:
+            raise EditError(
+                f"{model.name}: the result would be less valid",
+                "leave faces out with --faces '!#N', or use --amount 0.5",
+            )
+        spoiled |= worse
+    after = seams(result.displacement.applied(model)) if result.displacement.offsets else before
+    return Report(
+        model,
+        result,
+        deviations(model, result.displacement),
+        before,
+        after,
+        valid_before,
+        valid_after,
+        time.perf_counter() - start,
+    )
 
 
 def _refuse_if_stuck(model: Model, result: Edit) -> None:
@@ -210,24 +256,29 @@ def _refuse_if_stuck(model: Model, result: Edit) -> None:
         )
 
 
-def _judged(model: Model, before: Validity, moved: Validity, touched: set[int]) -> Validity:
-    """The verdict after an edit, from the check before it and that of the faces that moved.
+def _named(result: Edit, spoiled: set[int]) -> Edit:
+    """The outcomes with the reason for which ``spoiled`` faces were left."""
+    if not spoiled:
+        return result
+    return replace(
+        result,
+        outcomes=tuple(
+            replace(o, status="stuck", reason="its result would not be valid") if o.face in spoiled else o
+            for o in result.outcomes
+        ),
+    )
 
-    Raises
-    ------
-    EditError
-        When something fails that did not before.
-    """
-    known = Counter(before.failures)
-    fresh = list((Counter(moved.failures) - known).elements())
-    if fresh or moved.free_edges > before.free_edges:
-        what = str(fresh[0]) if fresh else "new free edges"
-        raise EditError(
-            f"{model.name}: the result would be less valid ({what})",
-            "leave that face out with --faces '!#N', or use --amount 0.5 or a smaller scale",
-        )
-    rest = tuple(f for f in before.failures if f.face not in touched)
-    failures = rest + moved.failures
+
+def _worse(before: Validity, after: Validity) -> set[int]:
+    """Faces with a failure that they did not have before (-1 for one that belongs to no face)."""
+    fresh = Counter(after.failures) - Counter(before.failures)
+    lost = {-1} if after.free_edges > before.free_edges else set()
+    return lost | {-1 if failure.face is None else failure.face for failure in fresh}
+
+
+def _verdict(before: Validity, moved: Validity, touched: set[int]) -> Validity:
+    """The verdict on the whole after an edit, from the check before it and that of the faces that moved."""
+    failures = tuple(f for f in before.failures if f.face not in touched) + moved.failures
     return replace(
         before,
         valid=not failures,

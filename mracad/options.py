@@ -10,6 +10,7 @@ import math
 import re
 import types
 import typing
+from collections.abc import Mapping
 from functools import cache
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -20,7 +21,7 @@ from mracad.errors import UsageError
 MILLIMETRES = {"um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4, "ft": 304.8, "yd": 914.4, "mi": 1609344.0}
 """Length units by name, in millimetres."""
 
-_LENGTH = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([a-zA-Z]*|%)\s*")
+_QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([a-zA-Z]*|%)\s*")
 
 
 def length(text: str, diagonal: float, name: str) -> float:
@@ -31,7 +32,7 @@ def length(text: str, diagonal: float, name: str) -> float:
     UsageError
         When it is not a positive finite length.
     """
-    match = _LENGTH.fullmatch(str(text))
+    match = _QUANTITY.fullmatch(str(text))
     hint = f"write {name} as 5mm, 0.2in or 2% (of the model's diagonal)"
     if not match or (match[2] not in {"", "%"} and match[2] not in MILLIMETRES):
         raise UsageError(f"{name}: {text!r} is not a length", hint)
@@ -39,6 +40,30 @@ def length(text: str, diagonal: float, name: str) -> float:
     if not (math.isfinite(value) and value > 0):
         raise UsageError(f"{name}: {text!r} is not greater than zero", hint)
     return value
+
+
+SECONDS = {"s": 1.0, "min": 60.0, "h": 3600.0}
+"""Units of time by name, in seconds."""
+
+BYTES = {"KB": 10**3, "MB": 10**6, "GB": 10**9, "TB": 10**12}
+"""Units of memory by name, in bytes."""
+
+
+def duration(text: str, name: str) -> float:
+    """Seconds from ``"90"``, ``"90s"``, ``"10min"`` or ``"2h"``; raises UsageError."""
+    return _quantity(text, {"": 1.0, **SECONDS}, name, "write it as 90s, 10min or 2h")
+
+
+def memory(text: str, name: str) -> int:
+    """Bytes from ``"500MB"`` or ``"2GB"``; raises UsageError."""
+    return int(_quantity(text.upper(), BYTES, name, "write it as 500MB or 2GB"))
+
+
+def _quantity(text: str, units: Mapping[str, float], name: str, hint: str) -> float:
+    match = _QUANTITY.fullmatch(text)
+    if not match or match[2] not in units or not 0 < float(match[1]) < math.inf:
+        raise UsageError(f"{name}: {text!r} is not right", hint)
+    return float(match[1]) * units[match[2]]
 
 
 Length = Annotated[

@@ -21,6 +21,7 @@ import shlex
 import typing
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any, Literal
 
@@ -347,6 +348,7 @@ def record_of(steps: Iterable[Step]) -> str:
     return "\n".join(lines) + "\n"
 
 
+@cache
 def versions() -> dict[str, str]:
     """Versions of what decides the result."""
     from importlib import metadata  # slow to load, as the command line's help need not be

@@ -706,10 +706,13 @@ def blade() -> Document:
 # ---------------------------------------------------------------------------------------------------------------------
 
 
+INCH = 25.4
+
+
 def placed(x: float, y: float, z: float) -> TopLoc_Location:
-    """Return a shift."""
+    """Return a shift by inches."""
     move = gp_Trsf()
-    move.SetTranslation(gp_Vec(x, y, z))
+    move.SetTranslation(gp_Vec(x * INCH, y * INCH, z * INCH))
     return TopLoc_Location(move)
 
 
@@ -718,7 +721,7 @@ def assembly() -> Document:
 
     Parts and instances have names; each part has a colour, the top of the pad its own; the base plate is on a layer.
     """
-    made = blank("fixture", Units("in", 25.4))
+    made = blank("fixture", Units("in", INCH))
     shapes = made.shape_tool
     colours = XCAFDoc_DocumentTool.ColorTool_s(made.xcaf.Main())
     layers = XCAFDoc_DocumentTool.LayerTool_s(made.xcaf.Main())
@@ -739,12 +742,13 @@ def assembly() -> Document:
             name(shapes.AddComponent(label, item, placed(*place)), instance)
         return label
 
-    net = rough_top(501, (2.0, 1.0), (26, 14), 0.4, 0.003, 12)
+    net = rough_top(501, (50.75, 25.5), (26, 14), 10.0, 0.075)
     body = block(surface(net[2], net[0], net[1]), [list(natural_rims(net).values())])
     axis = gp_Ax2(gp_Pnt(0, 0, 0), gp_Dir(0, 0, 1))
-    plate = part(BRepPrimAPI_MakeBox(gp_Pnt(0, 0, 0), 7.0, 4.0, 0.5).Shape(), "base plate", 0.0, 1.0, 0.0)
+    box = BRepPrimAPI_MakeBox(gp_Pnt(0, 0, 0), 7.0 * INCH, 4.0 * INCH, 0.5 * INCH)
+    plate = part(box.Shape(), "base plate", 0.0, 1.0, 0.0)
     pad = part(body, "pad", 0.0, 0.0, 1.0)
-    pin = part(BRepPrimAPI_MakeCylinder(axis, 0.25, 1.5).Shape(), "pin", 1.0, 1.0, 0.0)
+    pin = part(BRepPrimAPI_MakeCylinder(axis, 0.25 * INCH, 1.5 * INCH).Shape(), "pin", 1.0, 1.0, 0.0)
     paint(shapes.AddSubShape(pad, TopExp_Explorer(body, TopAbs_FACE).Current()), 1.0, 0.0, 0.0)
     layers.SetLayer(plate, TCollection_ExtendedString("tooling"))
     pair = group("pad pair", [(pad, "pad left", (0.0, 0.0, 0.0)), (pad, "pad right", (3.0, 0.0, 0.0))])

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import importlib
-import json
 import os
-import pkgutil
 import sys
 from collections.abc import Sequence
 
@@ -43,7 +41,8 @@ class Commands(click.Group):
 
 
 def _modules() -> set[str]:
-    return {module.name for module in pkgutil.iter_modules(commands.__path__)}
+    files = os.listdir(commands.__path__[0])
+    return {name.removesuffix(".py") for name in files if name.endswith(".py") and name[0] != "_"}
 
 
 @click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 120})
@@ -86,6 +85,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             "please report it with the output of --debug",
         )
     if "--json" in arguments:
+        import json
+
         body = {"code": int(failure.code), "message": failure.message, "hint": failure.hint}
         click.echo(json.dumps({"error": body}, ensure_ascii=False))
     click.echo(f"mracad: {' '.join(str(failure).split())}", err=True)

@@ -27,19 +27,23 @@ def read(source: str, input_unit: str | None) -> Document:
     return read_step(source, input_unit)
 
 
+def check_target(path: Path, overwrite: bool) -> None:
+    """Refuse an output that could not be written, or that exists already."""
+    if path.is_dir():
+        raise FileError(f"cannot write {path}: it is a directory", "name a file in it")
+    if not path.parent.is_dir():
+        raise FileError(f"cannot write {path}: there is no folder {path.parent}", "create it first")
+    if not os.access(path.parent, os.W_OK):
+        raise FileError(f"cannot write {path}: the folder is not writable", "choose another one")
+    if path.exists() and not overwrite:
+        raise UsageError(f"{path} exists", "give --overwrite to replace it")
+
+
 def write_text(path: Path, text: str) -> None:
     """Write a text file whole or not at all."""
-    from mracad.occ.output import put
+    from mracad.output import put
 
     put(text.encode(), path)
-
-
-def holds(path: Path, data: bytes) -> bool:
-    """Whether a file exists and has this content already."""
-    try:
-        return path.stat().st_size == len(data) and path.read_bytes() == data
-    except OSError:
-        return False
 
 
 def depfile_text(outputs: Iterable[str], inputs: Iterable[str]) -> str:
@@ -78,25 +82,18 @@ class Outputs:
 
     def check_report(self, path: str) -> None:
         """Refuse a report that could not be written."""
-        self._check(Path(path), ending=False)
+        check_target(Path(path), self.overwrite)
 
-    def _check(self, path: Path, ending: bool = True) -> None:
-        if ending and path.suffix.lower() not in STEP | STL:
+    def _check(self, path: Path) -> None:
+        if path.suffix.lower() not in STEP | STL:
             raise FileError(f"cannot write {path}: unknown ending {path.suffix!r}", "end it in .step, .stp or .stl")
-        if path.is_dir():
-            raise FileError(f"cannot write {path}: it is a directory", "name a file in it")
-        if not path.parent.is_dir():
-            raise FileError(f"cannot write {path}: there is no folder {path.parent}", "create it first")
-        if not os.access(path.parent, os.W_OK):
-            raise FileError(f"cannot write {path}: the folder is not writable", "choose another one")
-        if path.exists() and not self.overwrite:
-            raise UsageError(f"{path} exists", "give --overwrite to replace it")
+        check_target(path, self.overwrite)
 
     def write(self, document: Document, title: str) -> None:
         """Write the document to every output; none is replaced unless all could be made."""
         from mracad.occ.mesh import write_stl
-        from mracad.occ.output import beside
         from mracad.occ.write import write_step
+        from mracad.output import beside, holds
 
         made: dict[str, bytes] = {}
         for path in self.paths:

@@ -7,13 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 import msgspec
 
-from mracad.audit.verdict import Verdict
 from mracad.options import Selection
 
 if TYPE_CHECKING:
     from mracad.audit.continuity import SeamMeasure, SeamSummary
     from mracad.edit.result import FaceOutcome
-    from mracad.job import Report
+    from mracad.job import Checked, Report
     from mracad.occ.check import Validity
     from mracad.recipe import Step
 
@@ -45,9 +44,11 @@ def verdict(valid: bool) -> str:
     return "yes" if valid else "no"
 
 
-def step_lines(step: Step, result: Report | Verdict) -> list[str]:
+def step_lines(step: Step, result: Report | Checked) -> list[str]:
     """What a step of a recipe did; its first line begins with the step's name."""
-    if not isinstance(result, Verdict):
+    from mracad.job import Report
+
+    if isinstance(result, Report):
         assert isinstance(step.options, Selection)
         first, *rest = edit_lines(result, step.options, f"{result.seconds:.1f} s")
         return [f"{step.id}: {first}", *(f"  {line}" for line in rest)]
@@ -119,17 +120,19 @@ def seam(value: SeamMeasure) -> dict[str, Any]:
     """One seam; its faces by number."""
     return {
         **plain(value),
-        "edge": value.edge + 1 if value.sewn else None,
+        "edge": value.edge + 1,
         "faces": [i + 1 for i in value.faces],
         "smooth": value.smooth,
     }
 
 
-def result(value: Report | Verdict) -> dict[str, Any]:
+def result(value: Report | Checked) -> dict[str, Any]:
     """What a step did, in full."""
-    if isinstance(value, Verdict):
-        return {"passed": value.passed, "failures": list(value.failures)}
-    return report(value)
+    from mracad.job import Report
+
+    if isinstance(value, Report):
+        return report(value)
+    return {"passed": value.passed, "failures": list(value.failures)}
 
 
 def report(value: Report) -> dict[str, Any]:

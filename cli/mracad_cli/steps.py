@@ -61,7 +61,6 @@ def run_steps(
     **formats: Any,
 ) -> int:
     """Take one file through steps; without a recipe they are the one edit of a command."""
-    from mracad.audit.verdict import Verdict
     from mracad.recipe import record_of, title
     from mracad_cli import render
 
@@ -79,7 +78,7 @@ def run_steps(
         from mracad import job
 
         results = job.play(document, steps, progress=progress, apply=not dry_run)
-        failed = isinstance(results[-1], Verdict) and not results[-1].passed
+        failed = isinstance(results[-1], job.Checked) and not results[-1].passed
         written = not (dry_run or failed)
         if written:
             progress("writing", 0, 1)

@@ -28,7 +28,7 @@ class SeamMeasure:
     Attributes
     ----------
     edge : int
-        Index in ``Model.edges``; -1 for a seam of two coinciding free edges.
+        Index in ``Model.edges``; of the shorter one for a seam of two coinciding free edges.
     faces : (int, int)
         Indices of the two faces; the same twice for a closing edge.
     gap, mean_gap : float
@@ -71,10 +71,12 @@ def seams(model: Model) -> list[SeamMeasure]:
     pairs = [(edge, *edge.sides) for edge in model.edges if len(edge.sides) == 2 and not edge.degenerate]
     pairs = [pair for pair in pairs if len(pair[0].points) and _nurbs(pair)]
     jets = _evaluate(model, [side for _, *sides in pairs for side in sides])
-    found = [_measure(edge, edge.index, (a, b), jets[2 * i], jets[2 * i + 1]) for i, (edge, a, b) in enumerate(pairs)]
+    found = [_measure(edge, True, (a, b), jets[2 * i], jets[2 * i + 1]) for i, (edge, a, b) in enumerate(pairs)]
     matched = [m for m in coinciding(model) if _nurbs((m[0], m[1], m[2]))]
     jets = _evaluate(model, [side for _, *sides in matched for side in sides])
-    return found + [_measure(edge, -1, (a, b), jets[2 * i], jets[2 * i + 1]) for i, (edge, a, b) in enumerate(matched)]
+    return found + [
+        _measure(edge, False, (a, b), jets[2 * i], jets[2 * i + 1]) for i, (edge, a, b) in enumerate(matched)
+    ]
 
 
 def summary(measures: list[SeamMeasure], smooth: frozenset[tuple[int, tuple[int, int]]] | None = None) -> SeamSummary:
@@ -98,7 +100,7 @@ def _nurbs(pair: tuple[Edge, Side, Side]) -> bool:
     return pair[1].uv is not None or pair[2].uv is not None
 
 
-def _measure(edge: Edge, index: int, sides: tuple[Side, Side], a: Array, b: Array) -> SeamMeasure:
+def _measure(edge: Edge, sewn: bool, sides: tuple[Side, Side], a: Array, b: Array) -> SeamMeasure:
     """``a`` and ``b``: points and normals ``(2, k, 3)`` of the sides at the edge's samples."""
     apart = a[0] - b[0]
     apart -= (apart * edge.tangents).sum(axis=1, keepdims=True) * edge.tangents
@@ -107,14 +109,14 @@ def _measure(edge: Edge, index: int, sides: tuple[Side, Side], a: Array, b: Arra
     known = ~np.isnan(angles)
     worst = int(np.nanargmax(angles)) if known.any() else 0
     return SeamMeasure(
-        edge=index,
+        edge=edge.index,
         faces=(sides[0].face, sides[1].face),
         gap=float(gaps.max()),
         mean_gap=float(gaps.mean()),
         angle=float(angles[worst]),
         mean_angle=float(angles[known].mean()) if known.any() else float("nan"),
         where=tuple(float(x) for x in edge.points[worst]),  # type: ignore[arg-type]
-        sewn=index >= 0,
+        sewn=sewn,
     )
 
 

@@ -77,7 +77,7 @@ class Pool(Executor):
         Called once in each worker before its first task; must be importable.
     """
 
-    def __init__(self, workers: int, limits: Limits = Limits(), warm: Callable[[], object] | None = None) -> None:  # noqa: B008
+    def __init__(self, workers: int, limits: Limits = Limits(), warm: Callable[[], object] | None = None) -> None:
         self.workers = workers
         self._seconds = limits.seconds
         self._memory = limits.memory or int(0.8 * psutil.virtual_memory().total / workers)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
 from mracad.bspline.knots import Array, KnotVector, Side
@@ -72,6 +74,12 @@ def gauss(kv: KnotVector, points: int) -> tuple[Array, Array, Array]:
     offset, weight : ndarray (s, points)
         Parameters relative to the span's first knot, and quadrature weights in parameter units.
     """
-    nodes, weights = np.polynomial.legendre.leggauss(points)
+    nodes, weights = _legendre(points)
     lengths = np.diff(kv.breaks)[:, None]
     return kv.span_index, 0.5 * lengths * (nodes + 1), 0.5 * lengths * weights
+
+
+@lru_cache(maxsize=32)
+def _legendre(points: int) -> tuple[Array, Array]:
+    """Nodes and weights of the Gauss–Legendre rule on [-1, 1]."""
+    return np.polynomial.legendre.leggauss(points)

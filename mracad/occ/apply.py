@@ -21,7 +21,7 @@ from mracad.model import Displacement, Model, Offset, Surface
 from mracad.occ.convert import lay
 from mracad.occ.document import Document
 from mracad.occ.follow import follow
-from mracad.occ.geometry import basis, nets
+from mracad.occ.geometry import basis, nets, spline
 from mracad.occ.settings import quiet
 from mracad.occ.topology import edge_uses
 
@@ -56,6 +56,22 @@ def apply(document: Document, model: Model, displacement: Displacement) -> None:
             follow(document, _moved_edges(model, displacement))
 
 
+def restore(document: Document, model: Model, displacement: Displacement) -> None:
+    """Undo :func:`apply`: every control point gets its old bits, refined surfaces give way to the old ones.
+
+    Faces that were converted stay on their (undisplaced) NURBS surfaces.
+    """
+    with quiet():
+        for index in sorted(displacement.offsets):
+            surface = model.surfaces[index]
+            handle = basis(BRep_Tool.Surface_s(document.faces[surface.faces[0]], TopLoc_Location()))
+            if nets([handle])[0].poles.shape == surface.net.poles.shape:
+                _set(handle, np.argwhere(displacement.offsets[index].poles.any(axis=2)), surface.net.poles)
+            else:
+                _lay_all(document, surface, spline(surface.net))
+        follow(document, _moved_edges(model, displacement))
+
+
 def _handle(document: Document, surface: Surface, refined: bool) -> Geom_BSplineSurface | Geom_BezierSurface:
     """The kernel's surface to be moved, put on its faces where it is new to them."""
     first = surface.faces[0]
@@ -66,12 +82,17 @@ def _handle(document: Document, surface: Surface, refined: bool) -> Geom_BSpline
     handle = basis(BRep_Tool.Surface_s(document.faces[first], TopLoc_Location()))
     if not (refined and isinstance(handle, Geom_BezierSurface)):
         return handle
-    spline = GeomConvert.SurfaceToBSplineSurface_s(handle)
+    converted = GeomConvert.SurfaceToBSplineSurface_s(handle)
+    _lay_all(document, surface, converted)
+    return converted
+
+
+def _lay_all(document: Document, surface: Surface, handle: Geom_BSplineSurface) -> None:
+    """Put all faces of a surface on another one with the same parameters."""
     for face in (TopoDS.Face_s(document.faces[index].Oriented(TopAbs_FORWARD)) for index in surface.faces):
         edges = list(edge_uses(face))
         pcurves = [BRep_Tool.CurveOnSurface_s(edge, face, 0.0, 0.0) for edge in edges]
-        lay(face, spline, pcurves, [BRep_Tool.Tolerance_s(edge) for edge in edges])
-    return spline
+        lay(face, handle, pcurves, [BRep_Tool.Tolerance_s(edge) for edge in edges])
 
 
 def _refine(surface: Geom_BSplineSurface, offset: Offset) -> None:
@@ -92,9 +113,12 @@ def _move(surface: Geom_BSplineSurface | Geom_BezierSurface, offset: Offset) -> 
     poles = nets([surface])[0].poles
     if poles.shape != offset.poles.shape:
         raise MracadError(f"offsets of shape {offset.poles.shape} for a surface of {poles.shape} control points")
-    moved = np.argwhere(offset.poles.any(axis=2))
-    new = poles[tuple(moved.T)] + offset.poles[tuple(moved.T)]
-    for (i, j), pole in zip((moved + 1).tolist(), new.tolist(), strict=True):
+    _set(surface, np.argwhere(offset.poles.any(axis=2)), poles + offset.poles)
+
+
+def _set(surface: Geom_BSplineSurface | Geom_BezierSurface, places: Array, poles: Array) -> None:
+    """Set the control points at ``places`` (k, 2) to those of ``poles`` (nu, nv, 3)."""
+    for (i, j), pole in zip((places + 1).tolist(), poles[tuple(places.T)].tolist(), strict=True):
         surface.SetPole(i, j, gp_Pnt(*pole))
 
 

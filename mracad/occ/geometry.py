@@ -14,6 +14,9 @@ from OCP.BinTools import BinTools_Curve2dSet, BinTools_SurfaceSet
 from OCP.Geom import Geom_BezierSurface, Geom_BSplineSurface, Geom_RectangularTrimmedSurface, Geom_Surface
 from OCP.Geom2d import Geom2d_BSplineCurve, Geom2d_Curve, Geom2d_Line, Geom2d_TrimmedCurve
 from OCP.Geom2dConvert import Geom2dConvert
+from OCP.gp import gp_Pnt
+from OCP.TColgp import TColgp_Array2OfPnt
+from OCP.TColStd import TColStd_Array1OfInteger, TColStd_Array1OfReal, TColStd_Array2OfReal
 
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.net import Curve, Net
@@ -48,6 +51,33 @@ def nets(surfaces: Sequence[Geom_Surface]) -> list[Net]:
         collection.Add(surface)
     stream = _Stream(collection)
     return [_net(stream, isinstance(surface, Geom_BezierSurface)) for surface in surfaces]
+
+
+def spline(net: Net) -> Geom_BSplineSurface:
+    """The kernel's surface over a control net."""
+    poles = TColgp_Array2OfPnt(1, net.u.count, 1, net.v.count)
+    weights = TColStd_Array2OfReal(1, net.u.count, 1, net.v.count)
+    given = np.ones(net.poles.shape[:2]) if net.weights is None else net.weights
+    for (i, j), weight in np.ndenumerate(given):
+        poles.SetValue(i + 1, j + 1, gp_Pnt(*net.poles[i, j].tolist()))
+        weights.SetValue(i + 1, j + 1, float(weight))
+    (u, u_mults), (v, v_mults) = _multiplicities(net.u), _multiplicities(net.v)
+    directions = net.u.degree, net.v.degree, net.u.periodic, net.v.periodic
+    if net.weights is None:
+        return Geom_BSplineSurface(poles, u, v, u_mults, v_mults, *directions)
+    return Geom_BSplineSurface(poles, weights, u, v, u_mults, v_mults, *directions)
+
+
+def _multiplicities(knots: KnotVector) -> tuple[TColStd_Array1OfReal, TColStd_Array1OfInteger]:
+    """Distinct knots and their multiplicities as the kernel wants them."""
+    values, counts = knots.breaks, knots.multiplicities
+    if not knots.periodic:
+        values, counts = np.unique(knots.knots, return_counts=True)
+    breaks, mults = TColStd_Array1OfReal(1, len(values)), TColStd_Array1OfInteger(1, len(values))
+    for i, (value, count) in enumerate(zip(values.tolist(), counts.tolist(), strict=True), 1):
+        breaks.SetValue(i, value)
+        mults.SetValue(i, count)
+    return breaks, mults
 
 
 def curves(pieces: Sequence[tuple[Geom2d_Curve, float, float]]) -> list[Curve]:

@@ -2,23 +2,24 @@
 
 from __future__ import annotations
 
-import json
 from typing import Any
 
 import click
 
 from mracad.options import Check
 from mracad_cli import options, render
-from mracad_cli.files import read
 from mracad_cli.progress import Progress
 
 
 @click.command(help=__doc__)
 @options.apply(options.reading, options.of(Check), options.printing)
 def command(source: str, input_unit: str | None, as_json: bool, **given: Any) -> int:
+    import json
+
     from mracad import job
     from mracad.audit.continuity import key, summary
     from mracad.recipe import options as options_of
+    from mracad_cli.files import read
 
     limits = options_of("check", given)
     assert isinstance(limits, Check)

@@ -59,6 +59,14 @@ def put(data: bytes, target: str | os.PathLike | BinaryIO) -> None:
         raise FileError(f"cannot write the output: {error.strerror or error}", "check where it leads") from error
 
 
+def holds(path: Path, data: bytes) -> bool:
+    """Whether a file exists and has this content already."""
+    try:
+        return path.stat().st_size == len(data) and path.read_bytes() == data
+    except OSError:
+        return False
+
+
 def _mode(path: Path) -> int:
     """The permissions of the file that is replaced, or those that a new file gets."""
     if path.exists():
