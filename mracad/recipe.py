@@ -405,9 +405,9 @@ def _property(part: dict[str, Any], is_length: bool) -> dict[str, Any]:
     return found
 
 
-def reference() -> str:
-    """Every step with its options, as Markdown."""
-    lines = []
+def page() -> str:
+    """Every step with its options, as the Markdown page ``docs/steps.md``."""
+    lines = ["# Steps of recipes", "", "Made by `make docs` from `mracad/options.py`; see [recipes](recipes.md).", ""]
     for use, definition in schema()["$defs"].items():
         lines += [f"## {use}", "", definition["description"], "", "| option | default | |", "|---|---|---|"]
         for name, part in definition["properties"].items():
@@ -425,7 +425,7 @@ def nearest(word: str, known: Iterable[str], otherwise: str = "") -> str:
     import difflib
 
     names = list(known)
-    near = difflib.get_close_matches(word, names, n=1, cutoff=0.5)
+    near = difflib.get_close_matches(word, names, n=1)
     return f"did you mean {near[0]!r}?" if near else otherwise or "use one of " + ", ".join(names)
 
 

@@ -14,8 +14,12 @@ from pathlib import Path
 from types import TracebackType
 
 from mracad.errors import FileError
+from mracad.output import holds, put
 
 NAME = "manifest.jsonl"
+
+UNFINISHED = ".mracad-batch-"
+"""How the names of files begin that a batch is just writing."""
 
 
 class Manifest:
@@ -37,6 +41,8 @@ class Manifest:
         except OSError as error:
             raise FileError(f"cannot write '{path}': {error.strerror}", "choose another folder") from error
         _lock(self._file.fileno(), folder)
+        for left in folder.rglob(f"{UNFINISHED}*"):
+            left.unlink(missing_ok=True)
         self._file.seek(0)
         text = self._file.read()
         for line in text.splitlines():
@@ -68,8 +74,27 @@ class Manifest:
         except OSError:
             return False
 
-    def add(self, output: str, key: str, data: bytes) -> None:
-        """Note an output that is about to be written."""
+    def write(self, output: str, key: str, data: bytes, if_changed: bool = False) -> None:
+        """Note an output and write it, whole or not at all; raises FileError.
+
+        Parameters
+        ----------
+        output : str
+            Relative to the folder.
+        key : str
+            A hash of everything that it depends on.
+        data : bytes
+        if_changed : bool
+            Leave a file alone that has this content.
+        """
+        target = self.folder / output
+        self._note(output, key, data)
+        if not (if_changed and holds(target, data)):
+            with contextlib.suppress(OSError):  # writing says it better
+                target.parent.mkdir(parents=True, exist_ok=True)
+            put(data, target, UNFINISHED)
+
+    def _note(self, output: str, key: str, data: bytes) -> None:
         entry = {"output": output, "key": key, "sha256": digest(data)}
         self._file.write(json.dumps(entry, ensure_ascii=False).encode() + b"\n")
         self._file.flush()

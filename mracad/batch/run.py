@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import glob
 import json
 import os
@@ -14,10 +13,10 @@ from pathlib import Path
 from typing import Any, Literal, Protocol
 
 from mracad.batch.cluster import lost
-from mracad.batch.manifest import Manifest, digest
+from mracad.batch.manifest import UNFINISHED, Manifest, digest
 from mracad.batch.work import Product, Work, do
 from mracad.errors import Code, FileError, MracadError, UsageError
-from mracad.output import holds, put
+from mracad.output import put
 from mracad.recipe import Recipe, record_of
 
 ENDINGS = frozenset({".step", ".stp", ".p21"})
@@ -264,14 +263,9 @@ class _Batch:
     def _written(self, task: _Task, product: Product) -> Outcome:
 
         output = task.item.output
-        target = self.manifest.folder / output
-        with contextlib.suppress(OSError):  # writing says it better
-            target.parent.mkdir(parents=True, exist_ok=True)
-        self.manifest.add(output, task.key, product.data)
-        if not (self.settings.if_changed and holds(target, product.data)):
-            put(product.data, target)
+        self.manifest.write(output, task.key, product.data, self.settings.if_changed)
         if self.settings.record:
-            put(record_of(task.work.steps).encode(), f"{target}.toml")
+            put(record_of(task.work.steps).encode(), self.manifest.folder / f"{output}.toml", UNFINISHED)
         return Outcome(
             task.item.source, output, "done", seconds=product.seconds, attempts=task.attempts, steps=product.steps
         )
