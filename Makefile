@@ -16,7 +16,7 @@ export SOURCE_DATE_EPOCH ?= 0
 
 SAMPLES := $(wildcard samples/*.step)
 
-.PHONY: demo test lint bench samples smooth wheel clean
+.PHONY: demo test lint bench bench-batch docs samples smooth wheel clean
 
 demo: $(VENV)/ready
 	@mkdir -p build
@@ -36,6 +36,14 @@ lint: $(VENV)/dev
 bench: $(VENV)/dev
 	$(BIN)/python benchmarks/transform.py
 	$(BIN)/python benchmarks/command.py
+
+# Batches: what workers gain, kills, a lost cluster worker; some minutes
+bench-batch: $(VENV)/dev
+	$(BIN)/python benchmarks/batch.py
+
+# The page of steps, from their declaration
+docs: $(VENV)/ready
+	$(BIN)/python -c 'from mracad.recipe import page; print(page(), end="")' > docs/steps.md
 
 samples: $(VENV)/ready
 	$(BIN)/python samples/make.py samples

@@ -8,6 +8,7 @@ Both sides of every ratio are measured in this run.  The files are the samples, 
 from __future__ import annotations
 
 import os
+import resource
 import subprocess
 import sys
 import tempfile
@@ -47,13 +48,23 @@ def timed(*words: object) -> float:
     return time.perf_counter() - start
 
 
+def cpu() -> float:
+    """Processor seconds of all children so far."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
+
+
 def workers(folder: Path, files: int) -> None:
     """Two workers against one, whole commands."""
     words = (recipe(folder), models(folder / "in", files), "-O")
+    marks = [cpu()]
     one = timed(*words, folder / "one", "-j", 1)
+    marks.append(cpu())
     two = timed(*words, folder / "two", "-j", 2)
+    marks.append(cpu())
     same = outputs(folder / "one") == outputs(folder / "two")
     print(f"{files} files: -j 1 {one:.1f} s, -j 2 {two:.1f} s: {one / two:.2f} times as fast; same bytes: {same}")
+    print(f"  processor time: -j 1 {marks[1] - marks[0]:.1f} s, -j 2 {marks[2] - marks[1]:.1f} s")
 
 
 def overhead(folder: Path, files: int) -> None:

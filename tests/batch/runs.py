@@ -62,7 +62,7 @@ def start(*words: object, sham: float | None = None) -> subprocess.Popen[str]:
 def batch(*words: object, sham: float | None = None) -> tuple[int, str, str]:
     """Exit code, standard output and standard error of ``mracad batch``."""
     process = start(*words, sham=sham)
-    out, err = process.communicate(timeout=120)
+    out, err = process.communicate()
     return process.returncode, out, err
 
 
