@@ -2,6 +2,8 @@
 #
 #   make demo    set everything up and smooth a sample
 #   make test    set everything up and run the tests
+#   make regress compare every sample with the reference figures in samples/figures.json
+#   make fuzz    feed the commands 2 000 damaged files and kill 200 writers (half an hour)
 #
 # The pattern rule below is the use the tool is for: copy it into a Makefile beside your own models.
 
@@ -16,7 +18,7 @@ export SOURCE_DATE_EPOCH ?= 0
 
 SAMPLES := $(wildcard samples/*.step)
 
-.PHONY: demo test lint bench bench-batch docs samples smooth wheel clean
+.PHONY: demo test regress fuzz lint bench bench-batch docs samples smooth wheel clean
 
 demo: $(VENV)/ready
 	@mkdir -p build
@@ -26,6 +28,13 @@ demo: $(VENV)/ready
 
 test: $(VENV)/dev
 	$(BIN)/python -m pytest -n 2
+
+regress: $(VENV)/ready
+	$(BIN)/python samples/regress.py samples/*.step
+
+fuzz: $(VENV)/dev
+	$(BIN)/python -m tests.robust.mutate 2000
+	$(BIN)/python -m tests.robust.kill 200
 
 lint: $(VENV)/dev
 	$(BIN)/ruff check .

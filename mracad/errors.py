@@ -39,6 +39,16 @@ class MracadError(Exception):
     def __str__(self) -> str:
         return f"{self.message}; {self.hint}" if self.hint else self.message
 
+    def __reduce__(self) -> tuple[object, ...]:
+        return _again, (type(self), self.message, self.hint, self.code)
+
+
+def _again(kind: type[MracadError], message: str, hint: str, code: Code) -> MracadError:
+    """An error as it was, in another process."""
+    error = kind.__new__(kind)
+    MracadError.__init__(error, message, hint, code)
+    return error
+
 
 class UsageError(MracadError, ValueError):
     """A malformed value, an unknown option, face or step."""

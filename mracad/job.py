@@ -7,20 +7,26 @@ import time
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from mracad.audit.continuity import SeamMeasure, key, seams, summary
+from mracad import review
+from mracad.audit.compare import Limits
+from mracad.audit.continuity import SeamMeasure, key, seams
 from mracad.audit.deviation import Deviation, deviations
+from mracad.audit.verdict import Layer, Verdict
 from mracad.edit.result import Edit
-from mracad.errors import EditError
+from mracad.errors import EditError, UsageError
 from mracad.model import Model
-from mracad.options import Check, Selection, length
+from mracad.options import Check, Compare, Selection, length
 from mracad.select import NURBS, select
 
 if TYPE_CHECKING:
     from mracad.occ.check import Validity
     from mracad.occ.document import Document
     from mracad.recipe import Step
+
+Original = Callable[[], "Document"]
+"""Reads a document again as it was."""
 
 Progress = Callable[[str, int, int], None]
 """Called with the name of a stage, the steps done and the steps in all."""
@@ -56,38 +62,30 @@ class Report:
 
 
 @dataclass(frozen=True)
-class Checked:
-    """What a check found.
+class Judged:
+    """What a check or comparison found, and the layers for which it fails."""
 
-    Attributes
-    ----------
-    failures : sequence of str
-        What does not hold, one line each; empty when the check is passed.
-    facts : object
-        What was measured, as the check has it.
-    """
-
-    failures: Sequence[str]
-    facts: Any
+    verdict: Verdict
+    failed: tuple[Layer, ...]
 
     @property
     def passed(self) -> bool:
-        return not self.failures
+        return not self.failed
 
-
-@dataclass(frozen=True)
-class Inspection:
-    """What ``check`` looked at: the seams, those of them meant to be smooth, and the kernel's verdict."""
-
-    model: Model
-    seams: list[SeamMeasure]
-    meant: list[SeamMeasure]
-    valid: Validity
+    @property
+    def failures(self) -> list[str]:
+        """What does not hold, one line each; empty when it is passed."""
+        return [text for layer in self.failed for text in ([f.text for f in layer.findings] or [layer.text])]
 
 
 def play(
-    document: Document, steps: Sequence[Step], *, progress: Progress | None = None, apply: bool = True
-) -> list[Report | Checked]:
+    document: Document,
+    steps: Sequence[Step],
+    *,
+    original: Original | None = None,
+    progress: Progress | None = None,
+    apply: bool = True,
+) -> list[Report | Judged]:
     """Take a document through steps, in memory, up to the first check that fails.
 
     Parameters
@@ -95,12 +93,14 @@ def play(
     document : Document
         Changed in place.
     steps : sequence of Step
+    original : callable, optional
+        Reads the document again as it was, for a comparison.
     apply : bool
         False for a dry run, after which the document must not be written: the last step is not put into it.
 
     Returns
     -------
-    list of Report and Checked
+    list of Report and Judged
         One for each step that was done.
 
     Raises
@@ -108,51 +108,77 @@ def play(
     EditError
         As :func:`run`.
     """
-    results: list[Report | Checked] = []
+    results: list[Report | Judged] = []
     for step in steps:
         module, _, name = step.options.function.partition(":")
         function = getattr(importlib.import_module(module), name)
-        result: Report | Checked
+        result: Report | Judged
         if isinstance(step.options, Selection):
             put = apply or step is not steps[-1]
             result = run(document, function, step.options, progress=progress, apply=put)
         else:
-            result = function(document, step.options, progress=progress)
+            if progress:
+                progress(step.use, 0, 1)
+            result = function(document, step.options, original)
         results.append(result)
-        if isinstance(result, Checked) and not result.passed:
+        if isinstance(result, Judged) and not result.passed:
             break
     return results
 
 
-def check(document: Document, options: Check, *, progress: Progress | None = None) -> Checked:
-    """Check validity and continuity of a document against limits; the facts are an :class:`Inspection`."""
-    from mracad.occ.check import check as valid_by_kernel
-    from mracad.occ.view import view
+def check(document: Document, options: Check, original: Original | None = None, *, text: bytes | None = None) -> Judged:
+    """Check a document.
 
-    model = view(document)
-    widest = None if options.max_gap is None else length(options.max_gap, model.diagonal, "max-gap")
-    measures = seams(model)
-    if progress:
-        progress("checking", 0, 1)
-    valid = valid_by_kernel(document)
-    meant = [m for m in measures if m.angle < options.kink]
-    failures = []
-    if "invalid" in options.fail_on and not valid.valid:
-        failures += [str(failure) for failure in valid.failures] or ["not valid"]
-    if "free-edges" in options.fail_on and valid.free_edges:
-        failures.append(f"{valid.free_edges} free edge{'s' * (valid.free_edges > 1)}")
-    unsewn = summary(measures).unsewn
-    if "unsewn" in options.fail_on and unsewn:
-        failures.append(f"{unsewn} seam{'s' * (unsewn > 1)} not sewn")
-    if widest is not None:
-        failures += [f"gap {m.gap:.3g} mm between {_sides(m)}" for m in measures if m.gap > widest]
-    if options.max_angle is not None:
-        failures += [f"angle {m.angle:.2g}° between {_sides(m)}" for m in meant if m.angle > options.max_angle]
-    return Checked(failures, Inspection(model, measures, meant, valid))
+    Parameters
+    ----------
+    document : Document
+    options : Check
+    original : callable, optional
+        Not needed.
+    text : bytes, optional
+        The file that the document was read from: then every layer is looked at.  Without it there is no file to be
+        judged, and of the layers that take long only those that ``options.fail_on`` names are.
+    """
+    size = review.diagonal(document)
+    gap, tolerance, wall = (
+        None if given is None else length(given, size, name)
+        for given, name in (
+            (options.max_gap, "max-gap"),
+            (options.max_tolerance, "max-tolerance"),
+            (options.min_wall, "min-wall"),
+        )
+    )
+    limits = review.CheckLimits(gap, options.max_angle, options.kink, tolerance, wall, options.layer_limit)
+    slow = review.SLOW if text is not None else review.SLOW.intersection(options.fail_on)
+    verdict = review.check(text, document.name, document, limits, slow)
+    return Judged(verdict, tuple(review.failing(verdict, options.fail_on)))
 
 
-def _sides(measure: SeamMeasure) -> str:
-    return "#{} and #{}".format(*(face + 1 for face in measure.faces))
+def compare(document: Document, options: Compare, original: Original | None = None) -> Judged:
+    """Compare a document with the reference that ``options`` names, or else with the original.
+
+    Raises
+    ------
+    UsageError
+        When there is neither.
+    """
+    from mracad.occ.read import read_step
+
+    if options.reference:
+        reference = read_step(options.reference)
+    elif original:
+        reference = original()
+    else:
+        raise UsageError("compare has nothing to compare with", "name a reference")
+    size = review.diagonal(reference)
+    limits = Limits(
+        deviation=length(options.max_deviation, size, "max-deviation"),
+        gap_growth=None if options.max_gap_growth is None else length(options.max_gap_growth, size, "max-gap-growth"),
+        angle_growth=options.max_angle_growth,
+        volume_change=None if options.max_volume_change is None else options.max_volume_change / 100,
+    )
+    verdict = review.compare(reference, document, limits, options.ignore)
+    return Judged(verdict, verdict.failed())
 
 
 def run(

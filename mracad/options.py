@@ -10,7 +10,6 @@ import math
 import re
 import types
 import typing
-from collections.abc import Mapping
 from functools import cache
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -45,24 +44,13 @@ def length(text: str, diagonal: float, name: str) -> float:
 SECONDS = {"s": 1.0, "min": 60.0, "h": 3600.0}
 """Units of time by name, in seconds."""
 
-BYTES = {"KB": 10**3, "MB": 10**6, "GB": 10**9, "TB": 10**12}
-"""Units of memory by name, in bytes."""
-
 
 def duration(text: str, name: str) -> float:
     """Seconds from ``"90"``, ``"90s"``, ``"10min"`` or ``"2h"``; raises UsageError."""
-    return _quantity(text, {"": 1.0, **SECONDS}, name, "write it as 90s, 10min or 2h")
-
-
-def memory(text: str, name: str) -> int:
-    """Bytes from ``"500MB"`` or ``"2GB"``; raises UsageError."""
-    return int(_quantity(text.upper(), BYTES, name, "write it as 500MB or 2GB"))
-
-
-def _quantity(text: str, units: Mapping[str, float], name: str, hint: str) -> float:
     match = _QUANTITY.fullmatch(text)
+    units = {"": 1.0, **SECONDS}
     if not match or match[2] not in units or not 0 < float(match[1]) < math.inf:
-        raise UsageError(f"{name}: {text!r} is not right", hint)
+        raise UsageError(f"{name}: {text!r} is not a time", "write it as 90s, 10min or 2h")
     return float(match[1]) * units[match[2]]
 
 
@@ -203,11 +191,11 @@ class Smooth(Selection, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
 
 class Check(Options, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Check validity and continuity of a STEP file; exit code 1 when something asked for does not hold."""
+    """Check validity and continuity; what fails it stops a recipe, and a command ends with exit code 1."""
 
     function: ClassVar[str] = "mracad.job:check"
 
-    max_gap: Annotated[Length | None, Meta(description="Largest gap along any seam of a NURBS face.")] = None
+    max_gap: Annotated[Length | None, Meta(description="Largest gap along any seam.")] = None
     max_angle: Annotated[
         Annotated[float, Meta(ge=0.0)] | None,
         Meta(description="Largest angle (degrees) along seams that are meant to be smooth."),
@@ -215,11 +203,53 @@ class Check(Options, frozen=True, kw_only=True, forbid_unknown_fields=True):
     kink: Annotated[float, Meta(description="A seam with a smaller angle (degrees) is meant to be smooth.", ge=0.0)] = (
         1.0
     )
+    max_tolerance: Annotated[Length | None, Meta(description="Largest tolerance of edges and vertices.")] = None
+    min_wall: Annotated[Length | None, Meta(description="Least thickness of the walls of solids.")] = None
+    layer_limit: Annotated[
+        Annotated[float, Meta(gt=0.0)] | None,
+        Meta(description="Seconds for each layer; one that takes longer says nothing."),
+    ] = None
     fail_on: Annotated[
-        tuple[Literal["invalid", "free-edges", "unsewn", "nothing"], ...],
-        Meta(description="What else fails the check; repeatable."),
+        tuple[
+            Literal["invalid", "unknown", "free-edges", "unsewn", "file", "self-intersection", "mesh", "nothing"], ...
+        ],
+        Meta(description="What fails the check beside the limits; repeatable."),
     ] = ("invalid",)
 
 
-STEPS: dict[str, type[Options]] = {"smooth": Smooth, "check": Check}
+class Compare(Options, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Compare with a reference; what differs beyond its limit stops a recipe, and a command ends with exit code 1."""
+
+    function: ClassVar[str] = "mracad.job:compare"
+
+    reference: Annotated[
+        str | None, Meta(description="File to compare with; by default the model as it came into the recipe.")
+    ] = None
+    max_deviation: Annotated[Length, Meta(description="How far any face or outline may lie from its partner.")] = (
+        "1e-6mm"
+    )
+    max_gap_growth: Annotated[Length | None, Meta(description="How much wider the gap of any seam may become.")] = None
+    max_angle_growth: Annotated[
+        Annotated[float, Meta(ge=0.0)] | None,
+        Meta(description="How much larger the angle (degrees) of any seam may become."),
+    ] = None
+    max_volume_change: Annotated[
+        Annotated[float, Meta(ge=0.0)] | None, Meta(description="How much of the volume (percent) may come or go.")
+    ] = None
+    ignore: Annotated[
+        tuple[
+            Literal[
+                "faces", "deviation", "seams", "topology", "validity", "size", "assembly", "names", "colours",
+                "layers", "materials", "annotations",
+            ],
+            ...,
+        ],
+        Meta(description="What may differ in any way; repeatable."),
+    ] = ()  # fmt: skip
+
+    def files(self) -> tuple[str, ...]:
+        return (self.reference,) if self.reference else ()
+
+
+STEPS: dict[str, type[Options]] = {"smooth": Smooth, "check": Check, "compare": Compare}
 """Every step by the name of its command: edits (subclasses of ``Selection``) and checks."""

@@ -19,11 +19,11 @@ import os
 import re
 import shlex
 import typing
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
 
 import msgspec
 from msgspec import structs
@@ -31,6 +31,8 @@ from msgspec import structs
 from mracad import __version__
 from mracad.errors import FileError, UsageError
 from mracad.options import STEPS, Options, dashed, lengths, plain_types
+
+Given = TypeVar("Given", bound=Options)
 
 OWN = ("use", "id")
 """The keys of a step that are not options."""
@@ -151,7 +153,7 @@ class Recipe:
                 for key, value in table.values.items()
                 if key not in OWN
             }
-            given = options(table.values["use"], values, table.place)
+            given = options(STEPS[table.values["use"]], values, table.place)
             given = relocated(given, {file: os.path.normpath(folder / file) for file in given.files()})
             found.append(Step(name, table.values["use"], given))
         return tuple(found)
@@ -270,13 +272,13 @@ def _table(words: list[str], place: str) -> _Table:
     return _Table(values, {"": f"pipeline, {place}"})
 
 
-def options(use: str, values: Mapping[str, Any], place: Any = None) -> Options:
+def options(struct: type[Given], values: Mapping[str, Any], place: Callable[[str], str] | None = None) -> Given:
     """The options of a step from plain values, by their names on the command line or in Python.
 
     Parameters
     ----------
-    use : str
-        A key of :data:`mracad.options.STEPS`.
+    struct : type
+        One of :data:`mracad.options.STEPS`.
     values : mapping
     place : callable, optional
         Says where the value of a name stands, for messages.
@@ -286,7 +288,6 @@ def options(use: str, values: Mapping[str, Any], place: Any = None) -> Options:
     UsageError
         For a value that an option does not take.
     """
-    struct = STEPS[use]
     kinds, in_mm = plain_types(struct), lengths(struct)
     plain: dict[str, Any] = {}
     for key, value in values.items():
@@ -305,10 +306,10 @@ def options(use: str, values: Mapping[str, Any], place: Any = None) -> Options:
         at = f"{place(dashed(name))}: " if place else ""
         if cause:
             raise UsageError(f"{at}{cause.message}", cause.hint) from error
-        raise _refused(at, use, name, plain.get(name), kinds.get(name), str(error)) from error
+        raise _refused(at, struct, name, plain.get(name), kinds.get(name), str(error)) from error
 
 
-def _refused(at: str, use: str, name: str, value: Any, kind: Any, reason: str) -> UsageError:
+def _refused(at: str, struct: type[Options], name: str, value: Any, kind: Any, reason: str) -> UsageError:
     """The error for a value that is not of its option's type."""
     if typing.get_origin(kind) is tuple:
         kind = typing.get_args(kind)[0]
@@ -318,7 +319,9 @@ def _refused(at: str, use: str, name: str, value: Any, kind: Any, reason: str) -
         hint = nearest(str(wrong), choices, "use one of " + ", ".join(choices))
         return UsageError(f"{at}{dashed(name)}: {wrong!r} is not known", hint)
     said = reason.split(" - at")[0].replace("`", "").replace(" | null", "").lower()
-    return UsageError(f"{at}{dashed(name)}: {value!r} is not right, {said}", f"see mracad {use} --help")
+    return UsageError(
+        f"{at}{dashed(name)}: {value!r} is not right, {said}", f"see mracad {struct.__name__.lower()} --help"
+    )
 
 
 def relocated(options: Options, files: Mapping[str, str]) -> Options:

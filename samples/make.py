@@ -383,7 +383,7 @@ def name(label: TDF_Label, text: str) -> None:
 
 
 def blank(text: str, units: Units | None = None) -> Document:
-    """Return an empty document, in millimetres by default."""
+    """Return an empty document, held in millimetres, for a file in some unit, millimetres by default."""
     units = units or Units()
     xcaf = TDocStd_Document(TCollection_ExtendedString("BinXCAF"))
     XCAFDoc_DocumentTool.SetLengthUnit_s(xcaf, metres(1.0))
@@ -398,39 +398,11 @@ def single(shape: TopoDS_Shape, text: str) -> Document:
 
 
 def write(document: Document, path: Path) -> None:
-    """Write a document, with a header that changes neither with the date nor with mracad's version.
-
-    Lines that were broken inside a point are joined, which saves a twentieth.
-    """
+    """Write a document, with a header that changes neither with the date nor with mracad's version."""
     stream = io.BytesIO()
     write_step(document, stream, schema="AP214")
     header = f"FILE_NAME('{path.name}','1970-01-01T00:00:00',(''),(''),'','mracad samples','');"
-    text = re.sub(rb"FILE_NAME\(.*?\);", header.encode(), stream.getvalue(), count=1, flags=re.DOTALL)
-    path.write_bytes(styles_in_order(re.sub(rb"\n {4}(?=[-.0-9])", b"", text)))
-
-
-def styles_in_order(text: bytes) -> bytes:
-    """Put the styles at the end of a STEP file in the order of the parts they colour, and number them anew.
-
-    The kernel writes them in the order of addresses in memory, another one in each process.
-    """
-    word = b" = MECHANICAL_DESIGN_GEOMETRIC_PRESENTATION_REPRESENTATION("
-    start = text.rfind(b";\n#", 0, text.find(word)) + 2
-    end = text.rfind(b"ENDSEC;")
-    if word not in text:
-        return text
-    entities = re.sub(rb"\n +", b"", text[start:end]).splitlines()
-    groups: list[list[bytes]] = []
-    for entity in entities:
-        if word in entity:
-            groups.append([])
-        groups[-1].append(entity)
-    groups.sort(key=lambda group: int(re.findall(rb"#(\d+)", group[0])[-1]))  # the context that the part came with
-    ordered = [entity for group in groups for entity in group]
-    numbers = [entity.split(b" ")[0] for entity in entities]
-    anew = dict(zip((entity.split(b" ")[0] for entity in ordered), numbers, strict=True))
-    lines = (re.sub(rb"#\d+", lambda found: anew.get(found[0], found[0]), entity) for entity in ordered)
-    return text[:start] + b"\n".join(lines) + b"\n" + text[end:]
+    path.write_bytes(re.sub(rb"FILE_NAME\(.*?\);", header.encode(), stream.getvalue(), count=1, flags=re.DOTALL))
 
 
 # ---------------------------------------------------------------------------------------------------------------------

@@ -11,7 +11,7 @@ import click
 
 import mracad
 from mracad.errors import Code, MracadError
-from mracad_cli import commands
+from mracad_cli import commands, options
 from mracad_cli.steps import edit_command, edits
 
 
@@ -53,11 +53,10 @@ def group() -> None:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code."""
+    guarded = arguments is None
     arguments = list(sys.argv[1:] if arguments is None else arguments)
     try:
-        result = group.main(arguments, prog_name="mracad", standalone_mode=False)
-        sys.stdout.flush()
-        return result if isinstance(result, int) else 0
+        return _limited(arguments, guarded)
     except click.exceptions.NoArgsIsHelpError as error:
         click.echo(error.format_message(), err=True)
         return int(Code.USAGE)
@@ -91,6 +90,25 @@ def main(arguments: Sequence[str] | None = None) -> int:
         click.echo(json.dumps({"error": body}, ensure_ascii=False))
     click.echo(f"mracad: {' '.join(str(failure).split())}", err=True)
     return int(failure.code)
+
+
+def _limited(arguments: list[str], guarded: bool) -> int:
+    """Run a command; in a child process when it has a limit, or when a crash must not be the end of this one."""
+
+    def work() -> int:
+        result = group.main(arguments, prog_name="mracad", standalone_mode=False)
+        sys.stdout.flush()
+        return result if isinstance(result, int) else 0
+
+    if arguments[:1] == ["batch"]:  # its limits are those of each file, and its workers are its guard
+        return work()
+    seconds, memory = options.limits(arguments)
+    working = bool(arguments) and arguments[0] in group.list_commands(click.Context(group))
+    if seconds is None and memory is None and not (guarded and working and "--debug" not in arguments):
+        return work()
+    from mracad import guard
+
+    return guard.run(work, seconds, memory)
 
 
 if __name__ == "__main__":

@@ -21,7 +21,8 @@ from mracad.batch.pool import Limits, Pool
 from mracad.batch.run import Item, Outcome, Settings, find, run
 from mracad.batch.work import warm
 from mracad.errors import Code, MracadError
-from mracad.options import duration, memory
+from mracad.guard import size
+from mracad.options import duration
 from mracad.recipe import Recipe
 from mracad_cli.files import check_target, depfile_text, write_text
 from mracad_cli.progress import Progress
@@ -52,7 +53,7 @@ def run_batch(
 ) -> int:
     """Take many files through a recipe; see :mod:`mracad_cli.commands.batch` for the parameters."""
     settings = Settings(input_unit, schema.upper(), overwrite, if_changed, record, retry, fail_fast=not keep_going)
-    limits = Limits(duration(time_limit, "time-limit"), memory(memory_limit, "memory-limit") if memory_limit else 0)
+    limits = Limits(duration(time_limit, "time-limit"), size(memory_limit) if memory_limit else 0)
     for path in filter(None, (report, junit, depfile)):
         check_target(Path(path), overwrite=True)
     words = [word for given in sources for word in (sys.stdin.read().splitlines() if given == "-" else [given]) if word]

@@ -18,13 +18,33 @@ if TYPE_CHECKING:
 STEP, STL = frozenset({".step", ".stp", ".p21"}), frozenset({".stl"})
 
 
-def read(source: str, input_unit: str | None) -> Document:
+class Text(io.BytesIO):
+    """The bytes of an input, with its name."""
+
+    name = "stdin"
+
+
+def load(source: str) -> Text:
+    """The bytes of a file, or of standard input for ``-``."""
+    from mracad.occ.read import load as load_file
+
+    text, name = load_file(sys.stdin.buffer if source == "-" else source)
+    stream = Text(text)
+    stream.name = name
+    return stream
+
+
+def read(source: str | Text, input_unit: str | None) -> Document:
     """Read a STEP file, or standard input for ``-``."""
     from mracad.occ.read import read_step
 
-    if source == "-":
-        return read_step(io.BytesIO(sys.stdin.buffer.read()), input_unit)
-    return read_step(source, input_unit)
+    return read_step(load(source) if source == "-" else source, input_unit)
+
+
+def check_reports(*paths: str | None, overwrite: bool) -> None:
+    """Refuse reports that could not be written."""
+    for path in filter(None, paths):
+        check_target(Path(path), overwrite)
 
 
 def check_target(path: Path, overwrite: bool) -> None:

@@ -9,6 +9,7 @@ from typing import Any, Literal
 import click
 from msgspec import Meta, Struct, structs
 
+from mracad.errors import UsageError
 from mracad.options import Length, dashed, plain_types
 
 Command = Callable[..., Any]
@@ -17,8 +18,8 @@ SHORT = {"faces": "SEL", "hold": "SEL", "max_angle": "DEG", "kink": "DEG"}
 """Placeholders in the help."""
 
 
-def of(struct: type[Struct]) -> Callable[[Command], Command]:
-    """Add one option for each field of a struct, its own before the inherited ones, under the same names."""
+def of(struct: type[Struct], without: str = "") -> Callable[[Command], Command]:
+    """Add one option for each field of a struct but one, its own before the inherited ones, under the same names."""
 
     def decorate(command: Command) -> Command:
         hints, kinds = typing.get_type_hints(struct, include_extras=True), plain_types(struct)
@@ -26,6 +27,8 @@ def of(struct: type[Struct]) -> Callable[[Command], Command]:
         shared = len(structs.fields(base)) if base is not None and base is not Struct else 0
         fields = structs.fields(struct)
         for field in reversed(fields[shared:] + fields[:shared]):
+            if field.name == without:
+                continue
             meta = next(m for m in hints[field.name].__metadata__ if isinstance(m, Meta) and m.description)
             command = _option(field.name, meta.description or "", kinds[field.name], field.default)(command)
         return command
@@ -107,9 +110,25 @@ if_changed = click.option(
 as_json = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 debug = click.option("--debug", is_flag=True, expose_value=False, help="Show the traceback of an error.")
 
+limiting = apply(
+    click.option(
+        "--time-limit",
+        metavar="SECONDS",
+        expose_value=False,
+        help="End the command after this time: exit code 5.",
+    ),
+    click.option(
+        "--memory-limit", metavar="SIZE", expose_value=False, help="Memory that the command may hold: 500MB, 2GB."
+    ),
+)
 reading = apply(source, input_unit)
 writing = apply(outputs, schema, chord, angle, ascii_stl, overwrite, if_changed)
-printing = apply(as_json, debug)
+printing = apply(as_json, limiting, debug)
+reports = apply(
+    click.option("--junit", metavar="F.xml", type=click.Path(), help="Write the verdict as JUnit, a case a layer."),
+    click.option("--sarif", metavar="F.sarif", type=click.Path(), help="Write the findings as SARIF."),
+    click.option("--overwrite", is_flag=True, help="Replace existing reports."),
+)
 editing = apply(
     click.option("--report", metavar="F.json", type=click.Path(), help="Write the full report (JSON) to a file."),
     click.option("--depfile", metavar="F.d", type=click.Path(), help="Write what the outputs depend on, for make."),
@@ -125,3 +144,30 @@ assignments = click.option(
 record = click.option(
     "--record", is_flag=True, help="Write the recipe with all its options and versions beside the output (OUT.toml)."
 )
+
+
+def limits(arguments: list[str]) -> tuple[float | None, int | None]:
+    """Seconds and bytes that ``--time-limit`` and ``--memory-limit`` allow: needed before the command itself runs."""
+    from mracad.guard import size
+
+    time, memory = (_given(arguments, flag) for flag in ("--time-limit", "--memory-limit"))
+    if time is None:
+        return None, None if memory is None else size(memory)
+    try:
+        seconds = float(time)
+    except ValueError:
+        seconds = 0.0
+    if not 0 < seconds < float("inf"):
+        raise UsageError(f"time-limit: {time!r} is not a time", "give seconds, greater than zero")
+    return seconds, None if memory is None else size(memory)
+
+
+def _given(arguments: list[str], flag: str) -> str | None:
+    """The last value of an option."""
+    value = None
+    for i, word in enumerate(arguments):
+        if word == flag and i + 1 < len(arguments):
+            value = arguments[i + 1]
+        elif word.startswith(flag + "="):
+            value = word.partition("=")[2]
+    return value

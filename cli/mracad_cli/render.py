@@ -12,7 +12,7 @@ from mracad.options import Selection
 if TYPE_CHECKING:
     from mracad.audit.continuity import SeamMeasure, SeamSummary
     from mracad.edit.result import FaceOutcome
-    from mracad.job import Checked, Report
+    from mracad.job import Judged, Report
     from mracad.occ.check import Validity
     from mracad.recipe import Step
 
@@ -44,7 +44,7 @@ def verdict(valid: bool) -> str:
     return "yes" if valid else "no"
 
 
-def step_lines(step: Step, result: Report | Checked) -> list[str]:
+def step_lines(step: Step, result: Report | Judged) -> list[str]:
     """What a step of a recipe did; its first line begins with the step's name."""
     from mracad.job import Report
 
@@ -126,13 +126,15 @@ def seam(value: SeamMeasure) -> dict[str, Any]:
     }
 
 
-def result(value: Report | Checked) -> dict[str, Any]:
+def result(value: Report | Judged) -> dict[str, Any]:
     """What a step did, in full."""
     from mracad.job import Report
 
     if isinstance(value, Report):
         return report(value)
-    return {"passed": value.passed, "failures": list(value.failures)}
+    from mracad_cli.verdicts import as_data
+
+    return as_data(value.verdict, value.failed)
 
 
 def report(value: Report) -> dict[str, Any]:

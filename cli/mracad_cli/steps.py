@@ -13,10 +13,11 @@ from msgspec import structs
 
 from mracad.options import STEPS, Selection
 from mracad_cli import options
-from mracad_cli.files import Outputs, depfile_text, read, write_text
+from mracad_cli.files import Outputs, depfile_text, load, read, write_text
 from mracad_cli.progress import Progress
 
 if TYPE_CHECKING:
+    from mracad.occ import Document
     from mracad.recipe import Recipe, Step
 
 
@@ -36,7 +37,7 @@ def edit_command(use: str) -> click.Command:
         from mracad.recipe import options as options_of
 
         values = {name: given.pop(name) for name in struct.__struct_fields__}
-        return run_steps([Step(use, use, options_of(use, values))], source, **given)
+        return run_steps([Step(use, use, options_of(struct, values))], source, **given)
 
     return command
 
@@ -74,11 +75,16 @@ def run_steps(
             targets.say(line)
     with Progress() as progress:
         progress("reading", 0, 1)
-        document = read(source, input_unit)
+        text = load(source)
+        document = read(text, input_unit)
         from mracad import job
 
-        results = job.play(document, steps, progress=progress, apply=not dry_run)
-        failed = isinstance(results[-1], job.Checked) and not results[-1].passed
+        def original() -> Document:
+            text.seek(0)
+            return read(text, input_unit)
+
+        results = job.play(document, steps, original=original, progress=progress, apply=not dry_run)
+        failed = isinstance(results[-1], job.Judged) and not results[-1].passed
         written = not (dry_run or failed)
         if written:
             progress("writing", 0, 1)

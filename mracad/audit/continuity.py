@@ -12,13 +12,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mracad.constraint.coincide import coinciding
+from mracad.constraint.coincide import GAP, coinciding
 from mracad.model import Edge, Face, Model, Side
 
 Array = np.ndarray
 
 SMOOTH = 1.0
 """Degrees: a seam whose largest angle is below this counts as smooth in summaries."""
+
+TORN = 0.05
+"""Distance, mm, within which two free edges are told to be one that was torn open."""
 
 
 @dataclass(frozen=True)
@@ -66,13 +69,13 @@ class SeamSummary:
     angle: float
 
 
-def seams(model: Model) -> list[SeamMeasure]:
-    """Measure every seam that touches a NURBS face, in edge order; coinciding free edges after them."""
+def seams(model: Model, every: bool = False) -> list[SeamMeasure]:
+    """Measure every seam that touches a NURBS face (or just every one), in edge order; coinciding free edges last."""
     pairs = [(edge, *edge.sides) for edge in model.edges if len(edge.sides) == 2 and not edge.degenerate]
-    pairs = [pair for pair in pairs if len(pair[0].points) and _nurbs(pair)]
+    pairs = [pair for pair in pairs if len(pair[0].points) and (every or _nurbs(pair))]
     jets = _evaluate(model, [side for _, *sides in pairs for side in sides])
     found = [_measure(edge, True, (a, b), jets[2 * i], jets[2 * i + 1]) for i, (edge, a, b) in enumerate(pairs)]
-    matched = [m for m in coinciding(model) if _nurbs((m[0], m[1], m[2]))]
+    matched = [m for m in coinciding(model, TORN if every else GAP) if every or _nurbs((m[0], m[1], m[2]))]
     jets = _evaluate(model, [side for _, *sides in matched for side in sides])
     return found + [
         _measure(edge, False, (a, b), jets[2 * i], jets[2 * i + 1]) for i, (edge, a, b) in enumerate(matched)

@@ -18,7 +18,8 @@ from mracad.options import STEPS
 from mracad.recipe import Step, relocated, title
 
 if TYPE_CHECKING:
-    from mracad.job import Checked, Report
+    from mracad.job import Judged, Report
+    from mracad.occ import Document
 
 
 @dataclass(frozen=True)
@@ -75,8 +76,8 @@ def do(work: Work) -> Product:
     MracadError
         When a step cannot be done or a check fails.
     """
-    from mracad.job import Checked, play
-    from mracad.occ import read_step, write_step
+    from mracad.job import Judged, play
+    from mracad.occ import write_step
 
     start = time.perf_counter()
     if work.version != __version__:
@@ -85,19 +86,25 @@ def do(work: Work) -> Product:
         os.environ.pop("SOURCE_DATE_EPOCH", None)
     else:
         os.environ["SOURCE_DATE_EPOCH"] = work.epoch
-    source = _Named(work.data)
-    source.name = work.name
-    document = read_step(source, work.input_unit)
+    document = _read(work)
     with tempfile.TemporaryDirectory() as folder:
-        results = play(document, _here(work, Path(folder)))
+        results = play(document, _here(work, Path(folder)), original=lambda: _read(work))
     last = results[-1]
-    if isinstance(last, Checked) and not last.passed:
+    if isinstance(last, Judged) and not last.passed:
         more = f" (and {len(last.failures) - 1} more)" if len(last.failures) > 1 else ""
         raise MracadError(f"{work.steps[len(results) - 1].id}: {last.failures[0]}{more}", code=Code.FAILED_CHECK)
     written = io.BytesIO()
     write_step(document, written, schema=work.schema, options_text=title(work.steps))
     short = ({"step": step.id, **_short(result)} for step, result in zip(work.steps, results, strict=True))
     return Product(written.getvalue(), tuple(short), time.perf_counter() - start)
+
+
+def _read(work: Work) -> Document:
+    from mracad.occ import read_step
+
+    source = _Named(work.data)
+    source.name = work.name
+    return read_step(source, work.input_unit)
 
 
 class _Named(io.BytesIO):
@@ -115,11 +122,11 @@ def _here(work: Work, folder: Path) -> list[Step]:
     return [replace(step, options=relocated(step.options, places)) for step in work.steps]
 
 
-def _short(result: Report | Checked) -> dict[str, Any]:
+def _short(result: Report | Judged) -> dict[str, Any]:
     """What a step did, without the long lists."""
-    from mracad.job import Checked
+    from mracad.job import Judged
 
-    if isinstance(result, Checked):
+    if isinstance(result, Judged):
         return {"passed": result.passed}
     return {
         "edited": len(result.edit.faces("edited")),

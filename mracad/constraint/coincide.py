@@ -18,24 +18,24 @@ GAP = 1e-2
 """Distance, mm, within which free edges of different faces are taken for a seam (or 1e-6 of the diagonal)."""
 
 
-def coinciding(model: Model) -> list[tuple[Edge, Side, Side]]:
-    """Seams of coinciding free edges: an edge, its own side, and the other face's side at the same places.
+def coinciding(model: Model, gap: float = GAP) -> list[tuple[Edge, Side, Side]]:
+    """Seams of free edges within ``gap`` of each other: an edge, its side, and the other face's at the same places.
 
     Where one edge is a part of the other (a T-junction) the shorter one is the seam.
     """
     free = [e for e in model.edges if e.free and len(e.points) > 1]
     if len({e.sides[0].face for e in free}) < 2:
         return []
-    tolerance = max(GAP, 1e-6 * model.diagonal)
+    tolerance = max(gap, 1e-6 * model.diagonal)
     lines = [_hermite(e.points, _slopes(e), *_between(len(e.points))) for e in free]
     found: dict[tuple[int, int], tuple[Edge, Side, Side]] = {}
     for i, j in _candidates(free, lines, tolerance):
         edge, other = free[i], free[j]
         if (j, i) in found:
             continue
-        distance, uv = _carried(edge.points, other)
-        if distance.max() <= tolerance:
-            side = Side(other.sides[0].face, uv=uv) if uv is not None else _baked(edge, other)
+        off, uv = _carried(edge.points, other)
+        if np.linalg.norm(off, axis=1).max() <= tolerance:
+            side = Side(other.sides[0].face, uv=uv) if uv is not None else _baked(edge.points - off, other)
             found[i, j] = (edge, edge.sides[0], side)
     return list(found.values())
 
@@ -56,7 +56,7 @@ def _candidates(free: list[Edge], lines: list[Array], tolerance: float) -> Itera
 
 
 def _carried(points: Array, edge: Edge) -> tuple[Array, Array | None]:
-    """Distance of ``points`` (k, 3) from an edge, and the parameters there on its face (None for a fixed side)."""
+    """Offsets of ``points`` (k, 3) from an edge, and the parameters there on its face (None for a fixed side)."""
     start, chord = edge.points[:-1], np.diff(edge.points, axis=0)
     square = np.maximum((chord**2).sum(axis=1), np.finfo(float).tiny)
     along = np.clip(((points[:, None] - start) * chord).sum(axis=2) / square, 0.0, 1.0)
@@ -68,9 +68,8 @@ def _carried(points: Array, edge: Edge) -> tuple[Array, Array | None]:
     tangent = chord[segment] / np.sqrt(square[segment])[:, None]
     shift = (apart * tangent).sum(axis=1, keepdims=True)
     inner = ((s > 0) & (s < 1)).astype(float)
-    distance = np.linalg.norm(apart - inner * shift * tangent, axis=1)
     uv = edge.sides[0].uv
-    return distance, None if uv is None else _hermite(uv, np.gradient(uv, axis=0), segment, s)
+    return apart - inner * shift * tangent, None if uv is None else _hermite(uv, np.gradient(uv, axis=0), segment, s)
 
 
 def _slopes(edge: Edge) -> Array:
@@ -91,9 +90,9 @@ def _hermite(values: Array, slopes: Array, segment: Array, s: Array) -> Array:
     return (1 + 2 * s) * (1 - s) ** 2 * p + s * (1 - s) ** 2 * m + s * s * (3 - 2 * s) * q + s * s * (s - 1) * n
 
 
-def _baked(edge: Edge, other: Edge) -> Side:
-    """The fixed side of ``other`` at the sample of it nearest to each sample of ``edge``."""
+def _baked(points: Array, other: Edge) -> Side:
+    """The fixed side of ``other`` at ``points`` on it, with the normals of its nearest samples."""
     side = other.sides[0]
     assert side.points is not None and side.normals is not None
-    nearest = np.linalg.norm(edge.points[:, None] - other.points, axis=2).argmin(axis=1)
-    return Side(side.face, points=edge.points, normals=side.normals[nearest])
+    nearest = np.linalg.norm(points[:, None] - other.points, axis=2).argmin(axis=1)
+    return Side(side.face, points=points, normals=side.normals[nearest])

@@ -7,19 +7,17 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 from OCP.Adaptor3d import Adaptor3d_CurveOnSurface
-from OCP.BRep import BRep_Builder, BRep_Tool
+from OCP.BRep import BRep_Tool
 from OCP.BRepAdaptor import BRepAdaptor_Curve, BRepAdaptor_Curve2d, BRepAdaptor_Surface
 from OCP.BRepCheck import BRepCheck_Analyzer, BRepCheck_NoError
 from OCP.BRepLib import BRepLib_ValidateEdge
 from OCP.ShapeAnalysis import ShapeAnalysis_ShapeTolerance
 from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_FORWARD, TopAbs_SHELL, TopAbs_SOLID, TopAbs_VERTEX, TopAbs_WIRE
-from OCP.TopExp import TopExp
-from OCP.TopoDS import TopoDS, TopoDS_Compound, TopoDS_Face, TopoDS_Shape
-from OCP.TopTools import TopTools_IndexedMapOfShape
+from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Shape
 
 from mracad.occ.document import Document
 from mracad.occ.settings import quiet
-from mracad.occ.topology import edge_uses
+from mracad.occ.topology import compound, edge_uses, inside
 
 _KINDS = {
     TopAbs_SOLID: "solid", TopAbs_SHELL: "shell", TopAbs_FACE: "face", TopAbs_WIRE: "wire", TopAbs_EDGE: "edge",
@@ -93,16 +91,16 @@ def check(document: Document, faces: Iterable[int] | None = None, distances: boo
     """
     chosen = range(len(document.faces)) if faces is None else sorted(set(faces))
     members = [document.faces[index] for index in chosen]
-    subject = _compound(members if faces is not None else [part.shape for part in document.parts])
+    subject = compound(members if faces is not None else [part.shape for part in document.parts])
     with quiet():
         analyzer = BRepCheck_Analyzer(subject, True, True)
         failures = () if analyzer.IsValid() else tuple(_failures(analyzer, subject, chosen, members))
         tolerance = ShapeAnalysis_ShapeTolerance()
-        shells = [shell for part in document.parts for shell in _inside(part.shape, TopAbs_SHELL)]
+        shells = [shell for part in document.parts for shell in inside(part.shape, TopAbs_SHELL)]
         return Validity(
             valid=not failures,
             failures=failures,
-            solids=sum(1 for part in document.parts for _ in _inside(part.shape, TopAbs_SOLID)),
+            solids=sum(1 for part in document.parts for _ in inside(part.shape, TopAbs_SOLID)),
             shells=len(shells),
             faces=len(document.faces),
             open_shells=sum(not BRep_Tool.IsClosed_s(shell) for shell in shells),
@@ -113,35 +111,19 @@ def check(document: Document, faces: Iterable[int] | None = None, distances: boo
         )
 
 
-def _compound(shapes: Iterable[TopoDS_Shape]) -> TopoDS_Compound:
-    compound = TopoDS_Compound()
-    builder = BRep_Builder()
-    builder.MakeCompound(compound)
-    for shape in shapes:
-        builder.Add(compound, shape)
-    return compound
-
-
-def _inside(shape: TopoDS_Shape, kind) -> Iterator[TopoDS_Shape]:
-    """The distinct sub-shapes of one kind."""
-    found = TopTools_IndexedMapOfShape()
-    TopExp.MapShapes_s(shape, kind, found)
-    return (found.FindKey(i) for i in range(1, found.Extent() + 1))
-
-
 def _failures(
     analyzer: BRepCheck_Analyzer, subject: TopoDS_Shape, chosen: Iterable[int], members: list[TopoDS_Face]
 ) -> Iterator[Failure]:
     """Everything that the analyzer holds against the subject."""
     for kind in (TopAbs_SOLID, TopAbs_SHELL):
-        for shape in _inside(subject, kind):
+        for shape in inside(subject, kind):
             for status in _statuses(analyzer, shape, shape):
                 yield Failure(_KINDS[kind], status, None)
     for index, face in zip(chosen, members, strict=True):
         if analyzer.IsValid(face):
             continue
         for kind in (TopAbs_FACE, TopAbs_WIRE, TopAbs_EDGE, TopAbs_VERTEX):
-            for shape in _inside(face, kind):
+            for shape in inside(face, kind):
                 for status in _statuses(analyzer, shape, face):
                     yield Failure(_KINDS[kind], status, index)
 
@@ -182,3 +164,13 @@ def _distance(face: TopoDS_Face) -> float:
             validate.Process()
             worst = max(worst, validate.GetMaxDistance())
     return worst
+
+
+def looks(document: Document) -> Iterator[tuple[int, int, bool]]:
+    """Every use of an edge by a face of the document: edge, face, and whether the boundary runs along the edge."""
+    for part in document.parts:
+        for index in range(part.first, part.first + part.faces.Extent()):
+            for edge in edge_uses(document.faces[index]):
+                if not BRep_Tool.Degenerated_s(edge):
+                    along = edge.Orientation() == TopAbs_FORWARD
+                    yield part.first_edge + part.edges.FindIndex(edge) - 1, index, along

@@ -121,11 +121,11 @@ class Document:
         """The shape definitions that hold geometry, in document order."""
         placed: dict[str, list[TopLoc_Location]] = {}
         tints: dict[str, str] = {}
-        for label in _labels(self.shape_tool.GetFreeShapes):
+        for label in labels(self.shape_tool.GetFreeShapes):
             _walk(label, TopLoc_Location(), "", placed, tints)
         parts: list[Part] = []
         first = first_edge = 0
-        for label in _labels(self.shape_tool.GetShapes):
+        for label in labels(self.shape_tool.GetShapes):
             if not XCAFDoc_ShapeTool.IsSimpleShape_s(label):
                 continue
             shape = XCAFDoc_ShapeTool.GetShape_s(label)
@@ -182,7 +182,7 @@ def label_colour(label: TDF_Label) -> str:
     return ""
 
 
-def _labels(fill) -> Iterator[TDF_Label]:
+def labels(fill) -> Iterator[TDF_Label]:
     """The labels that a kernel function puts in the sequence it is given."""
     sequence = TDF_LabelSequence()
     fill(sequence)
@@ -205,7 +205,7 @@ def _walk(
         XCAFDoc_ShapeTool.GetReferredShape_s(label, referred)
         label = referred
     if XCAFDoc_ShapeTool.IsAssembly_s(label):
-        for component in _labels(lambda sequence: XCAFDoc_ShapeTool.GetComponents_s(label, sequence, False)):
+        for component in labels(lambda sequence: XCAFDoc_ShapeTool.GetComponents_s(label, sequence, False)):
             _walk(component, frame, colour, placed, tints)
         return
     key = label_key(label)
@@ -219,7 +219,7 @@ def _described(label: TDF_Label, faces: TopTools_IndexedMapOfShape) -> tuple[dic
     names: dict[int, str] = {}
     colours: dict[int, str] = {}
     inherited: dict[int, str] = {}
-    for sub in _labels(lambda sequence: XCAFDoc_ShapeTool.GetSubShapes_s(label, sequence)):
+    for sub in labels(lambda sequence: XCAFDoc_ShapeTool.GetSubShapes_s(label, sequence)):
         shape = XCAFDoc_ShapeTool.GetShape_s(sub)
         colour = label_colour(sub)
         if shape.ShapeType() == TopAbs_FACE:

@@ -43,7 +43,7 @@ def read_step(source: str | os.PathLike | BinaryIO, input_unit: str | None = Non
     UsageError
         For an unknown unit.
     """
-    text, name = _load(source)
+    text, name = load(source)
     reader = STEPCAFControl_Reader()
     for mode in _MODES:
         getattr(reader, f"Set{mode}Mode")(True)
@@ -61,7 +61,7 @@ def read_step(source: str | os.PathLike | BinaryIO, input_unit: str | None = Non
     return document
 
 
-def _load(source: str | os.PathLike | BinaryIO) -> tuple[bytes, str]:
+def load(source: str | os.PathLike | BinaryIO) -> tuple[bytes, str]:
     """The text of a STEP file and its name without folder; raises FileError."""
     if isinstance(source, str | os.PathLike):
         path = Path(source)

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 from OCP.Bnd import Bnd_Box
+from OCP.BRep import BRep_Builder
 from OCP.BRepBndLib import BRepBndLib
-from OCP.TopAbs import TopAbs_EDGE
-from OCP.TopExp import TopExp_Explorer
+from OCP.TopAbs import TopAbs_EDGE, TopAbs_SOLID
+from OCP.TopExp import TopExp, TopExp_Explorer
 from OCP.TopLoc import TopLoc_Location
-from OCP.TopoDS import TopoDS, TopoDS_Edge, TopoDS_Face, TopoDS_Shape
+from OCP.TopoDS import TopoDS, TopoDS_Compound, TopoDS_Edge, TopoDS_Face, TopoDS_Shape
+from OCP.TopTools import TopTools_IndexedMapOfShape
 
 Array = np.ndarray
 
@@ -21,6 +23,23 @@ def edge_uses(face: TopoDS_Face) -> Iterator[TopoDS_Edge]:
     while explorer.More():
         yield TopoDS.Edge_s(explorer.Current())
         explorer.Next()
+
+
+def inside(shape: TopoDS_Shape, kind) -> Iterator[TopoDS_Shape]:
+    """The distinct sub-shapes of one kind."""
+    found = TopTools_IndexedMapOfShape()
+    TopExp.MapShapes_s(shape, kind, found)
+    return (found.FindKey(i) for i in range(1, found.Extent() + 1))
+
+
+def compound(shapes: Iterable[TopoDS_Shape]) -> TopoDS_Compound:
+    """Several shapes as one."""
+    whole = TopoDS_Compound()
+    builder = BRep_Builder()
+    builder.MakeCompound(whole)
+    for shape in shapes:
+        builder.Add(whole, shape)
+    return whole
 
 
 def matrix(location: TopLoc_Location) -> Array:
@@ -37,3 +56,8 @@ def box(shape: TopoDS_Shape) -> Array:
     bounds = Bnd_Box()
     BRepBndLib.Add_s(shape, bounds, False)
     return np.array([bounds.CornerMin().Coord(), bounds.CornerMax().Coord()])
+
+
+def has_solids(shape: TopoDS_Shape) -> bool:
+    """Whether there is a solid in a shape."""
+    return TopExp_Explorer(shape, TopAbs_SOLID).More()

@@ -17,7 +17,8 @@ from OCP.TopAbs import TopAbs_FORWARD, TopAbs_REVERSED
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS, TopoDS_Edge, TopoDS_Face
 
-from mracad.errors import UsageError
+from mracad.bspline.net import Net
+from mracad.errors import FileError, UsageError
 from mracad.model import Edge, Face, Model, Side, Surface, Trim
 from mracad.occ.convert import conversion
 from mracad.occ.document import Document
@@ -39,6 +40,7 @@ _KINDS = {
     "Geom_SurfaceOfRevolution": "revolution",
     "Geom_OffsetSurface": "offset",
 }
+_ABSURD = 1e12  # mm: the distance of a planet
 _SAMPLES = 25
 # fractions of an edge's range: Chebyshev points, close to the ends but never on them
 _SPREAD = 0.5 - 0.5 * np.cos(np.pi * (np.arange(_SAMPLES) + 0.5) / _SAMPLES)
@@ -84,6 +86,8 @@ def view(document: Document, convert: Iterable[int] = ()) -> Model:
         For a face that does not exist.
     EditError
         For a face that the kernel cannot convert.
+    FileError
+        For a face whose numbers no model can have.
     """
     chosen = frozenset(convert)
     for face in sorted(chosen):
@@ -94,6 +98,7 @@ def view(document: Document, convert: Iterable[int] = ()) -> Model:
         kinds = [_KINDS.get(type(surface).__name__, "other") for surface in found.grounds]
         control = nets(list(found.surfaces))
         boxes = [box(face) for face in found.faces]
+        _refuse_absurd(document.name, boxes, zip(found.surfaces.values(), control, strict=True))
         trims = _trims(found)
         faces = tuple(
             Face(
@@ -113,6 +118,20 @@ def view(document: Document, convert: Iterable[int] = ()) -> Model:
     products = tuple(part.product for part in document.parts)
     diagonal = _diagonal(document, boxes)
     return Model(document.name, surfaces, faces, edges, diagonal, document.unit, document.schema, products)
+
+
+def _refuse_absurd(name: str, boxes: list[Array], surfaces: Iterable[tuple[list[int], Net]]) -> None:
+    """Raise FileError where numbers are infinite, undefined or astronomic: nothing made of them means anything."""
+    values = [(index, box) for index, box in enumerate(boxes)]
+    for members, net in surfaces:
+        values.append((members[0], net.poles))
+        if net.weights is not None:
+            values.append((members[0], net.weights))
+    for face, numbers in values:
+        if not (np.abs(numbers) < _ABSURD).all():
+            raise FileError(
+                f"'{name}' is damaged: #{face + 1} has coordinates or weights beyond {_ABSURD:.0e}", "export it again"
+            )
 
 
 def _walk(document: Document, chosen: frozenset[int]) -> _Found:

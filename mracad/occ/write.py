@@ -18,13 +18,13 @@ from OCP.TCollection import TCollection_HAsciiString
 from mracad import __version__
 from mracad.errors import FileError, UsageError
 from mracad.occ.document import Document
+from mracad.occ.part21 import UNNAMED, tidy
 from mracad.occ.settings import exchange, quiet
 from mracad.occ.units import UNITS
 from mracad.output import put
 
 _MODES = ("Name", "Color", "Layer", "DimTol", "Material", "Props", "SHUO")
 _SCHEMAS = {"AP203": "AP203", "AP214": "AP214IS", "AP242": "AP242DIS"}
-_UNNAMED = b"mracad unnamed product"  # what the kernel calls a product without a name, followed by a count
 
 
 def write_step(
@@ -62,7 +62,7 @@ def _text(document: Document, schema: str, name: str, options_text: str) -> byte
     settings = {
         "write.step.schema": schema,
         "write.step.unit": UNITS[document.unit][1],
-        "write.step.product.name": _UNNAMED.decode(),
+        "write.step.product.name": UNNAMED.decode(),
         "write.stepcaf.subshapes.name": "On",
     }
     stream = io.BytesIO()
@@ -82,7 +82,7 @@ def _text(document: Document, schema: str, name: str, options_text: str) -> byte
         printer.FloatWriter().SetFormatForRange("%#.17G", 1e-99, 1e99)
         printer.SendModel(writer.Writer().WS().Protocol())
         printer.Print(stream)
-    return _tidy(stream.getvalue())
+    return tidy(stream.getvalue())
 
 
 def _head(model: StepData_StepModel, name: str, options_text: str) -> None:
@@ -103,19 +103,3 @@ def _head(model: StepData_StepModel, name: str, options_text: str) -> None:
 def _ascii(text: str) -> str:
     """A text as STEP encodes it: what is not plain ASCII as ``\\X2\\…\\X0\\``."""
     return re.sub(r"[^\x20-\x7e]+", lambda run: "\\X2\\" + run[0].encode("utf-16-be").hex().upper() + "\\X0\\", text)
-
-
-def _tidy(text: bytes) -> bytes:
-    """Write reals without trailing zeros, and count what the kernel counts through the life of the process from 1."""
-    pieces = text.split(b"'")  # every second one is within quotes
-    products = usages = 0
-    for i in range(0, len(pieces) - 1, 2):
-        if pieces[i].endswith(b"PRODUCT(") and pieces[i + 1].startswith(_UNNAMED):
-            products += 1
-            pieces[i + 1] = pieces[i + 3] = b"part %d" % products
-        elif pieces[i].endswith(b"NEXT_ASSEMBLY_USAGE_OCCURRENCE("):
-            usages += 1
-            pieces[i + 1] = b"%d" % usages
-    plain = b"'".join(pieces[::2])
-    pieces[::2] = b"".join(re.split(rb"(\.(?:[0-9]*[1-9])?)0+(?=[,)E])", plain)).split(b"'")
-    return b"'".join(pieces)

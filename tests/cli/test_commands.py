@@ -117,7 +117,8 @@ def test_check(mracad, samples, tmp_path):
     assert failed.code == 1 and "failed: " in failed.out
     assert mracad("check", panel, "--fail-on", "free-edges").code == 1
     body = json.loads(mracad("check", samples / "bottle.step", "--fail-on", "free-edges", "--json").out)
-    assert body["passed"] and body["valid"]["solids"] == 1
+    layers = {layer["name"]: layer for layer in body["layers"]}
+    assert body["passed"] and body["valid"] is True and layers["shells"]["figures"]["solids"] == 1
 
 
 def test_convert(mracad, samples, tmp_path):

@@ -14,6 +14,7 @@ from OCP.TopLoc import TopLoc_Location
 
 from mracad import occ
 from mracad.errors import FileError, UsageError
+from mracad.occ.part21 import tidy
 from tests.occ import shapes
 
 POINT = re.compile(rb"CARTESIAN_POINT\s*\(\s*'[^']*'\s*,\s*\(([^)]*)\)")
@@ -168,6 +169,27 @@ def test_same_bytes_every_time_and_in_every_process(tmp_path):
     assert (tmp_path / "out.step").read_bytes() == first
     assert b"smooth --scale 5" in first and b"1970-01-01T00:00:00" in first
     assert str(tmp_path).encode() not in first and b"Open CASCADE STEP translator" not in first
+
+
+def test_coloured_parts_come_in_one_order_in_any_process(samples):
+    script = "import sys; from mracad import occ; occ.write_step(occ.read_step(sys.argv[1]), sys.stdout.buffer)"
+    command = [sys.executable, "-c", script, str(samples / "assembly.step")]
+    running = [
+        subprocess.Popen(command, stdout=subprocess.PIPE, env={**os.environ, "PYTHONHASHSEED": seed}) for seed in "0123"
+    ]
+    outputs = {process.communicate()[0] for process in running}
+    assert len(outputs) == 1
+    assert outputs.pop().count(b"MECHANICAL_DESIGN_GEOMETRIC_PRESENTATION_REPRESENTATION") == 3
+
+
+def test_the_order_of_styles_does_not_depend_on_the_order_they_were_written_in():
+    head = b"DATA;\n#1 = BODY();\n#2 = BODY();\n#3 = CONTEXT();\n"
+    first = b"#%d = MECHANICAL_DESIGN_GEOMETRIC_PRESENTATION_REPRESENTATION('',(#%d),#3);\n#%d = ITEM('#4',#1,#%d);\n"
+    second = b"#%d = MECHANICAL_DESIGN_GEOMETRIC_PRESENTATION_REPRESENTATION('',(#%d),#3);\n#%d = ITEM('',#2,#%d);\n"
+    colour, rest, end = b"#%d = COLOUR();\n", b"#%d = NOTE('it''s (#5;',#%d);\n", b"ENDSEC;\n"
+    one = head + first % (4, 5, 5, 6) + colour % 6 + second % (7, 8, 8, 6) + rest % (9, 7) + end
+    two = head + second % (4, 5, 5, 6) + colour % 6 + first % (7, 8, 8, 6) + rest % (9, 4) + end
+    assert one != two and tidy(one) == tidy(two) == one
 
 
 def test_header_time_follows_source_date_epoch(wavy, tmp_path, monkeypatch):

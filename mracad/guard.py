@@ -1,0 +1,183 @@
+"""Work in a child process, so that a crash or an endless loop in the CAD kernel is an error and not the end."""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import os
+import pickle
+import re
+import select
+import signal
+import sys
+import time
+from collections.abc import Callable, Iterator
+from typing import Any, TypeVar
+
+from mracad.errors import Code, MracadError, UsageError
+
+Result = TypeVar("Result")
+
+_GRACE = 1.0  # seconds for a child to put its files in order once its time is over
+_SIZES = {"": 1, "k": 1e3, "m": 1e6, "g": 1e9, "ki": 2**10, "mi": 2**20, "gi": 2**30}
+_DEATH_SIGNAL = 1  # PR_SET_PDEATHSIG
+
+
+def size(text: str) -> int:
+    """Bytes from ``"500MB"``, ``"2G"`` or ``"1.5GiB"``; raises UsageError."""
+    match = re.fullmatch(r"(\d+\.?\d*)\s*([kmg]i?|)b?", text.strip().lower())
+    if not match or not float(match[1]):
+        raise UsageError(f"memory-limit: {text!r} is not an amount of memory", "write it as 500MB or 2GB")
+    return int(float(match[1]) * _SIZES[match[2]])
+
+
+def run(work: Callable[[], Result], seconds: float | None = None, memory: int | None = None) -> Result:
+    """What ``work()`` returns, computed in a child process; whatever it raises is raised here.
+
+    Parameters
+    ----------
+    work : callable
+    seconds : float, optional
+        Time that it may take.
+    memory : int, optional
+        Bytes that it may hold.
+
+    Raises
+    ------
+    MracadError
+        With the code of a limit when one was hit; with that of an internal error when the child crashed.
+    """
+    if not hasattr(os, "fork"):
+        if seconds is None and memory is None:
+            return work()
+        raise UsageError("this system cannot limit time and memory", "leave the limits out")
+    sys.stdout.flush()
+    sys.stderr.flush()
+    reader, writer = os.pipe()
+    child = os.fork()
+    if not child:
+        os.close(reader)
+        _child(work, writer, memory)
+    os.close(writer)
+    try:
+        with _passing_on(child):
+            data, finished = _received(reader, seconds)
+    except BaseException:
+        _end(child)
+        raise
+    finally:
+        os.close(reader)
+    if not finished:
+        _end(child)
+        raise MracadError(f"time limit of {seconds:g} s exceeded", "give more with --time-limit", Code.LIMIT)
+    _, status, usage = os.wait4(child, 0)
+    if data:
+        good, value = pickle.loads(data)
+        if good:
+            return value
+        raise value
+    if memory and _peak(usage.ru_maxrss) > 0.7 * memory:
+        raise _out_of_memory(memory)
+    number = os.WTERMSIG(status) if os.WIFSIGNALED(status) else 0
+    what = signal.Signals(number).name if number else f"exit code {os.WEXITSTATUS(status)}"
+    raise MracadError(f"the CAD kernel crashed ({what})", "the model may be damaged: see mracad check", Code.INTERNAL)
+
+
+def _child(work: Callable[[], Any], writer: int, memory: int | None) -> None:
+    """Run the work, send what became of it, and end the process, whatever happens."""
+    try:
+        if sys.platform == "linux":
+            ctypes.CDLL(None).prctl(_DEATH_SIGNAL, signal.SIGKILL)
+        signal.signal(signal.SIGTERM, _terminated)
+        message = _outcome(work, memory)
+        with contextlib.suppress(OSError, ValueError):
+            sys.stdout.flush()
+            sys.stderr.flush()
+        with os.fdopen(writer, "wb") as pipe:
+            pipe.write(_packed(message))
+    finally:
+        os._exit(0)
+
+
+def _outcome(work: Callable[[], Any], memory: int | None) -> tuple[bool, Any]:
+    """Whether the work was done, and its result or error."""
+    if not memory:
+        try:
+            return True, work()
+        except BaseException as error:
+            return False, error
+    import resource
+
+    hard = resource.getrlimit(resource.RLIMIT_DATA)[1]
+    resource.setrlimit(resource.RLIMIT_DATA, (memory, hard))
+    try:
+        return True, work()
+    except BaseException as error:
+        resource.setrlimit(resource.RLIMIT_DATA, (hard, hard))  # room to say so
+        return False, _out_of_memory(memory) if _starved(error) else error
+
+
+def _starved(error: BaseException) -> bool:
+    """Whether an error says that memory was refused; a library that cannot be loaded for that says it in words."""
+    return isinstance(error, MemoryError) or "failed to map segment" in str(error)
+
+
+def _packed(message: tuple[bool, Any]) -> bytes:
+    try:
+        return pickle.dumps(message)
+    except Exception:  # an error that cannot be sent is told in words
+        return pickle.dumps((False, RuntimeError(f"{type(message[1]).__name__}: {message[1]}")))
+
+
+def _terminated(*_: object) -> None:
+    raise SystemExit(128 + signal.SIGTERM)
+
+
+def _received(reader: int, seconds: float | None) -> tuple[bytes, bool]:
+    """All that the child sends, and whether it ended in time."""
+    end = None if seconds is None else time.monotonic() + seconds
+    pieces: list[bytes] = []
+    while True:
+        rest = None if end is None else max(end - time.monotonic(), 0.0)
+        if not select.select([reader], [], [], rest)[0]:
+            return b"", False
+        piece = os.read(reader, 1 << 20)
+        if not piece:
+            return b"".join(pieces), True
+        pieces.append(piece)
+
+
+@contextlib.contextmanager
+def _passing_on(child: int) -> Iterator[None]:
+    """Hand a request to end on to the child."""
+    try:
+        old = signal.signal(signal.SIGTERM, lambda *_: os.kill(child, signal.SIGTERM))
+    except ValueError:  # not the main thread
+        yield
+        return
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, old)
+
+
+def _end(child: int) -> None:
+    """Ask a child to end, and make it."""
+    deadline = time.monotonic() + _GRACE
+    with contextlib.suppress(ProcessLookupError):
+        os.kill(child, signal.SIGTERM)
+    while time.monotonic() < deadline:
+        if os.waitpid(child, os.WNOHANG)[0]:
+            return
+        time.sleep(0.01)
+    os.kill(child, signal.SIGKILL)
+    os.waitpid(child, 0)
+
+
+def _peak(value: int) -> int:
+    """Bytes, from the number of the operating system."""
+    return value if sys.platform == "darwin" else value * 1024
+
+
+def _out_of_memory(memory: int) -> MracadError:
+    return MracadError(f"memory limit of {memory / 1e6:g} MB exceeded", "give more with --memory-limit", Code.LIMIT)

@@ -1,0 +1,156 @@
+"""Sizes of shapes, points on faces, and exact distances from them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from OCP.BRep import BRep_Tool
+from OCP.BRepAdaptor import BRepAdaptor_Surface
+from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeVertex
+from OCP.BRepExtrema import BRepExtrema_DistShapeShape
+from OCP.BRepGProp import BRepGProp
+from OCP.BRepTools import BRepTools
+from OCP.BRepTopAdaptor import BRepTopAdaptor_FClass2d
+from OCP.Geom import Geom_Surface
+from OCP.GeomAPI import GeomAPI_ProjectPointOnSurf
+from OCP.gp import gp_Dir, gp_Lin, gp_Pnt, gp_Pnt2d, gp_Vec
+from OCP.GProp import GProp_GProps
+from OCP.IntCurvesFace import IntCurvesFace_ShapeIntersector
+from OCP.ShapeAnalysis import ShapeAnalysis_Surface
+from OCP.TopAbs import TopAbs_FORWARD, TopAbs_IN, TopAbs_REVERSED, TopAbs_SOLID
+from OCP.TopLoc import TopLoc_Location
+from OCP.TopoDS import TopoDS
+
+from mracad.occ.document import Document, Part
+from mracad.occ.settings import quiet
+from mracad.occ.topology import compound, inside, matrix
+
+Array = np.ndarray
+Point = tuple[float, float, float]
+_EXACT = 1e-6  # relative error of volumes and areas; the kernel's default is off by a hundredth on NURBS faces
+_LEAST = 9  # sample lines across a face in each direction
+
+
+@dataclass(frozen=True)
+class Mass:
+    """Size of something: all placed instances of a document, or one face in its part's frame.
+
+    Attributes
+    ----------
+    volume : float
+        Of the solids, mm³; 0 for a face.
+    area : float
+        Of the faces, mm².
+    centre : (float, float, float)
+        Of the solids or, where there are none, of the faces, mm.
+    """
+
+    volume: float
+    area: float
+    centre: tuple[float, float, float]
+
+
+def mass(document: Document) -> Mass:
+    """Volume, area and centre of everything, placed."""
+    with quiet():
+        shape = document.shape
+        solid = GProp_GProps()
+        surface = GProp_GProps()
+        solids = list(inside(shape, TopAbs_SOLID))
+        if solids:
+            BRepGProp.VolumeProperties_s(compound(solids), solid, _EXACT)
+        BRepGProp.SurfaceProperties_s(shape, surface, _EXACT)
+        centre = (solid if solids else surface).CentreOfMass().Coord()
+        return Mass(solid.Mass() if solids else 0.0, surface.Mass(), centre)
+
+
+def face_masses(document: Document) -> list[Mass]:
+    """Area and centre of every face, in its part's frame: good enough to tell faces apart."""
+    found = []
+    with quiet():
+        for face in document.faces:
+            surface = GProp_GProps()
+            BRepGProp.SurfaceProperties_s(face, surface)
+            found.append(Mass(0.0, surface.Mass(), surface.CentreOfMass().Coord()))
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class Gauge:
+    """Points on the faces of a document and exact distances from them; lengths in mm, in the part's frame."""
+
+    document: Document
+
+    def sample(self, index: int, lines: tuple[int, int]) -> Array:
+        """Points inside a face, ``(q, 3)``: of a grid in its parameter plane, ``lines`` (at least nine) each way."""
+        face = TopoDS.Face_s(self.document.faces[index].Oriented(TopAbs_FORWARD))
+        bounds = BRepTools.UVBounds_s(face)
+        within = BRepTopAdaptor_FClass2d(face, 1e-9)
+        surface = BRepAdaptor_Surface(face, False)
+        us, vs = (
+            low + (high - low) * (np.arange(max(count, _LEAST)) + 0.5) / max(count, _LEAST)
+            for low, high, count in zip(bounds[::2], bounds[1::2], lines, strict=True)
+        )
+        points = [
+            surface.Value(u, v).Coord()
+            for u in us.tolist()
+            for v in vs.tolist()
+            if within.Perform(gp_Pnt2d(u, v)) == TopAbs_IN
+        ]
+        return np.array(points).reshape(-1, 3)
+
+    def distances(self, index: int, points: Array) -> Array:
+        """Distances of points ``(q, 3)`` from the whole surface under a face."""
+        location = TopLoc_Location()
+        surface = BRep_Tool.Surface_s(self.document.faces[index], location)
+        frame = matrix(location)
+        with quiet():
+            return np.fromiter(_off(surface, (points - frame[:3, 3]) @ frame[:3, :3]), float, len(points))
+
+    def thinnest(self, index: int, part: Part) -> tuple[float, Point | None]:
+        """Least distance from points of a face through the material of its part, along the normal; and where."""
+        face = self.document.faces[index]
+        rays = IntCurvesFace_ShapeIntersector()
+        rays.Load(part.shape, 1e-7)
+        surface = BRepAdaptor_Surface(face, False)
+        within = BRepTopAdaptor_FClass2d(TopoDS.Face_s(face.Oriented(TopAbs_FORWARD)), 1e-9)
+        bounds = BRepTools.UVBounds_s(face)
+        sign = 1.0 if face.Orientation() == TopAbs_REVERSED else -1.0
+        best: tuple[float, Point | None] = (float("inf"), None)
+        point, du, dv = gp_Pnt(), gp_Vec(), gp_Vec()
+        shares = (np.arange(_LEAST) + 0.5) / _LEAST
+        for u in (bounds[0] + (bounds[1] - bounds[0]) * shares).tolist():
+            for v in (bounds[2] + (bounds[3] - bounds[2]) * shares).tolist():
+                surface.D1(u, v, point, du, dv)
+                normal = du.Crossed(dv)
+                if normal.Magnitude() < 1e-12 or within.Perform(gp_Pnt2d(u, v)) != TopAbs_IN:
+                    continue
+                rays.Perform(gp_Lin(point, gp_Dir(normal * sign)), 1e-4, 1e10)
+                hits = [rays.WParameter(k) for k in range(1, rays.NbPnt() + 1)]
+                if hits and min(hits) < best[0]:
+                    best = min(hits), point.Coord()
+        return best
+
+    def edge_distances(self, edges: Iterable[int], points: Array) -> Array:
+        """Distances of points ``(q, 3)`` from the nearest of some edges."""
+        target = compound(self.document.edges[index] for index in edges)
+        with quiet():
+            vertices = (BRepBuilderAPI_MakeVertex(gp_Pnt(*point)).Vertex() for point in points.tolist())
+            return np.array([BRepExtrema_DistShapeShape(vertex, target).Value() for vertex in vertices])
+
+
+def _off(surface: Geom_Surface, points: Array) -> Iterator[float]:
+    """Orthogonal distances; where a point has no foot on the surface, that from its border."""
+    project = GeomAPI_ProjectPointOnSurf()
+    project.Init(surface, *surface.Bounds(), 1e-9)
+    analysis = ShapeAnalysis_Surface(surface)
+    for x, y, z in points.tolist():
+        point = gp_Pnt(x, y, z)
+        project.Perform(point)
+        if project.NbPoints():
+            yield project.LowerDistance()
+        else:
+            analysis.ValueOfUV(point, 1e-9)
+            yield analysis.Gap()

@@ -1,0 +1,63 @@
+"""The text of a STEP file as the kernel writes it, made shorter and the same in every process."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+#: What the kernel calls a product without a name, followed by a count.
+UNNAMED = b"mracad unnamed product"
+
+_STYLES = b" = MECHANICAL_DESIGN_GEOMETRIC_PRESENTATION_REPRESENTATION("
+_ENTITY = re.compile(rb"#(\d+) = (?:[^';]|'[^']*')*;\n")
+_REFERENCE = re.compile(rb"'[^']*'|#(\d+)")
+
+
+def tidy(text: bytes) -> bytes:
+    """Take out of a STEP file what differs from process to process, and what says nothing.
+
+    What the kernel counts through the life of the process is counted from 1, groups of styles come in the order of
+    the parts they colour, reals have no trailing zeros and points no line breaks.
+    """
+    pieces = text.split(b"'")  # every second one is within quotes
+    products = usages = 0
+    for i in range(0, len(pieces) - 1, 2):
+        if pieces[i].endswith(b"PRODUCT(") and pieces[i + 1].startswith(UNNAMED):
+            products += 1
+            pieces[i + 1] = pieces[i + 3] = b"part %d" % products
+        elif pieces[i].endswith(b"NEXT_ASSEMBLY_USAGE_OCCURRENCE("):
+            usages += 1
+            pieces[i + 1] = b"%d" % usages
+    plain = re.sub(rb"\n {4}(?=[-.0-9])", b"", b"'".join(pieces[::2]))
+    pieces[::2] = b"".join(re.split(rb"(\.(?:[0-9]*[1-9])?)0+(?=[,)E])", plain)).split(b"'")
+    return _styles_in_order(b"'".join(pieces))
+
+
+def _styles_in_order(text: bytes) -> bytes:
+    """Put the groups of styles in the order of what they colour, and number everything from the first of them anew.
+
+    The kernel writes them in the order of addresses in memory, another one in each process.
+    """
+    if text.count(_STYLES) < 2:
+        return text
+    start, end = text.rfind(b"\n#", 0, text.find(_STYLES)) + 1, text.rfind(b"ENDSEC;")
+    entities = {int(entity[1]): entity[0] for entity in _ENTITY.finditer(text, start, end)}
+    first = min(entities)
+    groups = [number for number, entity in entities.items() if _STYLES in entity]
+
+    def below(number: int, seen: set[int]) -> Iterator[int]:
+        """An entity and all that it refers to, depth first: of these, what comes before the styles is settled."""
+        if number in seen:
+            return
+        seen.add(number)
+        yield number
+        for found in _REFERENCE.finditer(entities[number], len(b"#%d" % number)) if number in entities else ():
+            if found[1]:
+                yield from below(int(found[1]), seen)
+
+    groups.sort(key=lambda group: [number for number in below(group, set()) if number < first])
+    seen: set[int] = set()
+    order = [number for root in (*groups, *entities) for number in below(root, seen) if number in entities]
+    anew = {old: b"#%d" % new for old, new in zip(order, entities, strict=True)}
+    body = text[:start] + b"".join(entities[number] for number in order) + text[end:]
+    return _REFERENCE.sub(lambda found: anew.get(int(found[1]), found[0]) if found[1] else found[0], body)

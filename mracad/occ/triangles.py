@@ -1,0 +1,110 @@
+"""Triangles of every face of a document, as arrays."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from OCP.BRep import BRep_Tool
+from OCP.BRepMesh import BRepMesh_IncrementalMesh
+from OCP.BRepTools import BRepTools
+from OCP.TopAbs import TopAbs_REVERSED
+from OCP.TopLoc import TopLoc_Location
+
+from mracad.occ.document import Document
+from mracad.occ.settings import quiet
+from mracad.occ.topology import box, compound, matrix
+
+Array = np.ndarray
+_CHORD = 2e-4  # of the diagonal
+_ANGLE = 12.0  # degrees
+_WELD = 2e-7  # of the diagonal: about the resolution of 32-bit numbers
+
+
+@dataclass(frozen=True, eq=False)
+class Triangles:
+    """A mesh of all parts, each once and in its own frame, mm.
+
+    Attributes
+    ----------
+    points : ndarray (n, 3)
+        Corners that coincide within rounding are one point of their part.
+    corners : ndarray of int (m, 3)
+        Point numbers, anticlockwise seen from outside.
+    faces, parts : ndarray of int (m,)
+        Which face and which part each triangle belongs to.
+    missing : tuple of int
+        Faces that the kernel could not mesh.
+    """
+
+    points: Array
+    corners: Array
+    faces: Array
+    parts: Array
+    missing: tuple[int, ...]
+
+
+def triangles(document: Document, chord: float | None = None, angle: float | None = None) -> Triangles:
+    """Mesh a document.
+
+    Parameters
+    ----------
+    document : Document
+    chord : float, optional
+        How far the mesh may be from the surface, mm; by default 1/5000 of the model's diagonal.
+    angle : float, optional
+        How far neighbouring triangles may turn along a curve, degrees; by default 12.
+    """
+    points: list[Array] = []
+    corners: list[Array] = []
+    owners: list[tuple[int, int, int]] = []
+    missing = []
+    count = 0
+    with quiet():
+        whole = compound(part.shape for part in document.parts)
+        BRepTools.Clean_s(whole)
+        bounds = box(document.shape)
+        diagonal = float(np.linalg.norm(bounds[1] - bounds[0]))
+        BRepMesh_IncrementalMesh(whole, chord or _CHORD * diagonal, False, float(np.radians(angle or _ANGLE)), False)
+        for number, part in enumerate(document.parts):
+            first = count
+            own: list[Array] = []
+            for index in range(part.first, part.first + part.faces.Extent()):
+                face, location = document.faces[index], TopLoc_Location()
+                mesh = BRep_Tool.Triangulation_s(face, location)
+                if mesh is None:
+                    missing.append(index)
+                    continue
+                frame = matrix(location)
+                nodes = np.array([mesh.Node(i).Coord() for i in range(1, mesh.NbNodes() + 1)])
+                own.append(nodes @ frame[:3, :3].T + frame[:3, 3])
+                three = np.array([mesh.Triangle(i).Get() for i in range(1, mesh.NbTriangles() + 1)]) - 1 + count
+                corners.append(three[:, ::-1] if face.Orientation() == TopAbs_REVERSED else three)
+                owners.append((index, number, len(three)))
+                count += len(nodes)
+            if own:
+                welded, leader = _weld(np.concatenate(own), _WELD * diagonal)
+                points.append(welded)
+                for k in range(len(corners)):
+                    if owners[k][1] == number:
+                        corners[k] = leader[corners[k] - first] + first
+        BRepTools.Clean_s(whole)
+    if not corners:
+        return Triangles(np.empty((0, 3)), np.empty((0, 3), int), np.empty(0, int), np.empty(0, int), tuple(missing))
+    three = np.concatenate(corners)
+    faces, parts = (np.repeat([o[k] for o in owners], [o[2] for o in owners]) for k in (0, 1))
+    whole_ones = (three[:, 0] != three[:, 1]) & (three[:, 1] != three[:, 2]) & (three[:, 2] != three[:, 0])
+    return Triangles(np.concatenate(points), three[whole_ones], faces[whole_ones], parts[whole_ones], tuple(missing))
+
+
+def _weld(points: Array, reach: float) -> tuple[Array, Array]:
+    """The points, and for each the first of those that coincide with it."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+    from scipy.spatial import cKDTree
+
+    pairs = cKDTree(points).query_pairs(reach, output_type="ndarray")
+    links = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(points), len(points)))
+    groups = connected_components(links, directed=False)[1]
+    _, first = np.unique(groups, return_index=True)
+    return points, first[groups]

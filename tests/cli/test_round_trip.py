@@ -1,0 +1,79 @@
+"""One face of a document is edited: everything that the document says beside that stays, read back by the kernel."""
+
+import json
+
+import numpy as np
+import pytest
+
+from mracad import occ
+from mracad.constraint.region import face_region, supported
+from mracad.model import Displacement, Offset
+from mracad.occ.contents import contents
+from tests.conftest import CORPUS
+
+EXPECTED = {  # usages, products, colours, layers, annotations
+    "as1_assembly_colours_occ": (13, 9, 5, 1, 0),
+    "nist_ctc02_pmi_ap242": (2, 3, 2, 0, 162),
+    "bracket_featuretype_inch_sw": (0, 1, 1, 0, 0),
+    "impeller_shapr3d": (2, 3, 11, 0, 0),
+}
+MOVED = 1e-3
+
+
+def inner(model, surface):
+    """An offset of the control points that no edge depends on, in a refinement where there are such."""
+    knots = [np.linspace(*k.domain, 14)[1:-1] for k in (surface.net.u, surface.net.v)]
+    net = surface.net.refined(*knots)
+    free = np.ones(net.poles.shape[:2], bool)
+    for face in surface.faces:
+        for crossed in face_region(net, model.faces[face]).crossed:
+            free &= ~supported(net, crossed)
+    return Offset(np.repeat(np.where(free, MOVED, 0.0)[..., None], 3, axis=2), *knots) if free.any() else None
+
+
+def round_trip(source, target):
+    """Edit one face, write, read back, compare; what the document says beside geometry."""
+    document = occ.read_step(source)
+    model, before = occ.view(document), contents(document)
+    surface, offset = next((s, o) for s in model.surfaces for o in [inner(model, s)] if o is not None)
+    occ.apply(document, model, Displacement({surface.index: offset}))
+    occ.write_step(document, target)
+    again = occ.read_step(target)
+    seen, after = occ.view(again), contents(again)
+    assert after == before
+    for old, new in zip(model.faces, seen.faces, strict=True):
+        for word in ("name", "product", "colour", "instances"):
+            assert getattr(old, word) == getattr(new, word)
+        # the kernel writes a torus that meets itself as a surface of revolution
+        assert old.kind == new.kind or (old.kind, new.kind) == ("torus", "revolution")
+    for old, new in zip(model.surfaces, seen.surfaces, strict=True):
+        if old.index == surface.index:
+            refined = old.net.refined(offset.u_knots, offset.v_knots)
+            assert np.abs(new.net.poles - refined.poles).max() == pytest.approx(MOVED, rel=1e-6)
+        else:
+            assert np.abs(old.net.poles - new.net.poles).max() <= 1e-12 * model.diagonal
+    return before
+
+
+@pytest.mark.parametrize("name", ["assembly", "trimmed"])
+def test_samples(samples, tmp_path, name):
+    found = round_trip(samples / f"{name}.step", tmp_path / "out.step")
+    assert (found.unit, found.usages, len(found.colours)) == (("in", 6, 4) if name == "assembly" else ("mm", 0, 0))
+
+
+@pytest.mark.skipif(CORPUS is None, reason="MRACAD_CORPUS does not name a folder of STEP models")
+@pytest.mark.parametrize("name", EXPECTED)
+def test_real_models(tmp_path, name):
+    found = round_trip(CORPUS / f"{name}.step", tmp_path / "out.step")
+    layers = {layer for layer, _ in found.layers}
+    annotations = sum(found.annotations.values())
+    assert (found.usages, len(found.products), len(found.colours), len(layers), annotations) == EXPECTED[name]
+
+
+def test_one_edit_changes_every_instance(mracad, samples, tmp_path):
+    out = tmp_path / "out.step"
+    assert mracad("smooth", samples / "assembly.step", "--scale", "8mm", "-o", out).code == 0
+    body = json.loads(mracad("compare", samples / "assembly.step", out, "--json").out)
+    assert body["failed"] == ["deviation"]
+    assert {face for finding in body["layers"][1]["findings"] for face in finding["faces"]} == {7}
+    assert next(p for p in occ.view(occ.read_step(out)).faces if p.index == 6).instances == 4

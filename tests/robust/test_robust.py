@@ -1,0 +1,105 @@
+"""Files with faults, kills, limits and crashes: an error message, and never a partial file."""
+
+import ctypes
+import faulthandler
+import os
+import subprocess
+import sys
+import time
+
+import pytest
+
+from mracad import guard
+from mracad.errors import Code, EditError, FileError, MracadError
+from tests.robust import kill, mutate
+
+NUMBERS = (*range(10), 499)
+
+
+@pytest.mark.parametrize("number", NUMBERS)
+def test_a_file_with_faults(number):
+    fault, code, wrong = mutate.verdict(number, limit=4)
+    assert not wrong, (fault, code, wrong)
+
+
+def test_kills_leave_the_old_file_or_the_new_one():
+    assert not kill.kills(10)
+
+
+def crash():
+    faulthandler.disable()
+    ctypes.string_at(0)
+
+
+def abort():
+    faulthandler.disable()
+    os.abort()
+
+
+def hang():
+    while True:
+        pass
+
+
+def hungry():
+    return len(bytes(10**8))
+
+
+@pytest.mark.parametrize(
+    ("work", "code", "says"),
+    [
+        (crash, Code.INTERNAL, "SIGSEGV"),
+        (abort, Code.INTERNAL, "SIGABRT"),
+        (hang, Code.LIMIT, "time limit of 0.3 s"),
+    ],
+)
+def test_a_crash_or_an_endless_loop_is_an_error(work, code, says):
+    start = time.monotonic()
+    with pytest.raises(MracadError, match=says) as error:
+        guard.run(work, 0.3)
+    assert error.value.code == code and error.value.hint and time.monotonic() - start < 3
+
+
+def test_too_much_memory_is_an_error():
+    with pytest.raises(MracadError, match="memory limit of 1 MB") as error:
+        guard.run(hungry, memory=guard.size("1MB"))
+    assert error.value.code == Code.LIMIT
+    assert guard.run(hungry, memory=guard.size("3GB")) == 10**8
+
+
+def test_results_and_errors_come_back():
+    assert guard.run(lambda: {"a": [1, 2]}, 60) == {"a": [1, 2]}
+    for kind in (EditError, FileError):
+
+        def work(kind=kind):
+            raise kind("what", "why")
+
+        with pytest.raises(kind) as error:
+            guard.run(work)
+        assert (error.value.message, error.value.hint) == ("what", "why")
+
+
+def test_a_limit_that_is_not_hit_costs_little():
+    start = time.perf_counter()
+    for _ in range(5):
+        guard.run(lambda: None, 60, guard.size("4GB"))
+    assert (time.perf_counter() - start) / 5 < 0.2
+
+
+def command(*words):
+    return subprocess.run(
+        [sys.executable, "-m", "mracad_cli", *map(str, words)], capture_output=True, text=True, timeout=60
+    )
+
+
+def test_limits_on_the_command_line(samples, tmp_path):
+    out = tmp_path / "out.step"
+    words = ["smooth", samples / "panel.step", "--scale", "16mm", "-o", out]
+    late = command(*words, "--time-limit", "0.2")
+    assert late.returncode == 5 and late.stderr.count("\n") == 1 and "0.2 s" in late.stderr and late.stdout == ""
+    assert not list(tmp_path.iterdir())
+    full = command(*words, "--memory-limit", "120MB")
+    assert full.returncode == 5 and "120 MB" in full.stderr and not list(tmp_path.iterdir())
+    assert command(*words, "--time-limit", "60", "--memory-limit", "4GB").returncode == 0 and out.exists()
+    for wrong in (["--time-limit", "0"], ["--time-limit", "soon"], ["--memory-limit", "much"]):
+        assert command("info", samples / "panel.step", *wrong).returncode == 2
