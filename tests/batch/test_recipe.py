@@ -161,9 +161,28 @@ def test_a_failed_check_stops_the_run(tmp_path, capsys):
     assert main(["pipeline", *words, "--json"]) == 1
     body = json.loads(capsys.readouterr().out)
     assert body["written"] == [] and not (tmp_path / "out.step").exists()
-    assert [step["step"] for step in body["steps"]] == ["check"] and "free edges" in body["steps"][0]["failures"][0]
+    assert [(step["step"], step["failed"]) for step in body["steps"]] == [("check", ["shells"])]
     assert main(["pipeline", "smooth --scale 20%", *words[1:], "--dry-run"]) == 0
     assert "1. smooth: smooth --scale 20%" in capsys.readouterr().out and not (tmp_path / "out.step").exists()
+
+
+def test_a_result_is_compared_with_what_came_in_or_with_a_file(tmp_path):
+    source = models(tmp_path / "in", 1) / "part000.step"
+
+    def code(line: str) -> int:
+        return main(["pipeline", line, str(source), "-o", str(tmp_path / "out.step"), "--overwrite"])
+
+    assert code("smooth --scale 20% ! compare --max-deviation 20%") == 0
+    (tmp_path / "out.step").rename(tmp_path / "ref.step")
+    assert code("smooth --scale 20% ! compare --max-deviation 1um") == 1
+    assert not (tmp_path / "out.step").exists()
+    path = written(
+        tmp_path, '[[step]]\nuse = "smooth"\nscale = "20%"\n[[step]]\nuse = "compare"\nreference = "ref.step"\n'
+    )
+    assert (
+        main(["run", str(path), str(source), "-o", str(tmp_path / "out.step"), "--depfile", str(tmp_path / "d")]) == 0
+    )
+    assert f" {path} {tmp_path / 'ref.step'}\n" in (tmp_path / "d").read_text()
 
 
 def test_the_page_of_steps_is_up_to_date():
