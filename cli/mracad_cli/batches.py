@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import json
 import os
-import re
 import sys
 import time
 from collections import Counter
 from collections.abc import Sequence
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -27,6 +27,7 @@ from mracad.recipe import Recipe
 from mracad_cli.files import check_target, depfile_text, write_text
 from mracad_cli.progress import Progress
 from mracad_cli.steps import needed, plan
+from mracad_cli.verdicts import clean
 
 
 def run_batch(
@@ -70,10 +71,11 @@ def run_batch(
     with (
         Manifest(Path(folder)) as manifest,
         Cluster(cluster, limits, workers) if cluster else Pool(workers, limits, warm) as executor,
+        closing(run(recipe, items, manifest, executor, settings)) as results,
         Progress(rate=True) as progress,
     ):
         try:
-            for outcome in run(recipe, items, manifest, executor, settings):
+            for outcome in results:
                 outcomes.append(outcome)
                 if as_json and outcome.status != "not tried":
                     print(json.dumps(msgspec.to_builtins(outcome), ensure_ascii=False), flush=True)
@@ -125,7 +127,7 @@ def junit_text(name: str, outcomes: Sequence[Outcome], seconds: float) -> str:
     suite = ElementTree.SubElement(root, "testsuite", {"name": name, **shared})
     for outcome in outcomes:
         case = ElementTree.SubElement(
-            suite, "testcase", {"classname": name, "name": outcome.file, "time": f"{outcome.seconds:.3f}"}
+            suite, "testcase", {"classname": name, "name": clean(outcome.file), "time": f"{outcome.seconds:.3f}"}
         )
         if outcome.status == "failed":
             tag = "failure" if outcome.code == 1 else "error"
@@ -137,8 +139,7 @@ def junit_text(name: str, outcomes: Sequence[Outcome], seconds: float) -> str:
         elif outcome.status == "unchanged":
             ElementTree.SubElement(case, "system-out").text = "unchanged"
     ElementTree.indent(root)
-    text = re.sub(r"[^\t\n\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]", "?", ElementTree.tostring(root, "unicode"))
-    return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n'
+    return '<?xml version="1.0" encoding="utf-8"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"
 
 
 def _depfile(recipe: Recipe, items: Sequence[Item], folder: Path) -> str:

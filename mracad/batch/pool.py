@@ -20,6 +20,7 @@ import time
 from collections.abc import Callable
 from concurrent.futures import Executor, Future
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import psutil
@@ -84,10 +85,10 @@ class Pool(Executor):
         self._warm = warm
         self._tasks: queue.SimpleQueue[_Task | None] = queue.SimpleQueue()
         self._slots: list[threading.Thread] = []
-        self._busy: dict[int, _Worker] = {}
+        self._workers: list[_Worker] = []
         self._open = 0  # tasks that are not done
         self._lock = threading.Lock()
-        self._closing = False
+        self._closing = self._stopped = False
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
         if self._closing:
@@ -107,11 +108,8 @@ class Pool(Executor):
         """Let what was submitted finish; with ``cancel_futures`` end the workers at once."""
         self._closing = True
         if cancel_futures:
-            with contextlib.suppress(queue.Empty):
-                while True:
-                    if task := self._tasks.get_nowait():
-                        task.future.cancel()
-            for worker in list(self._busy.values()):
+            self._stopped = True
+            for worker in list(self._workers):
                 worker.kill(CrashError("stopped"))
         for _ in self._slots:
             self._tasks.put(None)
@@ -123,42 +121,45 @@ class Pool(Executor):
         """Do tasks, in a worker that is replaced when it is lost or has grown."""
         worker: _Worker | None = None
         while (task := self._tasks.get()) is not None:
-            if task.future.set_running_or_notify_cancel():
-                if worker is None or worker.lost():
-                    worker = _Worker()
-                    self._busy[id(worker)] = worker
-                outcome = self._done(worker, task.payload)
-                if worker.lost() or worker.memory() > self._memory / 2:
-                    del self._busy[id(worker)]
-                    worker.close()
-                    worker = None
+            tell: Callable[[], object] = bool
+            if not self._stopped and task.future.set_running_or_notify_cancel():
+                if worker and worker.lost():
+                    worker = self._retired(worker)
+                try:
+                    worker = worker or self._started()
+                    tell = partial(task.future.set_result, worker.call(self._seconds, task.payload))
+                except BaseException as error:
+                    tell = partial(task.future.set_exception, error)
+                if worker and (worker.lost() or worker.memory() > self._memory / 2):
+                    worker = self._retired(worker)
             else:
-                outcome = None
+                task.future.cancel()
             with self._lock:
                 self._open -= 1
-            if outcome:
-                outcome(task.future)
+            tell()
         if worker:
-            del self._busy[id(worker)]
-            worker.close()
+            self._retired(worker)
 
-    def _done(self, worker: _Worker, payload: bytes) -> Callable[[Future[Any]], None]:
-        """Do one task, and return what is to be told to its future."""
+    def _started(self) -> _Worker:
+        """A worker that is warm."""
+        worker = _Worker()
+        self._workers.append(worker)
         try:
-            if not worker.warm:
-                worker.call(READY, pickle.dumps((self._warm or bool, (), {})))
-                worker.warm = True
-            value = worker.call(self._seconds, payload)
-        except BaseException as error:
-            failure = error
-            return lambda future: future.set_exception(failure)
-        return lambda future: future.set_result(value)
+            worker.call(READY, pickle.dumps((self._warm or bool, (), {})))
+        except BaseException:
+            self._retired(worker)
+            raise
+        return worker
+
+    def _retired(self, worker: _Worker) -> None:
+        self._workers.remove(worker)
+        worker.close()
 
     def _watch(self) -> None:
         """End the workers that overstep a limit."""
         while any(slot.is_alive() for slot in self._slots):
             time.sleep(TICK)
-            for worker in list(self._busy.values()):
+            for worker in list(self._workers):
                 if time.monotonic() > worker.deadline:
                     hint = "raise --time-limit, or look into the file"
                     worker.kill(LimitError(f"not done within the time limit of {worker.seconds:g} s", hint))
@@ -191,7 +192,6 @@ class _Worker:
             process_group=None if sys.platform == "win32" else 0,  # an interrupt is for the client to act upon
         )
         self.reason: MracadError | None = None
-        self.warm = False
         self.seconds, self.deadline = 0.0, math.inf
         self._process = psutil.Process(self.process.pid)
 

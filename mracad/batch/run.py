@@ -6,7 +6,7 @@ import glob
 import json
 import os
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Generator, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import dataclass
 from pathlib import Path
@@ -154,7 +154,7 @@ def _expanded(word: str) -> list[tuple[str, str]]:
 
 def run(
     recipe: Recipe, items: Iterable[Item], manifest: Manifest, executor: Workers, settings: Settings
-) -> Iterator[Outcome]:
+) -> Generator[Outcome, None, None]:
     """Take files through a recipe; yields outcomes as they come.
 
     Parameters
@@ -234,15 +234,16 @@ class _Batch:
         for future in wait(self.pending, return_when=FIRST_COMPLETED).done:
             task = self.pending.pop(future)
             try:
-                yield self._written(task, future.result())
+                outcome = self._written(task, future.result())
             except Exception as failure:
                 error = lost(failure)
                 if not isinstance(error, MracadError):
                     raise
                 if error.code in RETRIED and task.attempts <= self.settings.retry:
                     self._submit(task)
-                else:
-                    yield _failed(task.item, error, task)
+                    continue
+                outcome = _failed(task.item, error, task)
+            yield outcome
 
     def _submit(self, task: _Task) -> None:
         task.attempts += 1
@@ -261,7 +262,6 @@ class _Batch:
         return digest(json.dumps([*parts, work.input_unit, work.schema, work.epoch], sort_keys=True).encode())
 
     def _written(self, task: _Task, product: Product) -> Outcome:
-
         output = task.item.output
         self.manifest.write(output, task.key, product.data, self.settings.if_changed)
         if self.settings.record:
