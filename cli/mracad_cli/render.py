@@ -7,12 +7,15 @@ from typing import TYPE_CHECKING, Any
 
 import msgspec
 
+from mracad.options import Selection
+
 if TYPE_CHECKING:
     from mracad.audit.continuity import SeamMeasure, SeamSummary
     from mracad.constraint.seam import Treatment
     from mracad.edit.result import FaceOutcome
-    from mracad.job import Report
+    from mracad.job import Judged, Report
     from mracad.occ.check import Validity
+    from mracad.recipe import Step
 
 SHOWN = 6
 """Most faces named in one line."""
@@ -42,27 +45,29 @@ def verdict(valid: bool) -> str:
     return "yes" if valid else "no"
 
 
-def edit_lines(report: Report, done: str, quiet: str, written: str) -> list[str]:
-    """The four lines after an edit.
+def step_lines(step: Step, result: Report | Judged) -> list[str]:
+    """What a step of a recipe did; its first line begins with the step's name."""
+    from mracad.job import Report
 
-    Parameters
-    ----------
-    report : Report
-    done : str
-        What was done to the edited faces, ``"smoothed at 5 mm"``.
-    quiet : str
-        What unchanged faces are, ``"already smooth there"``.
-    written : str
-        The end of the last line.
-    """
+    if isinstance(result, Report):
+        assert isinstance(step.options, Selection)
+        first, *rest = edit_lines(result, step.options, f"{result.seconds:.1f} s")
+        return [f"{step.id}: {first}", *(f"  {line}" for line in rest)]
+    if result.passed:
+        return [f"{step.id}: passed"]
+    return [f"{step.id}: failed: {failure}" for failure in result.failures]
+
+
+def edit_lines(report: Report, options: Selection, end: str) -> list[str]:
+    """The four lines after an edit; ``end`` is that of the last one."""
     from mracad.audit.continuity import key, summary
 
     edit, model = report.edit, report.model
     nurbs = [o for o in edit.outcomes if o.status != "analytic"]
-    parts = [f"{len(edit.faces('edited'))} {done}"]
+    parts = [f"{len(edit.faces('edited'))} {options.done}"]
     unchanged = edit.faces("unchanged")
     if unchanged:
-        reasons = Counter("crease lines only" if o.reason == "crease lines only" else quiet for o in unchanged)
+        reasons = Counter("crease lines only" if o.reason == "crease lines only" else options.quiet for o in unchanged)
         parts += [f"{count} {reason}" for reason, count in reasons.items()]
     stuck = edit.faces("stuck")
     if stuck:
@@ -91,7 +96,7 @@ def edit_lines(report: Report, done: str, quiet: str, written: str) -> list[str]
         lines[-1] += f"; {len(worse)} less smooth"
     if edit.edges:
         lines[-1] += f"; {edge_words(edit.edges)}"
-    lines.append(f"valid: {verdict(report.valid_after.valid)} (was {verdict(report.valid_before.valid)}); {written}")
+    lines.append(f"valid: {verdict(report.valid_after.valid)} (was {verdict(report.valid_before.valid)}); {end}")
     return lines
 
 
@@ -132,6 +137,17 @@ def seam(value: SeamMeasure) -> dict[str, Any]:
         "faces": [i + 1 for i in value.faces],
         "smooth": value.smooth,
     }
+
+
+def result(value: Report | Judged) -> dict[str, Any]:
+    """What a step did, in full."""
+    from mracad.job import Report
+
+    if isinstance(value, Report):
+        return report(value)
+    from mracad_cli.verdicts import as_data
+
+    return as_data(value.verdict, value.failed)
 
 
 def report(value: Report) -> dict[str, Any]:

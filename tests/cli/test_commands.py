@@ -164,7 +164,7 @@ def test_streams_and_equal_bytes_in_any_process(samples, tmp_path):
     assert one.stdout.startswith(b"ISO-10303-21;") and one.stdout == two.stdout
     assert b"smoothed at 16mm" in one.stderr and str(tmp_path).encode() not in one.stdout
     header = one.stdout[: one.stdout.index(b"DATA;")]
-    assert b"scale=16mm" in header and b"mracad" in header
+    assert b"--scale 16mm" in header and b"mracad" in header
 
 
 def test_help_is_quick_and_loads_no_kernel():
