@@ -246,7 +246,7 @@ def run(
             valid_before = check(document)
         valid_after = valid_before
         after = seams(result.displacement.applied(model)) if result.displacement.offsets else before
-        torn = {i for i in _torn(before, after) if model.faces[i].surface is not None} - spoiled.keys()
+        torn = {i for i in _torn(before, after, result) if model.faces[i].surface is not None} - spoiled.keys()
         if torn:
             spoiled |= dict.fromkeys(torn, "its seams would not hold")
             continue
@@ -289,12 +289,14 @@ def _refuse_if_stuck(model: Model, result: Edit) -> None:
         )
 
 
-def _torn(before: list[SeamMeasure], after: list[SeamMeasure]) -> set[int]:
-    """Faces of seams that an edit would open, or that were smooth and would not be."""
+def _torn(before: list[SeamMeasure], after: list[SeamMeasure], edit: Edit) -> set[int]:
+    """Faces of seams that an edit would open, or that were smooth and would not be, without having moved them."""
+    moved = {t.edge for t in edit.edges if t.how != "frozen"}
     return {
         face
         for old, new in zip(before, after, strict=True)
-        if new.gap > old.gap + WIDER or (old.smooth and new.angle > old.angle + STEEPER)
+        if old.edge not in moved
+        and (new.gap > old.gap + WIDER or (old.smooth and new.angle > old.angle + STEEPER))
         for face in old.faces
     }
 

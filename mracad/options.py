@@ -135,18 +135,15 @@ class Selection(Options, frozen=True, kw_only=True, forbid_unknown_fields=True):
         Meta(description="Continuity that every edge keeps: position, tangent plane or curvature."),
     ] = "g1"
     edges: Annotated[
-        Literal["frozen", "coupled"],
+        Literal["coupled", "frozen"],
         Meta(
-            description="Edges between two edited faces: frozen, none moves; coupled, they move and stay as smooth as "
-            "they were, where both sides are natural boundaries and that is possible."
+            description="Edges between two edited faces: coupled, they move and stay as smooth as they were where that "
+            "is possible; frozen, none moves."
         ),
-    ] = "frozen"
+    ] = "coupled"
     fit_g1: Annotated[
-        float | None,
-        Meta(
-            description="Make seams tangent that are meant to be: those between edited faces under this angle (°).",
-            ge=0.0,
-        ),
+        Annotated[float, Meta(ge=0.0, le=45.0)] | None,
+        Meta(description="Make seams tangent that are meant to be: those between edited faces under this angle (°)."),
     ] = None
     close_gaps: Annotated[
         bool,

@@ -74,7 +74,9 @@ def smooth(
     scale = None if options.scale is None else length(options.scale, model.diagonal, "scale")
     movable = {i for i in selected if model.faces[i].surface is not None}
     works = [_SurfaceSmoothing(model, surface, movable, options) for surface in model.surfaces]
-    together = Together(model, movable, options, {w.index: w.spans for w in works}, {w.index: w.creases for w in works})
+    coarser = {work.index for work in works if work.coarser_knots(scale)}
+    spans, creases = {w.index: w.spans for w in works}, {w.index: w.creases for w in works}
+    together = Together(model, movable, coarser, options, spans, creases)
     moved = together.smoothed(scale, bound)
     outcomes: dict[int, FaceOutcome] = {}
     offsets: dict[int, Offset] = {}
@@ -205,21 +207,22 @@ class _SurfaceSmoothing:
     def _detail(self, points: Array) -> bool:
         return _largest(self.change, points) > DETAIL
 
-    def _target(self, scale: float | None) -> _Target | None:
-        """S f at the scale or level asked for; None where the knots allow no coarser space."""
-        if scale is not None:
-            coarse = tuple(
-                ladder_for_scale(k, s, scale, keep=c)
-                for k, s, c in zip(_pair(self.net), self.spans, self.creases, strict=True)
-            )
-            return None if coarse == _pair(self.net) else self._projected(coarse, scale)
-        assert self.options.level is not None
+    def coarser_knots(self, scale: float | None) -> list[list[KnotVector]]:
+        """Ladders in u and v, of one rung where a scale is given; empty where the knots allow no coarser space."""
         ladders = [
-            rungs_by_level(k, keep=c, lengths=s)
+            rungs_by_level(k, keep=c, lengths=s) if scale is None else [ladder_for_scale(k, s, scale, keep=c)]
             for k, s, c in zip(_pair(self.net), self.spans, self.creases, strict=True)
         ]
-        if all(len(rungs) == 1 for rungs in ladders):
+        return [] if all(r[-1] == k for r, k in zip(ladders, _pair(self.net), strict=True)) else ladders
+
+    def _target(self, scale: float | None) -> _Target | None:
+        """S f at the scale or level asked for; None where the knots allow no coarser space."""
+        ladders = self.coarser_knots(scale)
+        if not ladders:
             return None
+        if scale is not None:
+            return self._projected((ladders[0][0], ladders[1][0]), scale)
+        assert self.options.level is not None
         whole, part = int(self.options.level), self.options.level % 1.0
         levels = [self._rung(ladders, whole)] + ([self._rung(ladders, whole + 1)] if part else [])
         weights = [1.0 - part, part][: len(levels)]

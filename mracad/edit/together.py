@@ -25,6 +25,7 @@ from mracad.options import Smooth, length
 from mracad.wavelet.ladder import ladder_for_scale, rungs_by_level
 
 Array = np.ndarray
+_Spaces = dict[Direction, Coarse]
 
 WIDER = 1e-6
 """A seam may end up with so much more of a gap, mm; otherwise it is frozen."""
@@ -36,6 +37,8 @@ turns with the faces); otherwise it is frozen."""
 MENDED, BENT = 0.1, math.radians(0.1)
 """The same where defects are mended: beside points that stay, the shares that gap and angle may gain are these and the
 gap tolerance."""
+
+STUCK = "a face there has no free poles"
 
 LEAST = 0.5
 """A seam with less of the freedom of the smoother of its two sides is frozen."""
@@ -72,6 +75,8 @@ class Together:
     model : Model
     movable : collection of int
         Faces that the edit may move.
+    coarser : collection of int
+        Surfaces that have something to be smoothed; seams between others stay.
     options : Smooth
     spans : mapping of int to pair of ndarray
         Arc lengths of the knot spans in u and v of each surface, mm.
@@ -90,6 +95,7 @@ class Together:
         self,
         model: Model,
         movable: Collection[int],
+        coarser: Collection[int],
         options: Smooth,
         spans: Mapping[int, tuple[Array, Array]],
         creases: Mapping[int, tuple[frozenset[float], frozenset[float]]],
@@ -106,6 +112,8 @@ class Together:
             wishes = Wishes(options.keep, math.radians(options.fit_g1 or 0.0), options.close_gaps)
             self.found, self.closing, self.frozen = seams(model, movable, wishes)
             self._try_trimmed(wishes)
+            idle = (seam for seam in self._every() if not {seam.a.surface, seam.b.surface} & set(coarser))
+            self._freeze({seam.edge: "nothing to smooth on either side" for seam in idle})
         self.freedom: dict[int, int] = {}
         self.inserted: dict[int, tuple[Array, Array]] = {}
 
@@ -155,10 +163,15 @@ class Together:
             lines = [(strip, line(strip, self._knots, self._lengths, self._creases)) for strip in self._strips()]
             if not self._joined():
                 return {}
-            couplings = self._couplings(lines, scale)
-            broken = self._locked(couplings[0][1])
+            steps = self._steps(lines, scale)
+            nets = self._refined([coarse for _, coarse in steps])
+            separations = {i: self._separated(self.model.surfaces[i], net, self.moving) for i, net in nets.items()}
+            broken = self._stuck(separations)
             if not broken:
-                moved = self._moved(couplings, bound)
+                couplings = [(weight, self._coupling(nets, coarse)) for weight, coarse in steps]
+                broken = self._locked(couplings[0][1])
+            if not broken:
+                moved = self._moved(couplings, separations, bound)
                 broken = self._broken(moved)
             if not broken:
                 return moved
@@ -192,25 +205,35 @@ class Together:
         return found + [Strip({direction: (1.0, 0.0)}) for direction in lone]
 
     def _joined(self) -> list[int]:
-        every: list[Seam | TrimmedSeam] = [*self.found, *self.trimmed]
-        return sorted({side.surface for seam in every for side in (seam.a, seam.b)})
+        return sorted({side.surface for seam in self._every() for side in (seam.a, seam.b)})
 
-    def _couplings(self, lines: list[tuple[Strip, Line]], scale: float | None) -> list[tuple[float, Coupling]]:
-        """Coupled projections to blend and their weights; all on the same nets."""
+    def _every(self) -> list[Seam | TrimmedSeam]:
+        return [*self.found, *self.trimmed]
+
+    def _steps(self, lines: list[tuple[Strip, Line]], scale: float | None) -> list[tuple[float, _Spaces]]:
+        """Coarse spaces to blend and their weights."""
         if scale is not None:
             steps = [(1.0, [_at_scale(each, scale) for _, each in lines])]
         else:
             steps = _at_level([each for _, each in lines], self.options.level or 0.0)
-        coarse = [self._members(lines, knots) for _, knots in steps]
+        return [(weight, self._members(lines, knots)) for weight, knots in steps]
+
+    def _refined(self, spaces: list[_Spaces]) -> dict[int, Net]:
+        """The surfaces' nets with the knots that all coarse spaces need."""
         self.inserted = {
-            i: (_union([c[i, 0].inserted for c in coarse]), _union([c[i, 1].inserted for c in coarse]))
+            i: (_union([c[i, 0].inserted for c in spaces]), _union([c[i, 1].inserted for c in spaces]))
             for i in self._joined()
         }
-        nets = {i: self.model.surfaces[i].net.refined(*inserted) for i, inserted in self.inserted.items()}
-        return [
-            (weight, Coupling({i: self._patch(i, nets[i], (c[i, 0], c[i, 1])) for i in nets}, self.found, self.trimmed))
-            for (weight, _), c in zip(steps, coarse, strict=True)
-        ]
+        return {i: self.model.surfaces[i].net.refined(*inserted) for i, inserted in self.inserted.items()}
+
+    def _stuck(self, separations: Mapping[int, Separation]) -> dict[int, str]:
+        """Seams of surfaces of which no point can move even if all their seams do."""
+        stuck = {i for i, separation in separations.items() if not separation.free.any()}
+        return {seam.edge: STUCK for seam in self._every() if stuck & {seam.a.surface, seam.b.surface}}
+
+    def _coupling(self, nets: Mapping[int, Net], coarse: _Spaces) -> Coupling:
+        patches = {i: self._patch(i, net, (coarse[i, 0], coarse[i, 1])) for i, net in nets.items()}
+        return Coupling(patches, self.found, self.trimmed)
 
     def _locked(self, coupling: Coupling) -> dict[int, str]:
         """Seams whose conditions leave too little freedom; counts the freedom of all."""
@@ -232,14 +255,14 @@ class Together:
         inside = (knots.breaks > low) & (knots.breaks < high)
         return min(int(knots.multiplicities[inside].sum()) + knots.degree + 1, knots.count)
 
-    def _moved(self, couplings: list[tuple[float, Coupling]], bound: float | None) -> dict[int, Moved]:
+    def _moved(
+        self, couplings: list[tuple[float, Coupling]], separations: Mapping[int, Separation], bound: float | None
+    ) -> dict[int, Moved]:
         coupling = couplings[0][1]
-        nets = {i: patch.net for i, patch in coupling.patches.items()}
         change: dict[int, Array] = {}
         for weight, each in couplings:
             for i, delta in each.displacement().items():
                 change[i] = weight * delta + change.get(i, 0.0)
-        separations = {i: self._separated(self.model.surfaces[i], net, self.moving) for i, net in nets.items()}
         free = {i: s.free for i, s in separations.items()}
         amount = self.options.amount
         offsets = coupling.held({i: amount * x for i, x in change.items()}, free, amount)
@@ -247,9 +270,12 @@ class Together:
             offsets = coupling.held({i: bounded(x, bound) for i, x in offsets.items()}, free, amount)
             largest = max(float(np.linalg.norm(x, axis=-1).max()) for x in offsets.values())
             offsets = {i: min(1.0, bound / max(largest, 1e-300)) * x for i, x in offsets.items()}
-        return {i: Moved(net, self.inserted[i], separations[i], change[i], offsets[i]) for i, net in nets.items()}
+        return {
+            i: Moved(patch.net, self.inserted[i], separations[i], change[i], offsets[i])
+            for i, patch in coupling.patches.items()
+        }
 
-    def _members(self, lines: list[tuple[Strip, Line]], coarse: list[KnotVector]) -> dict[Direction, Coarse]:
+    def _members(self, lines: list[tuple[Strip, Line]], coarse: list[KnotVector]) -> _Spaces:
         """Coarse knots and knots to insert of every direction."""
         found = (
             members(strip, each, knots, self._knots, self._creases)
