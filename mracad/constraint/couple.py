@@ -19,7 +19,7 @@ A condition is a spline along the seam; it vanishes when it does at as many poin
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -27,7 +27,7 @@ from typing import Any
 import numpy as np
 
 from mracad.bspline.basis import basis
-from mracad.bspline.gram import gram
+from mracad.bspline.gram import Gram, gram
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.knots import Side as Limit
 from mracad.bspline.net import Net
@@ -54,6 +54,9 @@ CHEAP, CHEAP_STEPS = 1e-4, 3
 FILTERS = 3
 """How often the part in nearly dependent conditions, where the joints of a vertex contradict each other a little, is
 damped."""
+
+DENSE = 300
+"""Most functions in a direction for which the inverse of the Gram matrix is a dense matrix."""
 
 SETTLED = 1e-9
 MOST_STEPS = 300
@@ -493,7 +496,7 @@ class _Space:
         if patch.base == patch.lifted:
             size = patch.lifted[0].count * patch.lifted[1].count
             self.lift = eye_array(size, format="csr")
-            self.factors = [splu(g.tocsr().tocsc()) for g in grams]
+            self.inverses = [_inverse(g) for g in grams]
             self.diagonal = patch.weight * np.outer(*(g.diagonal() for g in grams)).ravel()
             return
         in_u, in_v = (refinement(b, k).tocsr() for b, k in zip(patch.base, patch.lifted, strict=True))
@@ -503,22 +506,32 @@ class _Space:
         self.lift = hstack(parts, format="csr")
         self.gram = patch.weight * kron(*(g.tocsr() for g in grams), format="csr")
         whole = (self.lift.T @ self.gram @ self.lift).tocsc()
-        self.factors = [splu(whole, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})]
+        self.inverses = [splu(whole, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}).solve]
         self.diagonal = whole.diagonal()
 
     def solve(self, b: Array) -> Array:
         """The inverse of the Gram matrix times ``b`` (coordinates, 3)."""
-        if len(self.factors) == 1:
-            return self.factors[0].solve(b)
+        if len(self.inverses) == 1:
+            return self.inverses[0](b)
         nu, nv = (k.count for k in self.patch.lifted)
-        along_u = self.factors[0].solve(np.ascontiguousarray(b.reshape(nu, -1))).reshape(nu, nv, 3)
+        along_u = self.inverses[0](b.reshape(nu, -1)).reshape(nu, nv, 3)
         turned = np.ascontiguousarray(along_u.swapaxes(0, 1)).reshape(nv, -1)
-        return self.factors[1].solve(turned).reshape(nv, nu, 3).swapaxes(0, 1).reshape(-1, 3) / self.patch.weight
+        return self.inverses[1](turned).reshape(nv, nu, 3).swapaxes(0, 1).reshape(-1, 3) / self.patch.weight
 
     def project(self, net: Array) -> Array:
         """Coordinates of the projection of a net over the lifted knots."""
         flat = net.reshape(-1, 3)
-        return flat if len(self.factors) == 2 else self.solve(self.lift.T @ (self.gram @ flat))
+        return flat if len(self.inverses) == 2 else self.solve(self.lift.T @ (self.gram @ flat))
+
+
+def _inverse(matrix: Gram) -> Callable[[Array], Array]:
+    """The inverse of a Gram matrix as a function of right-hand sides ``(n, k)``."""
+    if matrix.shape[0] > DENSE:
+        from scipy.sparse.linalg import splu
+
+        return splu(matrix.tocsr().tocsc()).solve
+    inverse = np.linalg.inv(matrix.toarray())
+    return (0.5 * (inverse + inverse.T)).__matmul__
 
 
 def _wavelets(base: KnotVector, lifted: KnotVector) -> Any:
