@@ -30,6 +30,9 @@ ISO = 1e-7
 """Deviation, as a fraction of the local span, within which a pcurve counts as isoparametric: δ's gradient on it is
 then below 1e-6 of δ per span, 1e-4° for a δ of a sixth of the span."""
 
+NEAR = 1e-4
+"""Distance, as a fraction of the longer span beside it, within which a pcurve counts as lying at a knot line."""
+
 
 @dataclass(frozen=True, eq=False)
 class Separation:
@@ -124,14 +127,26 @@ def frozen_along(net: Net, curves: Sequence[Curve], region: Region, keep: str = 
 
 @lru_cache(maxsize=4096)
 def jet_support(knots: KnotVector, at: float, highest: int) -> Array:
-    """Basis functions ``(n,)`` with a non-zero derivative of order ≤ ``highest`` at ``at``, from either side."""
+    """Basis functions ``(n,)`` with a non-zero derivative of order ≤ ``highest`` at ``at``, from either side.
+
+    Those of a knot that is as near as makes no difference to the eye count too: the other side of it is what is seen.
+    """
     start, end = knots.domain
     if knots.periodic:
         at = start + (at - start) % (end - start)
-    nearest = knots.breaks[np.argmin(np.abs(knots.breaks - at))]
-    if abs(nearest - at) <= ISO * local_span(knots, at):
-        at = float(nearest)
     at = min(max(at, start), end)
+    cell = int(np.argmin(np.abs(knots.breaks - at)))
+    nearest = float(knots.breaks[cell])
+    if abs(nearest - at) <= ISO * local_span(knots, at):
+        return _jet_at(knots, nearest, highest)
+    touched = _jet_at(knots, at, highest)
+    if abs(nearest - at) <= NEAR * np.diff(knots.breaks)[max(cell - 1, 0) : cell + 1].max():
+        touched |= _jet_at(knots, nearest, highest)
+    return touched
+
+
+def _jet_at(knots: KnotVector, at: float, highest: int) -> Array:
+    start, end = knots.domain
     touched = np.zeros(knots.count, bool)
     if not knots.periodic:
         if at == start and knots.multiplicities[0] == knots.degree + 1:

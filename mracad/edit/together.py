@@ -30,7 +30,7 @@ _Spaces = dict[Direction, Coarse]
 WIDER = 1e-6
 """A seam may end up with so much more of a gap, mm; otherwise it is frozen."""
 
-STEEPER, SHARE = math.radians(0.01), 0.05
+STEEPER, SHARE = math.radians(0.008), 0.0
 """A seam that was smooth may end up with so much more of an angle, and so much of that it had (a tilt that is carried
 turns with the faces); otherwise it is frozen."""
 
@@ -38,6 +38,10 @@ MENDED, BENT = 0.1, math.radians(0.1)
 """The same where defects are mended: beside points that stay, the shares that gap and angle may gain are these and the
 gap tolerance."""
 
+CLUSTER = 1e-6, 1e-4
+"""Knots closer than this fraction of the curve, or this in mm, are not set apart."""
+
+CROWDED = "knots of the two sides nearly meet"
 STUCK = "a face there has no free poles"
 
 LEAST = 0.5
@@ -103,26 +107,26 @@ class Together:
         self.model, self.movable, self.options = model, movable, options
         self.spans, self.creases = spans, creases
         self.gap = length(options.gap_tolerance, model.diagonal, "gap-tolerance")
+        self.wishes = Wishes(options.keep, math.radians(options.fit_g1 or 0.0), options.close_gaps)
         self.mending = options.close_gaps or options.fit_g1 is not None
         self.trimmed: list[TrimmedSeam] = []
         self.found: list[Seam] = []
         self.closing: set[int] = set()
         self.frozen: dict[int, str] = {}
         if options.edges == "coupled":
-            wishes = Wishes(options.keep, math.radians(options.fit_g1 or 0.0), options.close_gaps)
-            self.found, self.closing, self.frozen = seams(model, movable, wishes)
-            self._try_trimmed(wishes)
+            self.found, self.closing, self.frozen = seams(model, movable, self.wishes)
+            self._try_trimmed()
             idle = (seam for seam in self._every() if not {seam.a.surface, seam.b.surface} & set(coarser))
             self._freeze({seam.edge: "nothing to smooth on either side" for seam in idle})
         self.freedom: dict[int, int] = {}
         self.inserted: dict[int, tuple[Array, Array]] = {}
 
-    def _try_trimmed(self, wishes: Wishes) -> None:
+    def _try_trimmed(self) -> None:
         """Let seams that cannot move exactly move to the gap tolerance."""
         for index, reason in list(self.frozen.items()):
             edge = self.model.edges[index]
-            if reason in (TRIMMED, UNEVEN, VARYING) and len(edge.sides) == 2:
-                seam = trimmed(self.model, edge, edge.sides, wishes)
+            if reason in (TRIMMED, UNEVEN, VARYING, CROWDED) and len(edge.sides) == 2:
+                seam = trimmed(self.model, edge, edge.sides, self.wishes)
                 if isinstance(seam, TrimmedSeam):
                     self.trimmed.append(seam)
                     del self.frozen[index]
@@ -165,6 +169,11 @@ class Together:
                 return {}
             steps = self._steps(lines, scale)
             nets = self._refined([coarse for _, coarse in steps])
+            crowded = self._crowded()
+            if crowded:
+                self._freeze(crowded)
+                self._try_trimmed()
+                continue
             separations = {i: self._separated(self.model.surfaces[i], net, self.moving) for i, net in nets.items()}
             broken = self._stuck(separations)
             if not broken:
@@ -225,6 +234,24 @@ class Together:
             for i in self._joined()
         }
         return {i: self.model.surfaces[i].net.refined(*inserted) for i, inserted in self.inserted.items()}
+
+    def _crowded(self) -> dict[int, str]:
+        """Seams along which a surface would get a knot next to one that it has."""
+        crowded = set()
+        for i, inserted in self.inserted.items():
+            for axis, new in enumerate(inserted):
+                knots, spans = self._knots((i, axis)), self.spans[i][axis]
+                fresh = np.setdiff1d(new, knots.breaks)
+                if len(fresh):
+                    walked = np.append(0.0, np.cumsum(spans))
+                    at = np.interp(fresh, knots.breaks, walked)
+                    if np.abs(at[:, None] - walked).min() < max(CLUSTER[0] * walked[-1], CLUSTER[1]):
+                        crowded.add((i, axis))
+        return {
+            seam.edge: CROWDED
+            for seam in self.found
+            if crowded & {(seam.a.surface, 1 - seam.a.axis), (seam.b.surface, 1 - seam.b.axis)}
+        }
 
     def _stuck(self, separations: Mapping[int, Separation]) -> dict[int, str]:
         """Seams of surfaces of which no point can move even if all their seams do."""
