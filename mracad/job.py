@@ -295,8 +295,7 @@ def _torn(before: list[SeamMeasure], after: list[SeamMeasure], edit: Edit) -> se
     return {
         face
         for old, new in zip(before, after, strict=True)
-        if old.edge not in moved
-        and (new.gap > old.gap + WIDER or (old.smooth and new.angle > old.angle + STEEPER))
+        if old.edge not in moved and (new.gap > old.gap + WIDER or (old.smooth and new.angle > old.angle + STEEPER))
         for face in old.faces
     }
 

@@ -1,10 +1,16 @@
-"""A bound on a displacement, by blending it back locally."""
+"""Bounds on a displacement."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from mracad.bspline.net import Net
+
 Array = np.ndarray
+
+OVERSHOOT = 1.25
+"""A result that deviates by more than this many times what smoothing the whole surface does is refused: at high
+degrees control points lie far from the surface, and leaving some of them breaks the cancellation among them."""
 
 
 def bounded(moved: Array, bound: float) -> Array:
@@ -23,3 +29,9 @@ def bounded(moved: Array, bound: float) -> Array:
     least = minimum_filter(share, shape, mode="nearest")
     share = np.minimum(share, uniform_filter(least, shape, mode="nearest"))
     return moved * share[..., None]
+
+
+def deviation(net: Net, change: Array) -> float:
+    """Largest displacement, mm, at the Greville points of ``net`` when its poles move by ``change``."""
+    delta = Net(net.u, net.v, change, net.weights)
+    return float(np.linalg.norm(delta.grid(net.u.greville(), net.v.greville()), axis=-1).max())

@@ -20,7 +20,7 @@ from mracad.bspline.knots import KnotVector
 from mracad.bspline.net import Net
 from mracad.constraint.fairing import Fairing, border_noise
 from mracad.constraint.frozen import Separation, reached, separate
-from mracad.edit.bound import bounded
+from mracad.edit.bound import OVERSHOOT, bounded, deviation
 from mracad.edit.result import Edit, FaceOutcome, Status
 from mracad.edit.together import Moved, Together
 from mracad.model import Displacement, Face, Model, Offset, Surface
@@ -41,10 +41,6 @@ REFINED_POINTS = 10_000
 
 REFINED_SHARE = 1 / 16
 """Share of the visible points that should be free after refinement."""
-
-OVERSHOOT = 1.25
-"""A result that deviates by more than this many times what smoothing the whole surface does is refused: at high
-degrees control points lie far from the surface, and leaving some of them breaks the cancellation among them."""
 
 
 def smooth(
@@ -153,10 +149,10 @@ class _SurfaceSmoothing:
             self.inserted = len(extra_u) + len(extra_v)
         else:
             return
-        most = OVERSHOOT * _deviation(net, self.change)
-        if self.fairing and not self.inserted and _deviation(net, moved) > most:
+        most = OVERSHOOT * deviation(net, self.change)
+        if self.fairing and not self.inserted and deviation(net, moved) > most:
             moved, self.fairing = np.where(self.separation.free[..., None], self.change, 0.0), 0.0
-        if _deviation(net.refined(extra_u, extra_v), moved) > most:
+        if deviation(net.refined(extra_u, extra_v), moved) > most:
             self.fairing, self.inserted, self.entangled = 0.0, 0, True
             return
         moved = options.amount * moved
@@ -292,12 +288,6 @@ class _SurfaceSmoothing:
 
 def _pair(net: Net) -> tuple[KnotVector, KnotVector]:
     return net.u, net.v
-
-
-def _deviation(net: Net, change: Array) -> float:
-    """Largest displacement, mm, at the Greville points of ``net`` when its poles move by ``change``."""
-    delta = Net(net.u, net.v, change, net.weights)
-    return float(np.linalg.norm(delta.grid(net.u.greville(), net.v.greville()), axis=-1).max())
 
 
 def _largest(change: Array, points: Array | None = None) -> float:

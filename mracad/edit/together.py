@@ -19,7 +19,7 @@ from mracad.constraint.frozen import Separation, jet_support, separate
 from mracad.constraint.seam import TRIMMED, UNEVEN, VARYING, Border, Seam, Treatment, Wishes, opening, seams
 from mracad.constraint.strip import Coarse, Direction, Line, Strip, line, members, strips
 from mracad.constraint.trimmed import TrimmedSeam, parted, trimmed
-from mracad.edit.bound import bounded
+from mracad.edit.bound import OVERSHOOT, bounded, deviation
 from mracad.model import Model, Surface
 from mracad.options import Smooth, length
 from mracad.wavelet.ladder import ladder_for_scale, rungs_by_level
@@ -42,6 +42,7 @@ CLUSTER = 1e-6, 1e-4
 """Knots closer than this fraction of the curve, or this in mm, are not set apart."""
 
 CROWDED = "knots of the two sides nearly meet"
+ENTANGLED = "poles of a face there cannot move one by one"
 STUCK = "a face there has no free poles"
 
 LEAST = 0.5
@@ -181,7 +182,7 @@ class Together:
                 broken = self._locked(couplings[0][1])
             if not broken:
                 moved = self._moved(couplings, separations, bound)
-                broken = self._broken(moved)
+                broken = self._overshot(moved) or self._broken(moved)
             if not broken:
                 return moved
             self._freeze(broken)
@@ -330,6 +331,11 @@ class Together:
             float(lengths.sum()) / knots.period
             for lengths, knots in zip(self.spans[surface], (net.u, net.v), strict=True)
         )
+
+    def _overshot(self, moved: Mapping[int, Moved]) -> dict[int, str]:
+        """Seams of surfaces that deviate by more than smoothing them as a whole would."""
+        far = {i for i, m in moved.items() if deviation(m.net, m.offset) > OVERSHOOT * deviation(m.net, m.change)}
+        return {seam.edge: ENTANGLED for seam in self._every() if far & {seam.a.surface, seam.b.surface}}
 
     def _broken(self, moved: Mapping[int, Moved]) -> dict[int, str]:
         """Seams that are wider or steeper than they may be, and what is wrong with them."""
