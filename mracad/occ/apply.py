@@ -69,6 +69,7 @@ def restore(document: Document, model: Model, displacement: Displacement) -> Non
                 _set(handle, np.argwhere(displacement.offsets[index].poles.any(axis=2)), surface.net.poles)
             else:
                 _lay_all(document, surface, spline(surface.net))
+        _forget(document)
         follow(document, _moved_edges(model, displacement))
 
 
