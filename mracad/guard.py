@@ -83,11 +83,16 @@ def run(work: Callable[[], Result], seconds: float | None = None, memory: int | 
     raise MracadError(f"the CAD kernel crashed ({what})", "the model may be damaged: see mracad check", Code.INTERNAL)
 
 
+def end_with_parent() -> None:
+    """Let this process be killed when the thread that started it ends, where the system can."""
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(_DEATH_SIGNAL, signal.SIGKILL)
+
+
 def _child(work: Callable[[], Any], writer: int, memory: int | None) -> None:
     """Run the work, send what became of it, and end the process, whatever happens."""
     try:
-        if sys.platform == "linux":
-            ctypes.CDLL(None).prctl(_DEATH_SIGNAL, signal.SIGKILL)
+        end_with_parent()
         signal.signal(signal.SIGTERM, _terminated)
         message = _outcome(work, memory)
         with contextlib.suppress(OSError, ValueError):
@@ -119,7 +124,8 @@ def _outcome(work: Callable[[], Any], memory: int | None) -> tuple[bool, Any]:
 
 def _starved(error: BaseException) -> bool:
     """Whether an error says that memory was refused; a library that cannot be loaded for that says it in words."""
-    return isinstance(error, MemoryError) or "failed to map segment" in str(error)
+    words = str(error)
+    return isinstance(error, MemoryError) or "failed to map segment" in words or "bad_alloc" in words
 
 
 def _packed(message: tuple[bool, Any]) -> bytes:

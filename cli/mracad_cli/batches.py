@@ -53,15 +53,16 @@ def run_batch(
     as_json: bool,
 ) -> int:
     """Take many files through a recipe; see :mod:`mracad_cli.commands.batch` for the parameters."""
+    recipe.steps("model.step")  # what is wrong in it is said before anything is read
     settings = Settings(input_unit, schema.upper(), overwrite, if_changed, record, retry, fail_fast=not keep_going)
     limits = Limits(duration(time_limit, "time-limit"), size(memory_limit) if memory_limit else 0)
     for path in filter(None, (report, junit, depfile)):
         check_target(Path(path), overwrite=True)
     words = [word for given in sources for word in (sys.stdin.read().splitlines() if given == "-" else [given]) if word]
     items = find(words, Path(folder))
-    steps = recipe.steps(items[0].source)
     if dry_run:
-        for line in [*plan(steps), *(f"{item.source} -> {Path(folder, item.output)}" for item in items)]:
+        listed = (f"{item.source} -> {Path(folder, item.output)}" for item in items)
+        for line in [*plan(recipe.steps(items[0].source)), *listed]:
             print(line)
         return 0
     workers = min(jobs or os.cpu_count() or 1, len(items))
@@ -75,6 +76,7 @@ def run_batch(
         Progress(rate=True) as progress,
     ):
         try:
+            progress(recipe.name, 0, len(items))
             for outcome in results:
                 outcomes.append(outcome)
                 if as_json and outcome.status != "not tried":
