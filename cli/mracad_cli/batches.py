@@ -58,7 +58,7 @@ def run_batch(
     limits = Limits(duration(time_limit, "time-limit"), size(memory_limit) if memory_limit else 0)
     for path in filter(None, (report, junit, depfile)):
         check_target(Path(path), overwrite=True)
-    words = [word for given in sources for word in (sys.stdin.read().splitlines() if given == "-" else [given]) if word]
+    words = [word for given in sources for word in (_listed() if given == "-" else [given])]
     items = find(words, Path(folder))
     if dry_run:
         listed = (f"{item.source} -> {Path(folder, item.output)}" for item in items)
@@ -110,6 +110,11 @@ def run_batch(
     return 1 if failed else 0
 
 
+def _listed() -> list[str]:
+    """The lines of standard input."""
+    return [os.fsdecode(line) for line in sys.stdin.buffer.read().splitlines() if line]
+
+
 def summary(outcomes: Sequence[Outcome], seconds: float) -> list[str]:
     """The batch in a line, and one for each file that failed."""
     counts = Counter(outcome.status for outcome in outcomes)
@@ -134,8 +139,8 @@ def junit_text(name: str, outcomes: Sequence[Outcome], seconds: float) -> str:
         if outcome.status == "failed":
             tag = "failure" if outcome.code == 1 else "error"
             ElementTree.SubElement(
-                case, tag, {"message": outcome.message, "type": str(outcome.code)}
-            ).text = outcome.hint
+                case, tag, {"message": clean(outcome.message), "type": str(outcome.code)}
+            ).text = clean(outcome.hint)
         elif outcome.status == "not tried":
             ElementTree.SubElement(case, "skipped", {"message": "the batch stopped before"})
         elif outcome.status == "unchanged":

@@ -57,6 +57,9 @@ def test_a_lost_worker_costs_nothing(tmp_path: Path):
         assert process.returncode == 1, err
     assert "60 files: 59 done, 1 failed" in out and "crashed (SIGSEGV)" in out
     assert outputs(tmp_path / "out") == outputs(tmp_path / "local")
+    code, out, err = batch(*words, tmp_path / "here", "--cluster", "local", "-j", 2, sham=0.0)
+    assert code == 1 and "59 done, 1 failed" in out, err
+    assert outputs(tmp_path / "here") == outputs(tmp_path / "local")
 
 
 def test_a_cluster_that_is_not_there_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
