@@ -8,7 +8,7 @@ recipe smooths and checks them.  On a machine with other work look at the proces
 
 from __future__ import annotations
 
-import os
+import contextlib
 import resource
 import subprocess
 import sys
@@ -16,6 +16,8 @@ import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
+
+import psutil
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
@@ -96,7 +98,12 @@ def memory(folder: Path) -> None:
         process = subprocess.Popen(
             [*map(str, command), str(folder / f"out{count}")], env=environment(0.0), stdout=subprocess.DEVNULL
         )
-        peaks.append(os.wait4(process.pid, 0)[2].ru_maxrss / 1024)
+        client, peak = psutil.Process(process.pid), 0
+        while process.poll() is None:
+            with contextlib.suppress(psutil.Error):
+                peak = max(peak, client.memory_info().rss)
+            time.sleep(0.01)
+        peaks.append(peak / 1e6)
     print(f"client's memory: {peaks[0]:.0f} MB for 50 files, {peaks[1]:.0f} MB for 1000")
 
 
