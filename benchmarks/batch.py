@@ -159,8 +159,8 @@ def main() -> None:
         "overhead": lambda folder: overhead(folder, files),
         "memory": memory,
         "flight": lambda folder: flight(),
-        "killed": lambda folder: killed(folder, 100, 20),
-        "lost": lambda folder: lost(folder, 40),
+        "killed": lambda folder: killed(folder, min(files, 100), 20),
+        "lost": lambda folder: lost(folder, min(files, 40)),
     }
     for name in sys.argv[2:] or tasks:
         with tempfile.TemporaryDirectory() as folder:

@@ -64,12 +64,12 @@ def test_the_outputs_do_not_depend_on_the_number_of_workers(tmp_path):
 
 
 def test_kills_at_random_moments_leave_nothing_but_less_to_do(tmp_path):
-    folder = shams(tmp_path / "in", 120)
+    folder = shams(tmp_path / "in", 60)
     words = (recipe(tmp_path), folder, "-j", 2, "-O")
     assert batch(*words, tmp_path / "whole", sham=0.01)[0] == 0
-    done = kills(words, tmp_path / "out", 6, 120, sham=0.01)
+    done = kills(words, tmp_path / "out", 4, 60, sham=0.01)
     code, out, _ = batch(*words, tmp_path / "out", sham=0.01)
-    print(f"done at each kill: {done} of 120; then {out.strip()}")
+    print(f"done at each kill: {done} of 60; then {out.strip()}")
     assert code == 0 and done == sorted(done) and done[0]
     assert outputs(tmp_path / "out") == outputs(tmp_path / "whole")
 
