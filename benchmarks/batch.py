@@ -1,19 +1,23 @@
 """Batches: what two workers gain, what a file costs beside its work, memory, kills and lost workers.
 
-Usage: python benchmarks/batch.py [FILES]     (default: 200)
+Usage: python benchmarks/batch.py [FILES [NAME…]]     (default: 200, and every measurement below)
 
-Both sides of every ratio are measured in this run.  The files are the samples, each made different by a comment.
+Both sides of every ratio are measured in this run.  The files are the samples, each made different by a comment; the
+recipe smooths and checks them.  On a machine with other work look at the processor time, too.
 """
 
 from __future__ import annotations
 
-import os
+import contextlib
 import resource
 import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Callable
 from pathlib import Path
+
+import psutil
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
@@ -27,6 +31,7 @@ from tests.batch.runs import batch, environment, kills, outputs, recipe, shams  
 from tests.batch.tasks import work  # noqa: E402
 from tests.batch.test_cluster import cluster  # noqa: E402
 
+RECIPE = '[[step]]\nuse = "smooth"\nscale = "5%"\n\n[[step]]\nuse = "check"\n'
 SAMPLES = ("blade", "bottle", "panel", "trimmed")
 
 
@@ -56,7 +61,7 @@ def cpu() -> float:
 
 def workers(folder: Path, files: int) -> None:
     """Two workers against one, whole commands."""
-    words = (recipe(folder), models(folder / "in", files), "-O")
+    words = (recipe(folder, RECIPE), models(folder / "in", files), "-O")
     marks = [cpu()]
     one = timed(*words, folder / "one", "-j", 1)
     marks.append(cpu())
@@ -71,12 +76,15 @@ def overhead(folder: Path, files: int) -> None:
     """Wall time beside the work itself, one warm worker."""
     items = find([str(models(folder / "in", files + 1))], folder / "out")
     with Manifest(folder / "out") as manifest, Pool(1, Limits(), warm) as pool:
-        list(run(load(recipe(folder)), items[:1], manifest, pool, Settings()))
-        start = time.perf_counter()
-        outcomes = list(run(load(recipe(folder)), items[1:], manifest, pool, Settings()))
-        wall = time.perf_counter() - start
+        list(run(load(recipe(folder, RECIPE)), items[:1], manifest, pool, Settings()))
+        start, used = time.perf_counter(), time.process_time()
+        outcomes = list(run(load(recipe(folder, RECIPE)), items[1:], manifest, pool, Settings()))
+        wall, used = time.perf_counter() - start, time.process_time() - used
     beside = (wall - sum(outcome.seconds for outcome in outcomes)) / files
-    print(f"overhead: {beside * 1e3:.1f} ms a file beside {wall / files * 1e3:.0f} ms")
+    print(
+        f"overhead: {beside * 1e3:.1f} ms a file beside {wall / files * 1e3:.0f} ms; "
+        f"processor time of the client {used / files * 1e3:.1f} ms a file"
+    )
 
 
 def memory(folder: Path) -> None:
@@ -86,11 +94,16 @@ def memory(folder: Path) -> None:
         source = shams(folder / f"in{count}", count)
         for path in source.iterdir():
             path.write_text(f"{path}" + "x" * 1_000_000)
-        command = [sys.executable, "-m", "mracad_cli", "batch", recipe(folder), source, "-j", "2", "-O"]
+        command = [sys.executable, "-m", "mracad_cli", "batch", recipe(folder, RECIPE), source, "-j", "2", "-O"]
         process = subprocess.Popen(
             [*map(str, command), str(folder / f"out{count}")], env=environment(0.0), stdout=subprocess.DEVNULL
         )
-        peaks.append(os.wait4(process.pid, 0)[2].ru_maxrss / 1024)
+        client, peak = psutil.Process(process.pid), 0
+        while process.poll() is None:
+            with contextlib.suppress(psutil.Error):
+                peak = max(peak, client.memory_info().rss)
+            time.sleep(0.01)
+        peaks.append(peak / 1e6)
     print(f"client's memory: {peaks[0]:.0f} MB for 50 files, {peaks[1]:.0f} MB for 1000")
 
 
@@ -108,7 +121,7 @@ def flight() -> None:
 
 def killed(folder: Path, files: int, count: int) -> None:
     """The batch killed again and again, then resumed."""
-    words = (recipe(folder), models(folder / "in", files), "-j", 2, "-O")
+    words = (recipe(folder, RECIPE), models(folder / "in", files), "-j", 2, "-O")
     timed(*words, folder / "whole")
     done = kills(words, folder / "out", count, files)
     timed(*words, folder / "out")
@@ -118,7 +131,7 @@ def killed(folder: Path, files: int, count: int) -> None:
 
 def lost(folder: Path, files: int) -> None:
     """A cluster of two workers, one killed midway."""
-    words = (recipe(folder), models(folder / "in", files), "-O")
+    words = (recipe(folder, RECIPE), models(folder / "in", files), "-O")
     local = timed(*words, folder / "local", "-j", 2)
     with cluster(2) as (address, processes):
         killer = subprocess.Popen(
@@ -141,17 +154,17 @@ def lost(folder: Path, files: int) -> None:
 
 def main() -> None:
     files = int(sys.argv[1]) if len(sys.argv) > 1 else 200
-    tasks = [
-        lambda folder: workers(folder, files),
-        lambda folder: overhead(folder, files),
-        memory,
-        lambda folder: flight(),
-        lambda folder: killed(folder, 100, 20),
-        lambda folder: lost(folder, 40),
-    ]
-    for task in tasks:
+    tasks: dict[str, Callable[[Path], None]] = {
+        "workers": lambda folder: workers(folder, files),
+        "overhead": lambda folder: overhead(folder, files),
+        "memory": memory,
+        "flight": lambda folder: flight(),
+        "killed": lambda folder: killed(folder, min(files, 100), 20),
+        "lost": lambda folder: lost(folder, min(files, 40)),
+    }
+    for name in sys.argv[2:] or tasks:
         with tempfile.TemporaryDirectory() as folder:
-            task(Path(folder))
+            tasks[name](Path(folder))
         sys.stdout.flush()
 
 

@@ -83,15 +83,20 @@ def run(work: Callable[[], Result], seconds: float | None = None, memory: int | 
     raise MracadError(f"the CAD kernel crashed ({what})", "the model may be damaged: see mracad check", Code.INTERNAL)
 
 
-_OUT_OF_MEMORY = ("failed to map segment", "error return without exception set")
+_OUT_OF_MEMORY = ("failed to map segment", "error return without exception set", "bad_alloc")
 """What libraries say that ran out of memory: the loader, and compiled modules while they are loaded."""
+
+
+def end_with_parent() -> None:
+    """Let this process be killed when the thread that started it ends, where the system can."""
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(_DEATH_SIGNAL, signal.SIGKILL)
 
 
 def _child(work: Callable[[], Any], writer: int, memory: int | None) -> None:
     """Run the work, send what became of it, and end the process, whatever happens."""
     try:
-        if sys.platform == "linux":
-            ctypes.CDLL(None).prctl(_DEATH_SIGNAL, signal.SIGKILL)
+        end_with_parent()
         signal.signal(signal.SIGTERM, _terminated)
         message = _outcome(work, memory)
         with contextlib.suppress(OSError, ValueError):

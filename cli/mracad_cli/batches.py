@@ -53,15 +53,16 @@ def run_batch(
     as_json: bool,
 ) -> int:
     """Take many files through a recipe; see :mod:`mracad_cli.commands.batch` for the parameters."""
+    recipe.steps("model.step")  # what is wrong in it is said before anything is read
     settings = Settings(input_unit, schema.upper(), overwrite, if_changed, record, retry, fail_fast=not keep_going)
     limits = Limits(duration(time_limit, "time-limit"), size(memory_limit) if memory_limit else 0)
     for path in filter(None, (report, junit, depfile)):
         check_target(Path(path), overwrite=True)
-    words = [word for given in sources for word in (sys.stdin.read().splitlines() if given == "-" else [given]) if word]
+    words = [word for given in sources for word in (_listed() if given == "-" else [given])]
     items = find(words, Path(folder))
-    steps = recipe.steps(items[0].source)
     if dry_run:
-        for line in [*plan(steps), *(f"{item.source} -> {Path(folder, item.output)}" for item in items)]:
+        listed = (f"{item.source} -> {Path(folder, item.output)}" for item in items)
+        for line in [*plan(recipe.steps(items[0].source)), *listed]:
             print(line)
         return 0
     workers = min(jobs or os.cpu_count() or 1, len(items))
@@ -75,6 +76,7 @@ def run_batch(
         Progress(rate=True) as progress,
     ):
         try:
+            progress(recipe.name, 0, len(items))
             for outcome in results:
                 outcomes.append(outcome)
                 if as_json and outcome.status != "not tried":
@@ -108,6 +110,11 @@ def run_batch(
     return 1 if failed else 0
 
 
+def _listed() -> list[str]:
+    """The lines of standard input."""
+    return [os.fsdecode(line) for line in sys.stdin.buffer.read().splitlines() if line]
+
+
 def summary(outcomes: Sequence[Outcome], seconds: float) -> list[str]:
     """The batch in a line, and one for each file that failed."""
     counts = Counter(outcome.status for outcome in outcomes)
@@ -132,8 +139,8 @@ def junit_text(name: str, outcomes: Sequence[Outcome], seconds: float) -> str:
         if outcome.status == "failed":
             tag = "failure" if outcome.code == 1 else "error"
             ElementTree.SubElement(
-                case, tag, {"message": outcome.message, "type": str(outcome.code)}
-            ).text = outcome.hint
+                case, tag, {"message": clean(outcome.message), "type": str(outcome.code)}
+            ).text = clean(outcome.hint)
         elif outcome.status == "not tried":
             ElementTree.SubElement(case, "skipped", {"message": "the batch stopped before"})
         elif outcome.status == "unchanged":

@@ -63,7 +63,7 @@ def write_text(path: Path, text: str) -> None:
     """Write a text file whole or not at all."""
     from mracad.output import put
 
-    put(text.encode(), path)
+    put(text.encode(errors="surrogateescape"), path)
 
 
 def depfile_text(outputs: Iterable[str], inputs: Iterable[str]) -> str:

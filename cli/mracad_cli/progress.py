@@ -17,7 +17,7 @@ class Progress:
     Parameters
     ----------
     rate : bool
-        Show how many steps are done a second, and the time that is left.
+        Show how many steps are done a second, and the time that is left; from the beginning.
     """
 
     def __init__(self, rate: bool = False) -> None:
@@ -36,7 +36,7 @@ class Progress:
             self._bar.stop()
 
     def __call__(self, stage: str, done: int, total: int) -> None:
-        if not sys.stderr.isatty() or time.monotonic() - self._start < PATIENCE:
+        if not sys.stderr.isatty() or (time.monotonic() - self._start < PATIENCE and not self._rate):
             return
         if self._bar is None:
             from rich.console import Console
@@ -48,5 +48,5 @@ class Progress:
             self._bar = Bar(*columns, *times, console=Console(stderr=True), transient=True)
             self._bar.start()
             self._task = self._bar.add_task(stage, total=total, rate="")
-        rate = f"{done / (time.monotonic() - self._start):.1f}/s, left"
+        rate = f"{done / max(time.monotonic() - self._start, 1e-3):.1f}/s, left"
         self._bar.update(self._task, description=stage, completed=done, total=total, rate=rate)

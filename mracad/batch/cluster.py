@@ -7,6 +7,7 @@ its tasks are done again elsewhere.
 
 from __future__ import annotations
 
+import logging
 import threading
 from collections.abc import Callable
 from concurrent.futures import CancelledError, Executor, Future
@@ -33,7 +34,7 @@ class Cluster(Executor):
     limits : Limits
         Of each task; the memory is that of each worker machine by default.
     workers : int
-        How many workers a local cluster has.
+        How many tasks a local cluster does at a time.
 
     Raises
     ------
@@ -54,7 +55,12 @@ class Cluster(Executor):
         self._own = None
         if address == "local":
             self._own = distributed.LocalCluster(
-                n_workers=workers, threads_per_worker=1, host="127.0.0.1", dashboard_address=None, memory_limit=0
+                n_workers=1,
+                threads_per_worker=workers,
+                processes=False,
+                dashboard_address=None,
+                memory_limit=0,
+                silence_logs=logging.ERROR,
             )
         try:
             self._client = distributed.Client(self._own or address, timeout=PATIENCE, set_as_default=False)
@@ -77,6 +83,8 @@ class Cluster(Executor):
         self._executor.shutdown(wait=wait and not cancel_futures)
         self._client.close()
         if self._own:
+            while _pools:
+                _pools.popitem()[1].shutdown(wait, cancel_futures=cancel_futures)
             self._own.close()
 
 

@@ -88,7 +88,10 @@ class Manifest:
             Leave a file alone that has this content.
         """
         target = self.folder / output
-        self._note(output, key, data)
+        try:
+            self._note(output, key, data)
+        except OSError as error:
+            raise FileError(f"cannot write '{self._file.name}': {error.strerror}", "make room for it") from error
         if not (if_changed and holds(target, data)):
             with contextlib.suppress(OSError):  # writing says it better
                 target.parent.mkdir(parents=True, exist_ok=True)
@@ -96,7 +99,7 @@ class Manifest:
 
     def _note(self, output: str, key: str, data: bytes) -> None:
         entry = {"output": output, "key": key, "sha256": digest(data)}
-        self._file.write(json.dumps(entry, ensure_ascii=False).encode() + b"\n")
+        self._file.write(json.dumps(entry).encode() + b"\n")
         self._file.flush()
         os.fsync(self._file.fileno())
         self._known[output] = entry

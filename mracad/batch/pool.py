@@ -26,6 +26,7 @@ from typing import Any
 import psutil
 
 from mracad.errors import Code, MracadError
+from mracad.guard import end_with_parent
 
 TICK = 0.05
 """Seconds between two looks at the workers."""
@@ -123,22 +124,27 @@ class Pool(Executor):
         while (task := self._tasks.get()) is not None:
             tell: Callable[[], object] = bool
             if not self._stopped and task.future.set_running_or_notify_cancel():
-                if worker and worker.lost():
-                    worker = self._retired(worker)
+                worker = self._usable(worker)
                 try:
                     worker = worker or self._started()
                     tell = partial(task.future.set_result, worker.call(self._seconds, task.payload))
                 except BaseException as error:
                     tell = partial(task.future.set_exception, error)
-                if worker and (worker.lost() or worker.memory() > self._memory / 2):
-                    worker = self._retired(worker)
+                worker = self._usable(worker)
             else:
                 task.future.cancel()
             with self._lock:
                 self._open -= 1
             tell()
         if worker:
-            self._retired(worker)
+            self._retire(worker)
+
+    def _usable(self, worker: _Worker | None) -> _Worker | None:
+        """The worker, unless it is lost or has grown halfway from what it had when it was ready to its limit."""
+        if worker and (worker.lost() or worker.memory() > (worker.ready + self._memory) / 2):
+            self._retire(worker)
+            return None
+        return worker
 
     def _started(self) -> _Worker:
         """A worker that is warm."""
@@ -147,11 +153,12 @@ class Pool(Executor):
         try:
             worker.call(READY, pickle.dumps((self._warm or bool, (), {})))
         except BaseException:
-            self._retired(worker)
+            self._retire(worker)
             raise
+        worker.ready = worker.memory()
         return worker
 
-    def _retired(self, worker: _Worker) -> None:
+    def _retire(self, worker: _Worker) -> None:
         self._workers.remove(worker)
         worker.close()
 
@@ -193,6 +200,7 @@ class _Worker:
         )
         self.reason: MracadError | None = None
         self.seconds, self.deadline = 0.0, math.inf
+        self.ready = 0  # bytes occupied before the first task
         self._process = psutil.Process(self.process.pid)
 
     def call(self, seconds: float, payload: bytes) -> Any:
@@ -246,6 +254,7 @@ class _Worker:
 
 def serve() -> None:
     """What a worker process does: tasks from standard input, results to standard output, until that is closed."""
+    end_with_parent()
     requests, replies = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
     os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
     os.dup2(2, 1)

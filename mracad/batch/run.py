@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import glob
+import itertools
 import json
 import os
 import time
@@ -16,7 +17,7 @@ from mracad.batch.cluster import lost
 from mracad.batch.manifest import UNFINISHED, Manifest, digest
 from mracad.batch.work import Product, Work, do
 from mracad.errors import Code, FileError, MracadError, UsageError
-from mracad.output import put
+from mracad.output import holds, put
 from mracad.recipe import Recipe, record_of
 
 ENDINGS = frozenset({".step", ".stp", ".p21"})
@@ -111,42 +112,52 @@ class Workers(Protocol):
 def find(words: Iterable[str], folder: Path) -> list[Item]:
     """The files of a batch from paths, folders (all STEP files below them) and patterns.
 
-    Outputs have the names of their inputs; those of a folder keep their place below it.  What lies in the output
-    folder is not taken for an input.
+    Outputs have the names of their inputs; those of a folder keep their place below it, those of a pattern their
+    place below the folder before its first wildcard.  Hidden files are left out, and so is the output folder where
+    it lies below.
 
     Raises
     ------
     FileError
-        When a folder or pattern holds no STEP file.
+        When there is no file, or a folder or pattern holds no STEP file.
     UsageError
-        When two inputs would be written to the same output.
+        When two inputs would be written to the same output, or one to itself.
     """
     found: dict[str, str] = {}
     own = folder.resolve()
     for word in words:
-        for source, output in _expanded(word):
-            if Path(source).resolve().is_relative_to(own):
-                continue
-            if found.get(output, source) != source:
+        for source, output in _expanded(word, own):
+            other = found.setdefault(output, source)
+            if Path(other).resolve() != Path(source).resolve():
                 raise UsageError(
-                    f"'{found[output]}' and '{source}' would both be written to '{folder / output}'",
+                    f"'{other}' and '{source}' would both be written to '{folder / output}'",
                     "give the folder that holds both, or one batch each",
                 )
-            found[output] = source
+            if Path(source).resolve() == own / output:
+                raise UsageError(f"'{source}' would be replaced by its own output", "choose another folder with -O")
     if not found:
-        raise FileError("there is nothing to do: no STEP files", "give files, folders or patterns")
+        raise FileError("there is nothing to do: no files are named", "give files, folders or patterns")
     return [Item(source, output) for output, source in found.items()]
 
 
-def _expanded(word: str) -> list[tuple[str, str]]:
-    """The files that a word on the command line means, each with its output."""
-    if Path(word).is_dir():
-        files = sorted(path for path in Path(word).rglob("*") if path.suffix.lower() in ENDINGS)
-        pairs = [(str(path), str(path.relative_to(word))) for path in files]
-    elif glob.has_magic(word) and not Path(word).exists():
-        pairs = [(path, Path(path).name) for path in sorted(glob.glob(word, recursive=True))]
+def _expanded(word: str, own: Path) -> list[tuple[str, str]]:
+    """The files that a word on the command line means, but those in the output folder, each with its output."""
+    base = Path(word)
+    if base.is_dir():
+        files = [path for path in base.rglob("*") if path.suffix.lower() in ENDINGS]
+    elif glob.has_magic(word) and not base.exists():
+        base = Path(*itertools.takewhile(lambda part: not glob.has_magic(part), base.parts))
+        files = [Path(path) for path in glob.glob(word, recursive=True)]
     else:
-        return [(word, Path(word).name)]
+        return [(word, base.name)]
+    inside = base.resolve() in own.parents
+    pairs = [
+        (str(path), str(place))
+        for path, place in ((path, path.relative_to(base)) for path in sorted(files))
+        if not any(part.startswith(".") for part in place.parts)
+        and not (inside and path.resolve().is_relative_to(own))
+        and not path.is_dir()
+    ]
     if not pairs:
         raise FileError(f"no STEP files in '{word}'", f"they end in {', '.join(sorted(ENDINGS))}")
     return pairs
@@ -225,6 +236,10 @@ class _Batch:
         )
         key = self._key(work)
         if self.manifest.done(item.output, key):
+            try:
+                self._record(item, work)
+            except MracadError as error:
+                return _failed(item, error)
             return Outcome(item.source, item.output, "unchanged")
         self._submit(_Task(item, work, key, 0, 0.0))
         return None
@@ -250,6 +265,12 @@ class _Batch:
         task.start = time.perf_counter()
         self.pending[self.executor.submit(do, task.work)] = task
 
+    def _record(self, item: Item, work: Work) -> None:
+        """Write the resolved recipe beside the output where asked."""
+        target, data = self.manifest.folder / f"{item.output}.toml", record_of(work.steps).encode()
+        if self.settings.record and not holds(target, data):
+            put(data, target, UNFINISHED)
+
     def _check_target(self, item: Item) -> None:
         target = self.manifest.folder / item.output
         if target.exists() and not (self.settings.overwrite or self.manifest.made(item.output)):
@@ -264,8 +285,7 @@ class _Batch:
     def _written(self, task: _Task, product: Product) -> Outcome:
         output = task.item.output
         self.manifest.write(output, task.key, product.data, self.settings.if_changed)
-        if self.settings.record:
-            put(record_of(task.work.steps).encode(), self.manifest.folder / f"{output}.toml", UNFINISHED)
+        self._record(task.item, task.work)
         return Outcome(
             task.item.source, output, "done", seconds=product.seconds, attempts=task.attempts, steps=product.steps
         )

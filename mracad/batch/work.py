@@ -12,10 +12,9 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from mracad import __version__
 from mracad.errors import Code, MracadError
 from mracad.options import STEPS
-from mracad.recipe import Step, relocated, title
+from mracad.recipe import Step, relocated, title, versions
 
 if TYPE_CHECKING:
     from mracad.job import Judged, Report
@@ -39,8 +38,8 @@ class Work:
         The content of the files that the steps name.
     epoch : str or None
         ``SOURCE_DATE_EPOCH``.
-    version : str
-        Of the client.
+    versions : mapping
+        Of what decides the result, at the client.
     """
 
     name: str
@@ -50,7 +49,7 @@ class Work:
     schema: str = "AP214"
     files: Mapping[str, bytes] = field(default_factory=dict, repr=False)
     epoch: str | None = None
-    version: str = __version__
+    versions: Mapping[str, str] = field(default_factory=versions)
 
 
 @dataclass(frozen=True)
@@ -80,8 +79,10 @@ def do(work: Work) -> Product:
     from mracad.occ import write_step
 
     start = time.perf_counter()
-    if work.version != __version__:
-        raise MracadError(f"the worker has mracad {__version__}, not {work.version}", "install the same version there")
+    for name, version in versions().items():
+        if version != work.versions.get(name):
+            text = f"the worker has {name} {version}, not {work.versions.get(name)}"
+            raise MracadError(text, "install the same versions there")
     if work.epoch is None:
         os.environ.pop("SOURCE_DATE_EPOCH", None)
     else:

@@ -81,7 +81,7 @@ def load(source: str | os.PathLike | BinaryIO) -> tuple[bytes, str]:
         raise FileError(f"'{name}' is not a STEP file", "it must begin with ISO-10303-21: export it as STEP")
     if b"END-ISO-10303-21" not in text[-4096:]:
         raise FileError(f"'{name}' is truncated: its end is missing", "copy or export it again")
-    return text, name
+    return text, name.encode(errors="replace").decode()  # the kernel takes no name that is not Unicode
 
 
 def _schema(text: bytes) -> str:

@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import subprocess
 import sys
+import time
 from xml.etree import ElementTree
 
+import psutil
 import pytest
 
 from mracad.batch.manifest import NAME, Manifest
 from mracad.batch.run import find
 from mracad.errors import FileError, UsageError
-from tests.batch.runs import batch, environment, kills, models, outputs, recipe, shams
+from mracad.recipe import load
+from tests.batch.runs import batch, environment, kills, models, outputs, recipe, shams, start
 
 
 def test_five_bad_files_of_a_hundred_cost_five(tmp_path):
@@ -48,6 +52,8 @@ def test_five_bad_files_of_a_hundred_cost_five(tmp_path):
 
 def test_the_outputs_do_not_depend_on_the_number_of_workers(tmp_path):
     folder = models(tmp_path / "in", 6)
+    if sys.platform == "linux":
+        (folder / "part005.step").rename(folder / os.fsdecode(b"-p\xe4rt [5].step"))
     words = (recipe(tmp_path), folder)
     for jobs in (1, 2):
         assert batch(*words, "-O", tmp_path / f"out{jobs}", "-j", jobs)[0] == 0
@@ -58,12 +64,12 @@ def test_the_outputs_do_not_depend_on_the_number_of_workers(tmp_path):
 
 
 def test_kills_at_random_moments_leave_nothing_but_less_to_do(tmp_path):
-    folder = shams(tmp_path / "in", 120)
+    folder = shams(tmp_path / "in", 60)
     words = (recipe(tmp_path), folder, "-j", 2, "-O")
     assert batch(*words, tmp_path / "whole", sham=0.01)[0] == 0
-    done = kills(words, tmp_path / "out", 6, 120, sham=0.01)
+    done = kills(words, tmp_path / "out", 4, 60, sham=0.01)
     code, out, _ = batch(*words, tmp_path / "out", sham=0.01)
-    print(f"done at each kill: {done} of 120; then {out.strip()}")
+    print(f"done at each kill: {done} of 60; then {out.strip()}")
     assert code == 0 and done == sorted(done) and done[0]
     assert outputs(tmp_path / "out") == outputs(tmp_path / "whole")
 
@@ -144,7 +150,11 @@ def test_inputs_are_files_folders_patterns_and_lists(tmp_path):
         "part000.step", "part001.step", "part002.step", os.path.join("sub", "deep.STP"),
     ]  # fmt: skip
     assert len(find([f"{folder}/part*.step", str(folder / "part000.step")], out)) == 3
+    (folder / ".hidden.step").write_text("hidden")
     assert find([str(folder)], folder / "sub")[-1].output == "part002.step"
+    assert [item.output for item in find([f"{tmp_path}/*/**/*.STP"], out)] == [os.path.join("in", "sub", "deep.STP")]
+    with pytest.raises(UsageError, match="replaced by its own output"):
+        find([str(folder / "part000.step")], folder)
     with pytest.raises(FileError, match="no STEP files in"):
         find([f"{folder}/*.stp"], out)
     (tmp_path / "part000.step").write_text("other")
@@ -165,7 +175,47 @@ def test_a_list_from_standard_input_a_plan_and_a_depfile(tmp_path):
     assert rule in (tmp_path / "d").read_text()
 
 
-def test_a_wrong_recipe_is_refused_before_anything_is_read(tmp_path):
-    code, out, err = batch(recipe(tmp_path, '[[step]]\nuse = "smoth"\n'), tmp_path / "no.step", "-O", tmp_path / "out")
-    assert (code, out) == (2, "") and "recipe.toml:2" in err and "'smooth'" in err
+@pytest.mark.parametrize(
+    ("text", "place", "hint"),
+    [('use = "smoth"', "recipe.toml:2", "'smooth'"), ('use = "smooth"\nscale = "2 mn"', "recipe.toml:3", "5mm")],
+)
+def test_a_wrong_recipe_is_refused_before_anything_is_read(tmp_path, text, place, hint):
+    code, out, err = batch(recipe(tmp_path, f"[[step]]\n{text}\n"), tmp_path / "*.step", "-O", tmp_path / "out")
+    assert (code, out) == (2, "") and place in err and hint in err
     assert not (tmp_path / "out").exists()
+
+
+def test_records_are_there_whenever_asked_for(tmp_path):
+    words = (recipe(tmp_path), shams(tmp_path / "in", 2), "-O", tmp_path / "out")
+    assert batch(*words, sham=0.0)[0] == 0
+    code, out, _ = batch(*words, "--record", sham=0.0)
+    assert code == 0 and "2 unchanged" in out
+    assert load(tmp_path / "out" / "part000.step.toml").steps("-") == load(words[0]).steps("-")
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="names are Unicode elsewhere")
+def test_names_that_are_not_unicode(tmp_path):
+    folder = shams(tmp_path / "in", 1)
+    name = os.fsdecode(b"b\xe4r 'x'.step")
+    (folder / "part000.step").rename(folder / name)
+    words = (recipe(tmp_path), folder, "-O", tmp_path / "out", "--json", "--junit", tmp_path / "j.xml")
+    for status in ("done", "unchanged"):
+        code, out, err = batch(*words, sham=0.0)
+        assert code == 0, err
+        assert [json.loads(line).get("status") for line in out.splitlines()] == [status, None]
+    assert list(outputs(tmp_path / "out")) == [name]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="asks the system to end children")
+def test_workers_end_with_a_killed_batch_and_an_interrupted_one_says_so(tmp_path):
+    folder = shams(tmp_path / "in", 4)
+    for number in (signal.SIGKILL, signal.SIGINT):
+        process = start(recipe(tmp_path), folder, "-O", tmp_path / "out", "-j", 2, sham=60.0)
+        client, limit = psutil.Process(process.pid), time.monotonic() + 30
+        while len(workers := client.children()) < 2 and time.monotonic() < limit:
+            time.sleep(0.05)
+        time.sleep(0.5)
+        process.send_signal(number)
+        _, err = process.communicate(timeout=10)
+        assert len(workers) == 2 and not psutil.wait_procs(workers, timeout=5)[1]
+    assert process.returncode == 130 and "interrupted after 0 of 4 files; run it again" in err

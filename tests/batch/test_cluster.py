@@ -43,7 +43,7 @@ def cluster(workers: int, sham: float | None = None) -> Iterator[tuple[str, list
 
 
 def test_a_lost_worker_costs_nothing(tmp_path: Path):
-    folder = shams(tmp_path / "in", 60)
+    folder = shams(tmp_path / "in", 40)
     (folder / "part007.step").write_text("/* crash */")
     words = (recipe(tmp_path), folder, "-O")
     assert batch(*words, tmp_path / "local", "-j", 2, sham=0.0)[0] == 1
@@ -55,8 +55,11 @@ def test_a_lost_worker_costs_nothing(tmp_path: Path):
         os.kill(workers[0].pid, signal.SIGKILL)
         out, err = process.communicate(timeout=60)
         assert process.returncode == 1, err
-    assert "60 files: 59 done, 1 failed" in out and "crashed (SIGSEGV)" in out
+    assert "40 files: 39 done, 1 failed" in out and "crashed (SIGSEGV)" in out
     assert outputs(tmp_path / "out") == outputs(tmp_path / "local")
+    code, out, err = batch(*words, tmp_path / "here", "--cluster", "local", "-j", 2, sham=0.0)
+    assert code == 1 and "39 done, 1 failed" in out, err
+    assert outputs(tmp_path / "here") == outputs(tmp_path / "local")
 
 
 def test_a_cluster_that_is_not_there_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
