@@ -65,9 +65,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return int(Code.USAGE)
     except click.exceptions.Exit as error:
         return error.exit_code
-    except click.ClickException as error:
-        command = error.ctx.command_path if isinstance(error, click.UsageError) and error.ctx else "mracad"
-        failure = MracadError(error.format_message().rstrip("."), f"see {command} --help", Code.USAGE)
     except MracadError as error:
         if "--debug" in arguments:
             raise
@@ -99,7 +96,13 @@ def _limited(arguments: list[str], guarded: bool) -> int:
     """Run a command; in a child process when it has a limit, or when a crash must not be the end of this one."""
 
     def work() -> int:
-        result = group.main(arguments, prog_name="mracad", standalone_mode=False)
+        try:
+            result = group.main(arguments, prog_name="mracad", standalone_mode=False)
+        except click.exceptions.NoArgsIsHelpError:
+            raise
+        except click.ClickException as error:
+            command = error.ctx.command_path if isinstance(error, click.UsageError) and error.ctx else "mracad"
+            raise MracadError(error.format_message().rstrip("."), f"see {command} --help", Code.USAGE) from error
         sys.stdout.flush()
         return result if isinstance(result, int) else 0
 

@@ -89,11 +89,14 @@ class Outputs:
         chord: str,
         angle: float,
         ascii_stl: bool,
+        needed: bool = True,
     ) -> None:
         self.paths, self.schema = paths, schema.upper()
         self.overwrite, self.if_changed = overwrite or if_changed, if_changed
         self.chord, self.angle, self.ascii_stl = chord, angle, ascii_stl
         self._sizes: list[str] = []
+        if needed and not paths:
+            raise UsageError("no output is named", "name a file with -o OUT.step, or - for standard output")
         if len(set(paths)) < len(paths):
             raise UsageError("the same output is named twice", "give each -o once")
         for path in paths:

@@ -71,7 +71,6 @@ outputs = click.option(
     "outputs",
     metavar="OUT",
     multiple=True,
-    required=True,
     type=click.Path(allow_dash=True),
     help="File to write; its ending says the format (.step .stp .stl); repeatable; - for STEP on standard output.",
 )

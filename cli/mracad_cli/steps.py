@@ -66,7 +66,7 @@ def run_steps(
     from mracad_cli import render
 
     start = time.perf_counter()
-    targets = Outputs(outputs, **formats)
+    targets = Outputs(outputs, needed=not dry_run, **formats)
     for path in (report, depfile, *(targets.records() if record else ())):
         if path:
             targets.check_report(path)

@@ -1,6 +1,8 @@
 """Bad input: one line that says what is wrong and what to do, the exit code, and no file written or touched."""
 
 import json
+import subprocess
+import sys
 
 import pytest
 
@@ -105,3 +107,23 @@ def test_a_model_on_which_nothing_can_move(mracad, tmp_path):
     assert "--refine" in result.err and not out.exists()
     result = mracad("smooth", source, "--scale", "8mm", "--refine", "-o", out)
     assert result.code == 0 and out.exists() and "1 smoothed" in result.out
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["--scale", "5mm"], "no output is named"),
+        (["--scal", "5mm", "-o", "x.step"], "--scal"),
+        (["--amount", "2", "--scale", "5mm", "-o", "x.step"], "amount"),
+    ],
+)
+def test_bad_usage_in_a_process_of_its_own(samples, tmp_path, words, says):
+    command = [sys.executable, "-m", "mracad_cli", "smooth", str(samples / "panel.step"), *words]
+    result = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path)
+    assert result.returncode == 2 and result.stdout == "" and not list(tmp_path.iterdir())
+    assert result.stderr.startswith("mracad: ") and result.stderr.count("\n") == 1 and says in result.stderr
+
+
+def test_a_dry_run_needs_no_output(mracad, samples):
+    result = mracad("smooth", samples / "panel.step", "--scale", "16mm", "--dry-run")
+    assert result.code == 0 and "dry run, nothing written" in result.out
