@@ -20,6 +20,9 @@ if TYPE_CHECKING:
 SHOWN = 6
 """Most faces named in one line."""
 
+REASONS = 3
+"""Most reasons named in one line."""
+
 
 def mm(value: float) -> str:
     """A length for people: three significant digits, millimetres."""
@@ -105,7 +108,8 @@ def edge_words(edges: tuple[Treatment, ...]) -> str:
     moved = sum(e.how != "frozen" for e in edges)
     loose = sum(e.how == "to tolerance" for e in edges)
     why = Counter(e.reason for e in edges if e.reason)
-    reasons = ", ".join(f"{count} {reason}" for reason, count in why.most_common())
+    reasons = ", ".join(f"{count} {reason}" for reason, count in why.most_common(REASONS))
+    reasons += ", …" if len(why) > REASONS else ""
     words = f"{moved} of {plural(len(edges), 'edge')} moved with both faces"
     return words + (f", {loose} to tolerance" if loose else "") + (f" (not: {reasons})" if why else "")
 
