@@ -112,14 +112,15 @@ def _outcome(work: Callable[[], Any], memory: int | None) -> tuple[bool, Any]:
     resource.setrlimit(resource.RLIMIT_DATA, (memory, hard))
     try:
         return True, work()
+    except (MracadError, KeyboardInterrupt, SystemExit) as error:
+        return False, error
     except BaseException as error:
         resource.setrlimit(resource.RLIMIT_DATA, (hard, hard))  # room to say so
-        return False, _out_of_memory(memory) if _starved(error) else error
-
-
-def _starved(error: BaseException) -> bool:
-    """Whether an error says that memory was refused; a library that cannot be loaded for that says it in words."""
-    return isinstance(error, MemoryError) or "failed to map segment" in str(error)
+        # a library that is refused memory says so in many ways
+        full = (
+            isinstance(error, MemoryError) or _peak(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss) > 0.7 * memory
+        )
+        return False, _out_of_memory(memory) if full else error
 
 
 def _packed(message: tuple[bool, Any]) -> bytes:
