@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import importlib
-import json
 import os
-import pkgutil
 import sys
 from collections.abc import Sequence
 
@@ -20,7 +18,8 @@ class Commands(click.Group):
     """A group whose commands are the modules of ``mracad_cli.commands``."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        return sorted(module.name for module in pkgutil.iter_modules(commands.__path__))
+        files = os.listdir(commands.__path__[0])
+        return sorted(name.removesuffix(".py") for name in files if name.endswith(".py") and name[0] != "_")
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name not in self.list_commands(ctx):
@@ -78,6 +77,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             "please report it with the output of --debug",
         )
     if "--json" in arguments:
+        import json
+
         body = {"code": int(failure.code), "message": failure.message, "hint": failure.hint}
         click.echo(json.dumps({"error": body}, ensure_ascii=False))
     click.echo(f"mracad: {' '.join(str(failure).split())}", err=True)

@@ -122,6 +122,13 @@ def jet_support(knots: KnotVector, at: float, highest: int) -> Array:
         at = float(nearest)
     at = min(max(at, start), end)
     touched = np.zeros(knots.count, bool)
+    if not knots.periodic:
+        if at == start and knots.multiplicities[0] == knots.degree + 1:
+            touched[: highest + 1] = True
+            return touched
+        if at == end and knots.multiplicities[-1] == knots.degree + 1:
+            touched[-highest - 1 :] = True
+            return touched
     places: set[tuple[float, Side]] = {(at, "left"), (at, "right")}
     if knots.periodic and at in (start, end):
         places = {(start, "right"), (end, "left")}

@@ -9,7 +9,6 @@ from __future__ import annotations
 import click
 
 from mracad_cli import options
-from mracad_cli.files import check_reports, load, read
 from mracad_cli.progress import Progress
 
 RULES = ("invalid", "unknown", "free-edges", "unsewn", "file", "self-intersection", "mesh", "nothing")
@@ -67,6 +66,8 @@ def command(
     overwrite: bool,
     as_json: bool,
 ) -> int:
+    from mracad_cli.files import check_reports, load, read
+
     check_reports(junit, sarif, overwrite=overwrite)
     from mracad import review
     from mracad.options import length

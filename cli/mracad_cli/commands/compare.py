@@ -9,7 +9,6 @@ from __future__ import annotations
 import click
 
 from mracad_cli import options
-from mracad_cli.files import check_reports, read
 from mracad_cli.progress import Progress
 
 LAYERS = (
@@ -59,6 +58,8 @@ def command(
     overwrite: bool,
     as_json: bool,
 ) -> int:
+    from mracad_cli.files import check_reports, read
+
     check_reports(junit, sarif, overwrite=overwrite)
     from mracad.audit.compare import Limits
     from mracad.options import length

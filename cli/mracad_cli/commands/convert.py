@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-import json
-import time
 from typing import Any
 
 import click
 
 from mracad_cli import options
-from mracad_cli.files import Outputs, read
 from mracad_cli.progress import Progress
 
 
 @click.command(help=__doc__)
 @options.apply(options.reading, options.writing, options.printing)
 def command(source: str, input_unit: str | None, as_json: bool, outputs: tuple[str, ...], **formats: Any) -> int:
+    import json
+    import time
+
+    from mracad_cli.files import Outputs, read
+
     start = time.perf_counter()
     targets = Outputs(outputs, **formats)
     with Progress() as progress:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
@@ -10,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from mracad_cli import options, render
-from mracad_cli.files import read
 from mracad_cli.progress import Progress
 
 if TYPE_CHECKING:
@@ -35,11 +33,14 @@ if TYPE_CHECKING:
     options.printing,
 )
 def command(source: str, input_unit: str | None, scale: str, keep: Any, everything: bool, as_json: bool) -> int:
+    import json
+
     from mracad.audit.continuity import seams, summary
     from mracad.edit.smooth import smooth
     from mracad.occ.check import check
     from mracad.occ.view import view
     from mracad.options import Smooth, length
+    from mracad_cli.files import read
 
     with Progress() as progress:
         progress("reading", 0, 1)
