@@ -18,7 +18,7 @@ export SOURCE_DATE_EPOCH ?= 0
 
 SAMPLES := $(wildcard samples/*.step)
 
-.PHONY: demo test regress fuzz lint bench samples smooth wheel clean
+.PHONY: demo test regress fuzz lint bench bench-batch docs samples smooth wheel clean
 
 demo: $(VENV)/ready
 	@mkdir -p build
@@ -45,6 +45,14 @@ lint: $(VENV)/dev
 bench: $(VENV)/dev
 	$(BIN)/python benchmarks/transform.py
 	$(BIN)/python benchmarks/command.py
+
+# Batches: what workers gain, kills, a lost cluster worker; some minutes
+bench-batch: $(VENV)/dev
+	$(BIN)/python benchmarks/batch.py
+
+# The page of steps, from their declaration
+docs: $(VENV)/ready
+	$(BIN)/python -c 'from mracad.recipe import page; print(page(), end="")' > docs/steps.md
 
 samples: $(VENV)/ready
 	$(BIN)/python samples/make.py samples

@@ -83,6 +83,10 @@ def run(work: Callable[[], Result], seconds: float | None = None, memory: int | 
     raise MracadError(f"the CAD kernel crashed ({what})", "the model may be damaged: see mracad check", Code.INTERNAL)
 
 
+_OUT_OF_MEMORY = ("failed to map segment", "error return without exception set")
+"""What libraries say that ran out of memory: the loader, and compiled modules while they are loaded."""
+
+
 def _child(work: Callable[[], Any], writer: int, memory: int | None) -> None:
     """Run the work, send what became of it, and end the process, whatever happens."""
     try:
@@ -116,11 +120,12 @@ def _outcome(work: Callable[[], Any], memory: int | None) -> tuple[bool, Any]:
         return False, error
     except BaseException as error:
         resource.setrlimit(resource.RLIMIT_DATA, (hard, hard))  # room to say so
-        # a library that is refused memory says so in many ways
-        full = (
-            isinstance(error, MemoryError) or _peak(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss) > 0.7 * memory
-        )
-        return False, _out_of_memory(memory) if full else error
+        return False, _out_of_memory(memory) if _starved(error) else error
+
+
+def _starved(error: BaseException) -> bool:
+    """Whether an error says that memory was refused; a library that cannot be loaded for that says it in words."""
+    return isinstance(error, MemoryError) or any(words in str(error) for words in _OUT_OF_MEMORY)
 
 
 def _packed(message: tuple[bool, Any]) -> bytes:

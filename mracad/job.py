@@ -1,24 +1,35 @@
-"""One document on its way through the program: read, view, edit, apply, check, write; and the report of it."""
+"""A document on its way through the steps of a recipe: viewed, edited, checked in memory; and the report of it."""
 
 from __future__ import annotations
 
+import importlib
 import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+from mracad import review
+from mracad.audit.compare import Limits
 from mracad.audit.continuity import SeamMeasure, key, seams
 from mracad.audit.deviation import Deviation, deviations
+from mracad.audit.verdict import Layer, Verdict
 from mracad.edit.result import Edit
-from mracad.errors import EditError
+from mracad.errors import EditError, UsageError
 from mracad.model import Model
-from mracad.options import Selection
+from mracad.options import Check, Compare, Selection, length
 from mracad.select import NURBS, select
 
 if TYPE_CHECKING:
     from mracad.occ.check import Validity
     from mracad.occ.document import Document
+    from mracad.recipe import Step
+
+Original = Callable[[], "Document"]
+"""Reads a document again as it was."""
+
+WIDER, STEEPER = 1e-5, 0.01
+"""No seam may gape by so much more (mm), and no smooth one turn by so much more (degrees), after an edit."""
 
 Progress = Callable[[str, int, int], None]
 """Called with the name of a stage, the steps done and the steps in all."""
@@ -51,6 +62,126 @@ class Report:
     def smooth_seams(self) -> frozenset[tuple[int, tuple[int, int]]]:
         """Keys of the seams that were smooth before."""
         return frozenset(key(m) for m in self.before if m.smooth)
+
+
+@dataclass(frozen=True)
+class Judged:
+    """What a check or comparison found, and the layers for which it fails."""
+
+    verdict: Verdict
+    failed: tuple[Layer, ...]
+
+    @property
+    def passed(self) -> bool:
+        return not self.failed
+
+    @property
+    def failures(self) -> list[str]:
+        """What does not hold, one line each; empty when it is passed."""
+        return [text for layer in self.failed for text in ([f.text for f in layer.findings] or [layer.text])]
+
+
+def play(
+    document: Document,
+    steps: Sequence[Step],
+    *,
+    original: Original | None = None,
+    progress: Progress | None = None,
+    apply: bool = True,
+) -> list[Report | Judged]:
+    """Take a document through steps, in memory, up to the first check that fails.
+
+    Parameters
+    ----------
+    document : Document
+        Changed in place.
+    steps : sequence of Step
+    original : callable, optional
+        Reads the document again as it was, for a comparison.
+    apply : bool
+        False for a dry run, after which the document must not be written: the last step is not put into it.
+
+    Returns
+    -------
+    list of Report and Judged
+        One for each step that was done.
+
+    Raises
+    ------
+    EditError
+        As :func:`run`.
+    """
+    results: list[Report | Judged] = []
+    for step in steps:
+        module, _, name = step.options.function.partition(":")
+        function = getattr(importlib.import_module(module), name)
+        result: Report | Judged
+        if isinstance(step.options, Selection):
+            put = apply or step is not steps[-1]
+            result = run(document, function, step.options, progress=progress, apply=put)
+        else:
+            if progress:
+                progress(step.use, 0, 1)
+            result = function(document, step.options, original)
+        results.append(result)
+        if isinstance(result, Judged) and not result.passed:
+            break
+    return results
+
+
+def check(document: Document, options: Check, original: Original | None = None, *, text: bytes | None = None) -> Judged:
+    """Check a document.
+
+    Parameters
+    ----------
+    document : Document
+    options : Check
+    original : callable, optional
+        Not needed.
+    text : bytes, optional
+        The file that the document was read from: then every layer is looked at.  Without it there is no file to be
+        judged, and of the layers that take long only those that ``options.fail_on`` names are.
+    """
+    size = review.diagonal(document)
+    gap, tolerance, wall = (
+        None if given is None else length(given, size, name)
+        for given, name in (
+            (options.max_gap, "max-gap"),
+            (options.max_tolerance, "max-tolerance"),
+            (options.min_wall, "min-wall"),
+        )
+    )
+    limits = review.CheckLimits(gap, options.max_angle, options.kink, tolerance, wall, options.layer_limit)
+    slow = review.SLOW if text is not None else review.SLOW.intersection(options.fail_on)
+    verdict = review.check(text, document.name, document, limits, slow)
+    return Judged(verdict, tuple(review.failing(verdict, options.fail_on)))
+
+
+def compare(document: Document, options: Compare, original: Original | None = None) -> Judged:
+    """Compare a document with the reference that ``options`` names, or else with the original.
+
+    Raises
+    ------
+    UsageError
+        When there is neither.
+    """
+    from mracad.occ.read import read_step
+
+    if options.reference:
+        reference = read_step(options.reference)
+    elif original:
+        reference = original()
+    else:
+        raise UsageError("compare has nothing to compare with", "name a reference")
+    size = review.diagonal(reference)
+    limits = Limits(
+        deviation=length(options.max_deviation, size, "max-deviation"),
+        gap_growth=None if options.max_gap_growth is None else length(options.max_gap_growth, size, "max-gap-growth"),
+        angle_growth=options.max_angle_growth,
+        volume_change=None if options.max_volume_change is None else options.max_volume_change / 100,
+    )
+    verdict = review.compare(reference, document, limits, options.ignore)
+    return Judged(verdict, verdict.failed())
 
 
 def run(
@@ -104,9 +235,9 @@ def run(
         model = view(document, convert=convertible)
     before: list[SeamMeasure] = []
     valid_before: Validity | None = None
-    spoiled: set[int] = set()
+    spoiled: dict[int, str] = {}
     while True:
-        result = edit(model, options, faces=chosen, held=held | spoiled, progress=stage("editing"))
+        result = edit(model, options, faces=chosen, held=held | spoiled.keys(), progress=stage("editing"))
         result = _named(result, spoiled)
         _refuse_if_stuck(model, result)
         if valid_before is None:
@@ -114,6 +245,11 @@ def run(
             stage("checking the input")(0, 1)
             valid_before = check(document)
         valid_after = valid_before
+        after = seams(result.displacement.applied(model)) if result.displacement.offsets else before
+        torn = {i for i in _torn(before, after) if model.faces[i].surface is not None} - spoiled.keys()
+        if torn:
+            spoiled |= dict.fromkeys(torn, "its seams would not hold")
+            continue
         if not (apply and result.displacement.offsets):
             break
         put(document, model, result.displacement)
@@ -125,13 +261,12 @@ def run(
             valid_after = _verdict(valid_before, moved, touched)
             break
         restore(document, model, result.displacement)
-        if not worse <= touched - spoiled:
+        if not worse <= touched - spoiled.keys():
             raise EditError(
                 f"{model.name}: the result would be less valid",
                 "leave faces out with --faces '!#N', or use --amount 0.5",
             )
-        spoiled |= worse
-    after = seams(result.displacement.applied(model)) if result.displacement.offsets else before
+        spoiled |= dict.fromkeys(worse, "its result would not be valid")
     return Report(
         model,
         result,
@@ -154,15 +289,24 @@ def _refuse_if_stuck(model: Model, result: Edit) -> None:
         )
 
 
-def _named(result: Edit, spoiled: set[int]) -> Edit:
-    """The outcomes with the reason for which ``spoiled`` faces were left."""
+def _torn(before: list[SeamMeasure], after: list[SeamMeasure]) -> set[int]:
+    """Faces of seams that an edit would open, or that were smooth and would not be."""
+    return {
+        face
+        for old, new in zip(before, after, strict=True)
+        if new.gap > old.gap + WIDER or (old.smooth and new.angle > old.angle + STEEPER)
+        for face in old.faces
+    }
+
+
+def _named(result: Edit, spoiled: dict[int, str]) -> Edit:
+    """The outcomes with the reasons for which ``spoiled`` faces were left."""
     if not spoiled:
         return result
     return replace(
         result,
         outcomes=tuple(
-            replace(o, status="stuck", reason="its result would not be valid") if o.face in spoiled else o
-            for o in result.outcomes
+            replace(o, status="stuck", reason=spoiled[o.face]) if o.face in spoiled else o for o in result.outcomes
         ),
     )
 

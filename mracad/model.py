@@ -5,7 +5,8 @@ Lengths are millimetres.  Every array is float64 and must be treated as read-onl
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -109,12 +110,15 @@ class Side:
         Parameters on the face's surface.
     points, normals : ndarray (k, 3) or None
         Points (mm) and outward unit normals in the part's frame.
+    curvatures : ndarray (k,) or None
+        Normal curvatures across the edge (1/mm), positive where the face bends towards its normal.
     """
 
     face: int
     uv: Array | None = None
     points: Array | None = None
     normals: Array | None = None
+    curvatures: Array | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,6 +186,10 @@ class Model:
     schema: str = ""
     products: tuple[str, ...] = ()
 
+    def with_surfaces(self, surfaces: Sequence[Surface]) -> Model:
+        """The model with other surfaces under the same faces (baked sides stay where they are)."""
+        return replace(self, surfaces=tuple(surfaces))
+
 
 @dataclass(frozen=True, eq=False)
 class Offset:
@@ -220,13 +228,4 @@ class Displacement:
             surfaces[index] = Surface(
                 index, Net(net.u, net.v, net.poles + offset.poles, net.weights), old.faces, old.origin
             )
-        return Model(
-            model.name,
-            tuple(surfaces),
-            model.faces,
-            model.edges,
-            model.diagonal,
-            model.unit,
-            model.schema,
-            model.products,
-        )
+        return model.with_surfaces(surfaces)

@@ -1,23 +1,26 @@
-"""The options of every edit, declared once: command line, recipes, schemas and documentation come from here.
+"""The options of every step, declared once: command line, recipes, schemas and documentation come from here.
 
-A ``Struct`` per edit; a field's ``Meta`` carries its help.  This module imports no numerical library, so that the
-command line can show its help at once.
+A ``Struct`` per edit or check, listed in ``STEPS``; a field's ``Meta`` carries its help.  This module imports no
+numerical library, so that the command line can show its help at once.
 """
 
 from __future__ import annotations
 
 import math
 import re
-from typing import Annotated, Literal
+import types
+import typing
+from functools import cache
+from typing import Annotated, Any, ClassVar, Literal
 
-from msgspec import Meta, Struct
+from msgspec import Meta, Struct, structs
 
 from mracad.errors import UsageError
 
 MILLIMETRES = {"um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4, "ft": 304.8, "yd": 914.4, "mi": 1609344.0}
 """Length units by name, in millimetres."""
 
-_LENGTH = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([a-zA-Z]*|%)\s*")
+_QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([a-zA-Z]*|%)\s*")
 
 
 def length(text: str, diagonal: float, name: str) -> float:
@@ -28,7 +31,7 @@ def length(text: str, diagonal: float, name: str) -> float:
     UsageError
         When it is not a positive finite length.
     """
-    match = _LENGTH.fullmatch(str(text))
+    match = _QUANTITY.fullmatch(str(text))
     hint = f"write {name} as 5mm, 0.2in or 2% (of the model's diagonal)"
     if not match or (match[2] not in {"", "%"} and match[2] not in MILLIMETRES):
         raise UsageError(f"{name}: {text!r} is not a length", hint)
@@ -38,7 +41,82 @@ def length(text: str, diagonal: float, name: str) -> float:
     return value
 
 
-class Selection(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+SECONDS = {"s": 1.0, "min": 60.0, "h": 3600.0}
+"""Units of time by name, in seconds."""
+
+
+def duration(text: str, name: str) -> float:
+    """Seconds from ``"90"``, ``"90s"``, ``"10min"`` or ``"2h"``; raises UsageError."""
+    match = _QUANTITY.fullmatch(text)
+    units = {"": 1.0, **SECONDS}
+    if not match or match[2] not in units or not 0 < float(match[1]) < math.inf:
+        raise UsageError(f"{name}: {text!r} is not a time", "write it as 90s, 10min or 2h")
+    return float(match[1]) * units[match[2]]
+
+
+Length = Annotated[
+    str,
+    Meta(extra_json_schema={"pattern": rf"^\s*\+?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?\s*({'|'.join(MILLIMETRES)}|%)?\s*$"}),
+]
+"""The type of a field that :func:`length` reads."""
+
+
+def dashed(name: str) -> str:
+    """An option's name as on the command line."""
+    return name.replace("_", "-")
+
+
+@cache
+def lengths(struct: type[Struct]) -> frozenset[str]:
+    """The fields of a struct that hold a length."""
+    return frozenset(name for name, kind in plain_types(struct).items() if kind is Length)
+
+
+@cache
+def plain_types(struct: type[Struct]) -> dict[str, Any]:
+    """The type of each field, without its help and without None."""
+    hints = typing.get_type_hints(struct, include_extras=True)
+    return {name: _plain(hints[name]) for name in struct.__struct_fields__}
+
+
+def _plain(hint: Any) -> Any:
+    """``T`` from ``Annotated[T | None, …]``; :data:`Length` stays what it is."""
+    if hint is Length:
+        return hint
+    if typing.get_origin(hint) is Annotated:
+        return _plain(hint.__origin__)
+    if typing.get_origin(hint) in (types.UnionType, typing.Union):
+        return _plain(next(member for member in typing.get_args(hint) if member is not type(None)))
+    return hint
+
+
+class Options(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What every step is asked with.
+
+    Attributes
+    ----------
+    function : str
+        Where the step is done, ``"module:function"``.
+    """
+
+    function: ClassVar[str]
+
+    def __post_init__(self) -> None:
+        for name in lengths(type(self)):
+            if (text := getattr(self, name)) is not None:
+                length(text, 1.0, dashed(name))
+
+    def given(self) -> dict[str, Any]:
+        """The options that differ from their defaults, by name."""
+        every = {field.name: (getattr(self, field.name), field.default) for field in structs.fields(self)}
+        return {name: value for name, (value, default) in every.items() if value != default}
+
+    def files(self) -> tuple[str, ...]:
+        """Files that the options name, beside the model: what the result depends on, too."""
+        return ()
+
+
+class Selection(Options, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Which faces an edit may touch and how their edges are treated; shared by every edit."""
 
     faces: Annotated[
@@ -56,6 +134,28 @@ class Selection(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         Literal["g0", "g1", "g2"],
         Meta(description="Continuity that every edge keeps: position, tangent plane or curvature."),
     ] = "g1"
+    edges: Annotated[
+        Literal["frozen", "coupled"],
+        Meta(
+            description="Edges between two edited faces: frozen, none moves; coupled, they move and stay as smooth as "
+            "they were, where both sides are natural boundaries and that is possible."
+        ),
+    ] = "frozen"
+    fit_g1: Annotated[
+        float | None,
+        Meta(
+            description="Make seams tangent that are meant to be: those between edited faces under this angle (°).",
+            ge=0.0,
+        ),
+    ] = None
+    close_gaps: Annotated[
+        bool,
+        Meta(description="Pull gaps along seams between edited faces shut."),
+    ] = False
+    gap_tolerance: Annotated[
+        Length,
+        Meta(description="Gap (a length) that a seam along a trim curve may have after it moved, unless it was wider."),
+    ] = "1e-4mm"
     refine: Annotated[
         bool,
         Meta(description="Insert knots (exactly) where a face has too few free control points."),
@@ -65,34 +165,113 @@ class Selection(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         Meta(description="How much of the edit: 1 is all of it, 0 none.", ge=0.0, le=1.0),
     ] = 1.0
     max_deviation: Annotated[
-        str | None,
+        Length | None,
         Meta(description="Bound on the displacement (a length): the edit is blended back locally until it holds."),
     ] = None
 
+    quiet: ClassVar[str]
+
+    @property
+    def done(self) -> str:
+        """What was done to an edited face, ``"smoothed at 5mm"``; ``quiet`` is what an unchanged one is."""
+        raise NotImplementedError
+
 
 class Smooth(Selection, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Remove detail finer than a scale from NURBS faces."""
+    """Remove detail finer than a scale from the NURBS faces of a STEP file."""
+
+    function: ClassVar[str] = "mracad.edit.smooth:smooth"
+    quiet: ClassVar[str] = "already smooth there"
 
     scale: Annotated[
-        str | None,
+        Length | None,
         Meta(
             description="Wavelength (5mm, 0.2in, or 2% of the model's diagonal): ripples up to half of it go, "
             "ripples of three times it stay."
         ),
     ] = None
     level: Annotated[
-        float | None,
+        Annotated[float, Meta(gt=0.0)] | None,
         Meta(
             description="Instead of --scale: how many levels of the face's own knot ladder to remove, 2.5 for two "
-            "and a half.",
-            gt=0.0,
+            "and a half."
         ),
     ] = None
 
+    @property
+    def done(self) -> str:
+        return f"smoothed at {self.scale if self.scale is not None else f'level {self.level:g}'}"
+
     def __post_init__(self) -> None:
+        super().__post_init__()
         if (self.scale is None) == (self.level is None):
             raise UsageError("smooth needs either a scale or a level", "give --scale 5mm, --scale 2% or --level 2.5")
         if self.level is not None and not (math.isfinite(self.level) and self.level > 0):
             raise UsageError(f"level: {self.level} is not greater than zero", "give --level 1, 2 or 2.5")
         if not (math.isfinite(self.amount) and 0 <= self.amount <= 1):
             raise UsageError(f"amount: {self.amount} is not between 0 and 1", "give --amount 0.5")
+
+
+class Check(Options, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Check validity and continuity; what fails it stops a recipe, and a command ends with exit code 1."""
+
+    function: ClassVar[str] = "mracad.job:check"
+
+    max_gap: Annotated[Length | None, Meta(description="Largest gap along any seam.")] = None
+    max_angle: Annotated[
+        Annotated[float, Meta(ge=0.0)] | None,
+        Meta(description="Largest angle (degrees) along seams that are meant to be smooth."),
+    ] = None
+    kink: Annotated[float, Meta(description="A seam with a smaller angle (degrees) is meant to be smooth.", ge=0.0)] = (
+        1.0
+    )
+    max_tolerance: Annotated[Length | None, Meta(description="Largest tolerance of edges and vertices.")] = None
+    min_wall: Annotated[Length | None, Meta(description="Least thickness of the walls of solids.")] = None
+    layer_limit: Annotated[
+        Annotated[float, Meta(gt=0.0)] | None,
+        Meta(description="Seconds for each layer; one that takes longer says nothing."),
+    ] = None
+    fail_on: Annotated[
+        tuple[
+            Literal["invalid", "unknown", "free-edges", "unsewn", "file", "self-intersection", "mesh", "nothing"], ...
+        ],
+        Meta(description="What fails the check beside the limits; repeatable."),
+    ] = ("invalid",)
+
+
+class Compare(Options, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Compare with a reference; what differs beyond its limit stops a recipe, and a command ends with exit code 1."""
+
+    function: ClassVar[str] = "mracad.job:compare"
+
+    reference: Annotated[
+        str | None, Meta(description="File to compare with; by default the model as it came into the recipe.")
+    ] = None
+    max_deviation: Annotated[Length, Meta(description="How far any face or outline may lie from its partner.")] = (
+        "1e-6mm"
+    )
+    max_gap_growth: Annotated[Length | None, Meta(description="How much wider the gap of any seam may become.")] = None
+    max_angle_growth: Annotated[
+        Annotated[float, Meta(ge=0.0)] | None,
+        Meta(description="How much larger the angle (degrees) of any seam may become."),
+    ] = None
+    max_volume_change: Annotated[
+        Annotated[float, Meta(ge=0.0)] | None, Meta(description="How much of the volume (percent) may come or go.")
+    ] = None
+    ignore: Annotated[
+        tuple[
+            Literal[
+                "faces", "deviation", "seams", "topology", "validity", "size", "assembly", "names", "colours",
+                "layers", "materials", "annotations",
+            ],
+            ...,
+        ],
+        Meta(description="What may differ in any way; repeatable."),
+    ] = ()  # fmt: skip
+
+    def files(self) -> tuple[str, ...]:
+        return (self.reference,) if self.reference else ()
+
+
+STEPS: dict[str, type[Options]] = {"smooth": Smooth, "check": Check, "compare": Compare}
+"""Every step by the name of its command: edits (subclasses of ``Selection``) and checks."""

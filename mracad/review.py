@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -19,6 +19,7 @@ from mracad.errors import Code, MracadError
 if TYPE_CHECKING:
     from mracad.audit.continuity import SeamMeasure, SeamSummary
     from mracad.occ.document import Document
+    from mracad.occ.stated import Stated
 
 
 def compare(ref: Document, new: Document, limits: audit.Limits | None = None, ignore: Iterable[str] = ()) -> Verdict:
@@ -86,18 +87,25 @@ class CheckLimits:
     layer_seconds: float | None = None
 
 
-def check(text: bytes, name: str, document: Document, limits: CheckLimits) -> Verdict:
-    """Check a STEP file, layer by layer.
+SLOW = frozenset({"self-intersection", "mesh"})
+"""Layers that take long."""
+
+
+def check(
+    text: bytes | None, name: str, document: Document, limits: CheckLimits, slow: Collection[str] = SLOW
+) -> Verdict:
+    """Check a document, layer by layer.
 
     Parameters
     ----------
-    text : bytes
-        The file.
+    text : bytes or None
+        The file that it was read from; None for a document that has changed since.
     name : str
         Its name.
     document : Document
-        The same file, read.
     limits : CheckLimits
+    slow : collection of str
+        Those of :data:`SLOW` to be looked at.
     """
     from mracad.occ.check import check as kernel_check
     from mracad.occ.check import looks
@@ -106,31 +114,25 @@ def check(text: bytes, name: str, document: Document, limits: CheckLimits) -> Ve
     from mracad.occ.view import view
 
     model = view(document)
-    file = stated(text, name)
+    file = None if text is None else stated(text, name)
     measures = seams(model, every=True)
-    flipped = layers.turned(file.uses)
-    known = flipped if file.faces == len(model.faces) else set()
+    flipped = layers.turned(file.uses) if file else set()
+    known = flipped if file and file.faces == len(model.faces) else set()
     unseen = "" if known or not flipped else f"; {len(flipped)} faces of the file were turned round"
     brep = _limited("brep", lambda: layers.brep(kernel_check(document)), limits)
     validity = kernel_check(document, faces=None if brep.status in ("pass", "fail") else ())
     open_faces = {edge.sides[0].face for edge in model.edges if edge.free}
     totals = summary(measures, frozenset(key(m) for m in measures if m.angle < limits.kink))
     found = [
-        Layer(
-            "file",
-            "fail" if file.broken else "pass",
-            f"{document.schema or 'unknown schema'}, unit {document.unit}, {file.entities} entities",
-            tuple(Finding(line, "entity") for line in file.broken),
-            {"entities": file.entities, "schema": document.schema, "unit": document.unit},
-        ),
-        _load(len(model.faces), file.faces, unseen),
+        _file(file, document) if file else Layer("file", "skipped", "not written yet"),
+        _load(len(model.faces), file.faces, unseen) if file else Layer("load", "skipped", "not written yet"),
         brep,
         layers.shells(model, validity, known | layers.turned(looks(document))),
         layers.seams(measures, limits.kink, limits.gap, limits.angle, _seam_text(totals)),
-        _limited("self-intersection", lambda: _crossed(document, measures), limits),
+        _limited("self-intersection", lambda: _crossed(document, measures), limits, slow),
         layers.tolerances(model, validity, limits.tolerance),
         _limited("walls", lambda: _walls(document, limits.wall), limits),
-        _limited("mesh", lambda: layers.mesh(triangles(document), open_faces), limits),
+        _limited("mesh", lambda: layers.mesh(triangles(document), open_faces), limits, slow),
     ]
     return Verdict(name, tuple(found), _valid(found, validity.solids))
 
@@ -161,8 +163,20 @@ def _valid(found: list[Layer], solids: int) -> bool | None:
     return None if by_name["brep"].status != "pass" else True
 
 
-def _limited(name: str, make: Callable[[], Layer], limits: CheckLimits) -> Layer:
-    """A layer that may take only so long, and whose crash is not the end."""
+def _file(file: Stated, document: Document) -> Layer:
+    return Layer(
+        "file",
+        "fail" if file.broken else "pass",
+        f"{document.schema or 'unknown schema'}, unit {document.unit}, {file.entities} entities",
+        tuple(Finding(line, "entity") for line in file.broken),
+        {"entities": file.entities, "schema": document.schema, "unit": document.unit},
+    )
+
+
+def _limited(name: str, make: Callable[[], Layer], limits: CheckLimits, slow: Collection[str] | None = None) -> Layer:
+    """A layer that may take only so long, and whose crash is not the end; skipped when it is not in ``slow``."""
+    if slow is not None and name not in slow:
+        return Layer(name, "skipped", "not asked for")
     if limits.layer_seconds is None:
         return make()
     try:

@@ -12,18 +12,20 @@ import click
 import mracad
 from mracad.errors import Code, MracadError
 from mracad_cli import commands, options
+from mracad_cli.steps import edit_command, edits
 
 
 class Commands(click.Group):
-    """A group whose commands are the modules of ``mracad_cli.commands``."""
+    """A group whose commands are the modules of ``mracad_cli.commands`` and the edits of ``mracad.options``."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        files = os.listdir(commands.__path__[0])
-        return sorted(name.removesuffix(".py") for name in files if name.endswith(".py") and name[0] != "_")
+        return sorted({*_modules(), *edits()})
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name not in self.list_commands(ctx):
             return None
+        if cmd_name not in _modules():
+            return edit_command(cmd_name)
         command = importlib.import_module(f"mracad_cli.commands.{cmd_name}").command
         return command if isinstance(command, click.Command) else None
 
@@ -36,6 +38,11 @@ class Commands(click.Group):
             near = difflib.get_close_matches(args[0], self.list_commands(ctx), n=1)
             raise click.UsageError(f"no command {args[0]!r}" + (f", did you mean {near[0]!r}?" if near else ""))
         return super().resolve_command(ctx, args)
+
+
+def _modules() -> set[str]:
+    files = os.listdir(commands.__path__[0])
+    return {name.removesuffix(".py") for name in files if name.endswith(".py") and name[0] != "_"}
 
 
 @click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 120})
@@ -93,6 +100,8 @@ def _limited(arguments: list[str], guarded: bool) -> int:
         sys.stdout.flush()
         return result if isinstance(result, int) else 0
 
+    if arguments[:1] == ["batch"]:  # its limits are those of each file, and its workers are its guard
+        return work()
     seconds, memory = options.limits(arguments)
     working = bool(arguments) and arguments[0] in group.list_commands(click.Context(group))
     if seconds is None and memory is None and not (guarded and working and "--debug" not in arguments):

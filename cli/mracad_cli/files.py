@@ -6,6 +6,7 @@ import contextlib
 import io
 import os
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -60,9 +61,19 @@ def check_target(path: Path, overwrite: bool) -> None:
 
 def write_text(path: Path, text: str) -> None:
     """Write a text file whole or not at all."""
-    from mracad.occ.output import put
+    from mracad.output import put
 
     put(text.encode(), path)
+
+
+def depfile_text(outputs: Iterable[str], inputs: Iterable[str]) -> str:
+    """A rule for make: what the outputs depend on; and one for each input, so that make bears with its absence."""
+    targets, needs = ([_for_make(path) for path in paths] for paths in (outputs, inputs))
+    return f"{' '.join(targets)}: {' '.join(needs)}\n" + "".join(f"\n{need}:\n" for need in needs)
+
+
+def _for_make(path: str) -> str:
+    return path.replace("$", "$$").replace("#", "\\#").replace(" ", "\\ ")
 
 
 class Outputs:
@@ -73,12 +84,14 @@ class Outputs:
         paths: tuple[str, ...],
         *,
         overwrite: bool,
+        if_changed: bool,
         schema: str,
         chord: str,
         angle: float,
         ascii_stl: bool,
     ) -> None:
-        self.paths, self.overwrite, self.schema = paths, overwrite, schema.upper()
+        self.paths, self.schema = paths, schema.upper()
+        self.overwrite, self.if_changed = overwrite or if_changed, if_changed
         self.chord, self.angle, self.ascii_stl = chord, angle, ascii_stl
         self._sizes: list[str] = []
         if len(set(paths)) < len(paths):
@@ -99,8 +112,8 @@ class Outputs:
     def write(self, document: Document, title: str) -> None:
         """Write the document to every output; none is replaced unless all could be made."""
         from mracad.occ.mesh import write_stl
-        from mracad.occ.output import beside
         from mracad.occ.write import write_step
+        from mracad.output import beside, holds
 
         made: dict[str, bytes] = {}
         for path in self.paths:
@@ -112,7 +125,7 @@ class Outputs:
             made[path] = stream.getvalue()
         with contextlib.ExitStack() as stack:
             for path, data in made.items():
-                if path != "-":
+                if path != "-" and not (self.if_changed and holds(Path(path), data)):
                     stack.enter_context(beside(path)).write_bytes(data)
         if "-" in made:
             sys.stdout.buffer.write(made["-"])
@@ -129,6 +142,14 @@ class Outputs:
     def say(self, line: str) -> None:
         """Print a line of the result."""
         print(line, file=sys.stderr if "-" in self.paths else sys.stdout)
+
+    def files(self) -> list[str]:
+        """The outputs that are files."""
+        return [path for path in self.paths if path != "-"]
+
+    def records(self) -> list[str]:
+        """The files beside the outputs that say how they were made."""
+        return [f"{path}.toml" for path in self.files()]
 
     def names(self) -> list[str]:
         return [self._name(path) for path in self.paths]

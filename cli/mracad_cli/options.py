@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import types
 import typing
 from collections.abc import Callable
 from typing import Any, Literal
@@ -11,44 +10,47 @@ import click
 from msgspec import Meta, Struct, structs
 
 from mracad.errors import UsageError
+from mracad.options import Length, dashed, plain_types
 
 Command = Callable[..., Any]
 
-SHORT = {"max_deviation": "LENGTH", "scale": "LENGTH", "faces": "SEL", "hold": "SEL"}
+SHORT = {"faces": "SEL", "hold": "SEL", "max_angle": "DEG", "kink": "DEG", "fit_g1": "DEG"}
 """Placeholders in the help."""
 
 
-def of(struct: type[Struct]) -> Callable[[Command], Command]:
-    """Add one option for each field of a struct, its own before the inherited ones, under the same names."""
+def of(struct: type[Struct], without: str = "") -> Callable[[Command], Command]:
+    """Add one option for each field of a struct but one, its own before the inherited ones, under the same names."""
 
     def decorate(command: Command) -> Command:
-        hints = typing.get_type_hints(struct, include_extras=True)
+        hints, kinds = typing.get_type_hints(struct, include_extras=True), plain_types(struct)
         base = struct.__base__
         shared = len(structs.fields(base)) if base is not None and base is not Struct else 0
         fields = structs.fields(struct)
         for field in reversed(fields[shared:] + fields[:shared]):
-            command = _option(field.name, hints[field.name], field.default)(command)
+            if field.name == without:
+                continue
+            meta = next(m for m in hints[field.name].__metadata__ if isinstance(m, Meta) and m.description)
+            command = _option(field.name, meta.description or "", kinds[field.name], field.default)(command)
         return command
 
     return decorate
 
 
-def _option(name: str, hint: Any, default: Any) -> Callable[[Command], Command]:
-    kind, meta = hint.__origin__, next(m for m in hint.__metadata__ if isinstance(m, Meta))
-    members = [t for t in typing.get_args(kind) if t is not type(None)] if isinstance(kind, types.UnionType) else []
-    if members:
-        kind = members[0]
-    flag = f"--{name.replace('_', '-')}"
-    settings: dict[str, Any] = {"help": meta.description, "default": default, "metavar": SHORT.get(name)}
+def _option(name: str, help: str, kind: Any, default: Any) -> Callable[[Command], Command]:
+    flag = f"--{dashed(name)}"
+    settings: dict[str, Any] = {"help": help, "metavar": SHORT.get(name), "default": default}
     if kind is bool:
-        return click.option(flag, is_flag=True, help=meta.description, default=default)
+        return click.option(flag, is_flag=True, help=help, default=default)
+    if kind is Length:
+        settings |= {"metavar": "LENGTH"}
     if typing.get_origin(kind) is tuple:
-        return click.option(flag, type=str, multiple=True, metavar=SHORT.get(name), help=meta.description)
+        settings |= {"multiple": True}
+        kind = typing.get_args(kind)[0]
     if typing.get_origin(kind) is Literal:
-        settings |= {"type": click.Choice(typing.get_args(kind)), "show_default": True}
+        settings |= {"type": click.Choice(typing.get_args(kind))}
     else:
-        settings |= {"type": kind, "show_default": default is not None}
-    return click.option(flag, **settings)
+        settings |= {"type": kind if kind in (int, float) else str}
+    return click.option(flag, **settings, show_default=default not in (None, ()))
 
 
 def apply(*decorators: Callable[[Command], Command]) -> Callable[[Command], Command]:
@@ -102,6 +104,9 @@ angle = click.option(
 )
 ascii_stl = click.option("--ascii", "ascii_stl", is_flag=True, help="STL: write text instead of binary.")
 overwrite = click.option("--overwrite", is_flag=True, help="Replace an existing output.")
+if_changed = click.option(
+    "--if-changed", is_flag=True, help="Replace an existing output only where its content changes, as make likes it."
+)
 as_json = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 debug = click.option("--debug", is_flag=True, expose_value=False, help="Show the traceback of an error.")
 
@@ -117,7 +122,7 @@ limiting = apply(
     ),
 )
 reading = apply(source, input_unit)
-writing = apply(outputs, schema, chord, angle, ascii_stl, overwrite)
+writing = apply(outputs, schema, chord, angle, ascii_stl, overwrite, if_changed)
 printing = apply(as_json, limiting, debug)
 reports = apply(
     click.option("--junit", metavar="F.xml", type=click.Path(), help="Write the verdict as JUnit, a case a layer."),
@@ -126,7 +131,18 @@ reports = apply(
 )
 editing = apply(
     click.option("--report", metavar="F.json", type=click.Path(), help="Write the full report (JSON) to a file."),
+    click.option("--depfile", metavar="F.d", type=click.Path(), help="Write what the outputs depend on, for make."),
     click.option("--dry-run", is_flag=True, help="Say what would be done; write nothing but the report."),
+)
+assignments = click.option(
+    "--set",
+    "assignments",
+    metavar="STEP.OPTION=VALUE",
+    multiple=True,
+    help="Set an option of a step, named by its id or its command; repeatable.",
+)
+record = click.option(
+    "--record", is_flag=True, help="Write the recipe with all its options and versions beside the output (OUT.toml)."
 )
 
 

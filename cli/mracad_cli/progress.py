@@ -12,9 +12,16 @@ PATIENCE = 1.0
 
 
 class Progress:
-    """A context manager whose instances are called with a stage, the steps done and the steps in all."""
+    """A context manager whose instances are called with a stage, the steps done and the steps in all.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    rate : bool
+        Show how many steps are done a second, and the time that is left.
+    """
+
+    def __init__(self, rate: bool = False) -> None:
+        self._rate = rate
         self._start = time.monotonic()
         self._bar: Any = None
         self._task: Any = None
@@ -33,11 +40,13 @@ class Progress:
             return
         if self._bar is None:
             from rich.console import Console
-            from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
+            from rich.progress import BarColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
             from rich.progress import Progress as Bar
 
             columns = TextColumn("{task.description}"), BarColumn(), TextColumn("{task.completed}/{task.total}")
-            self._bar = Bar(*columns, TimeElapsedColumn(), console=Console(stderr=True), transient=True)
+            times = (TextColumn("{task.fields[rate]}"), TimeRemainingColumn()) if self._rate else (TimeElapsedColumn(),)
+            self._bar = Bar(*columns, *times, console=Console(stderr=True), transient=True)
             self._bar.start()
-            self._task = self._bar.add_task(stage, total=total)
-        self._bar.update(self._task, description=stage, completed=done, total=total)
+            self._task = self._bar.add_task(stage, total=total, rate="")
+        rate = f"{done / (time.monotonic() - self._start):.1f}/s, left"
+        self._bar.update(self._task, description=stage, completed=done, total=total, rate=rate)

@@ -7,11 +7,15 @@ from typing import TYPE_CHECKING, Any
 
 import msgspec
 
+from mracad.options import Selection
+
 if TYPE_CHECKING:
     from mracad.audit.continuity import SeamMeasure, SeamSummary
+    from mracad.constraint.seam import Treatment
     from mracad.edit.result import FaceOutcome
-    from mracad.job import Report
+    from mracad.job import Judged, Report
     from mracad.occ.check import Validity
+    from mracad.recipe import Step
 
 SHOWN = 6
 """Most faces named in one line."""
@@ -41,27 +45,29 @@ def verdict(valid: bool) -> str:
     return "yes" if valid else "no"
 
 
-def edit_lines(report: Report, done: str, quiet: str, written: str) -> list[str]:
-    """The four lines after an edit.
+def step_lines(step: Step, result: Report | Judged) -> list[str]:
+    """What a step of a recipe did; its first line begins with the step's name."""
+    from mracad.job import Report
 
-    Parameters
-    ----------
-    report : Report
-    done : str
-        What was done to the edited faces, ``"smoothed at 5 mm"``.
-    quiet : str
-        What unchanged faces are, ``"already smooth there"``.
-    written : str
-        The end of the last line.
-    """
+    if isinstance(result, Report):
+        assert isinstance(step.options, Selection)
+        first, *rest = edit_lines(result, step.options, f"{result.seconds:.1f} s")
+        return [f"{step.id}: {first}", *(f"  {line}" for line in rest)]
+    if result.passed:
+        return [f"{step.id}: passed"]
+    return [f"{step.id}: failed: {failure}" for failure in result.failures]
+
+
+def edit_lines(report: Report, options: Selection, end: str) -> list[str]:
+    """The four lines after an edit; ``end`` is that of the last one."""
     from mracad.audit.continuity import key, summary
 
     edit, model = report.edit, report.model
     nurbs = [o for o in edit.outcomes if o.status != "analytic"]
-    parts = [f"{len(edit.faces('edited'))} {done}"]
+    parts = [f"{len(edit.faces('edited'))} {options.done}"]
     unchanged = edit.faces("unchanged")
     if unchanged:
-        reasons = Counter("crease lines only" if o.reason == "crease lines only" else quiet for o in unchanged)
+        reasons = Counter("crease lines only" if o.reason == "crease lines only" else options.quiet for o in unchanged)
         parts += [f"{count} {reason}" for reason, count in reasons.items()]
     stuck = edit.faces("stuck")
     if stuck:
@@ -88,8 +94,20 @@ def edit_lines(report: Report, done: str, quiet: str, written: str) -> list[str]
     ]
     if worse:
         lines[-1] += f"; {len(worse)} less smooth"
-    lines.append(f"valid: {verdict(report.valid_after.valid)} (was {verdict(report.valid_before.valid)}); {written}")
+    if edit.edges:
+        lines[-1] += f"; {edge_words(edit.edges)}"
+    lines.append(f"valid: {verdict(report.valid_after.valid)} (was {verdict(report.valid_before.valid)}); {end}")
     return lines
+
+
+def edge_words(edges: tuple[Treatment, ...]) -> str:
+    """What was done about the edges of the edited faces."""
+    moved = sum(e.how != "frozen" for e in edges)
+    loose = sum(e.how == "to tolerance" for e in edges)
+    why = Counter(e.reason for e in edges if e.reason)
+    reasons = ", ".join(f"{count} {reason}" for reason, count in why.most_common())
+    words = f"{moved} of {plural(len(edges), 'edge')} moved with both faces"
+    return words + (f", {loose} to tolerance" if loose else "") + (f" (not: {reasons})" if why else "")
 
 
 def seam_line(new: SeamSummary, old: SeamSummary | None = None) -> str:
@@ -121,6 +139,17 @@ def seam(value: SeamMeasure) -> dict[str, Any]:
     }
 
 
+def result(value: Report | Judged) -> dict[str, Any]:
+    """What a step did, in full."""
+    from mracad.job import Report
+
+    if isinstance(value, Report):
+        return report(value)
+    from mracad_cli.verdicts import as_data
+
+    return as_data(value.verdict, value.failed)
+
+
 def report(value: Report) -> dict[str, Any]:
     """The full report of an edit."""
     from mracad.audit.continuity import key, summary
@@ -132,6 +161,7 @@ def report(value: Report) -> dict[str, Any]:
         "diagonal": value.model.diagonal,
         "counts": dict(Counter(o.status for o in value.edit.outcomes)),
         "faces": [outcome(o) for o in value.edit.outcomes],
+        "edges": [{**plain(e), "edge": e.edge + 1, "faces": [i + 1 for i in e.faces]} for e in value.edit.edges],
         "notes": list(value.edit.notes),
         "deviation": [{**plain(d), "face": d.face + 1} for d in value.deviations],
         "seams": {

@@ -114,26 +114,27 @@ def _junit(verdict: Verdict, failed: Sequence[Layer], command: str) -> str:
     skipped = [layer for layer in verdict.layers if layer.status in ("skipped", "time limit")]
     suite = Xml.Element(
         "testsuite",
-        name=_clean(f"mracad {command} {verdict.subject}"),
+        name=clean(f"mracad {command} {verdict.subject}"),
         tests=str(len(verdict.layers)),
         failures=str(len(failed)),
         errors="0",
         skipped=str(sum(layer not in failed for layer in skipped)),
     )
     for layer in verdict.layers:
-        case = Xml.SubElement(suite, "testcase", classname=_clean(verdict.subject), name=layer.name)
+        case = Xml.SubElement(suite, "testcase", classname=clean(verdict.subject), name=layer.name)
         if layer in failed:
-            failure = Xml.SubElement(case, "failure", message=_clean(layer.text), type=layer.status)
-            failure.text = _clean("\n".join(_placed(finding) for finding in layer.findings))
+            failure = Xml.SubElement(case, "failure", message=clean(layer.text), type=layer.status)
+            failure.text = clean("\n".join(_placed(finding) for finding in layer.findings))
         elif layer in skipped:
-            Xml.SubElement(case, "skipped", message=_clean(f"{layer.status}: {layer.text}"))
+            Xml.SubElement(case, "skipped", message=clean(f"{layer.status}: {layer.text}"))
         elif layer.text:
-            Xml.SubElement(case, "system-out").text = _clean(layer.text)
+            Xml.SubElement(case, "system-out").text = clean(layer.text)
     Xml.indent(suite)
     return '<?xml version="1.0" encoding="utf-8"?>\n' + Xml.tostring(suite, encoding="unicode") + "\n"
 
 
-def _clean(text: str) -> str:
+def clean(text: str) -> str:
+    """A text without the characters that XML cannot hold."""
     return _CONTROL.sub("\N{REPLACEMENT CHARACTER}", text)
 
 

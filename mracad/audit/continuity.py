@@ -2,7 +2,8 @@
 
 At a sample of the edge let p_a, p_b be the two faces' points, n_a, n_b their outward unit normals and t the edge's
 unit tangent.  The gap is |d − (d·t) t| with d = p_a − p_b (a difference along the edge is one of parameterisation,
-not a gap); the angle is atan2(|n_a × n_b|, n_a·n_b).
+not a gap); the angle is atan2(|n_a × n_b|, n_a·n_b).  With κ_a, κ_b the normal curvatures across the edge, in the
+direction n × t, the curvature jump is |κ_a − κ_b|; relative, it is divided by max(|κ_a|, |κ_b|).
 """
 
 from __future__ import annotations
@@ -12,7 +13,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mracad.bspline.knots import Side as Limit
+from mracad.bspline.net import curvature
 from mracad.constraint.coincide import GAP, coinciding
+from mracad.constraint.seam import from_inside
 from mracad.model import Edge, Face, Model, Side
 
 Array = np.ndarray
@@ -22,6 +26,9 @@ SMOOTH = 1.0
 
 TORN = 0.05
 """Distance, mm, within which two free edges are told to be one that was torn open."""
+
+FLAT = 1e-9
+"""Curvature, 1/mm, below which a face counts as flat: jumps are not measured against less."""
 
 
 @dataclass(frozen=True)
@@ -38,6 +45,10 @@ class SeamMeasure:
         Largest and mean distance between the faces, mm.
     angle, mean_angle : float
         Largest and mean angle between the normals, degrees; NaN where a normal is undefined all along.
+    bend, mean_bend : float
+        Largest and mean jump of the normal curvature across the seam, 1/mm; NaN where it is undefined all along.
+    relative_bend : float
+        Largest jump relative to the larger of the two curvatures there.
     where : tuple of float
         Point of the largest angle, mm, in the part's frame.
     sewn : bool
@@ -50,6 +61,9 @@ class SeamMeasure:
     mean_gap: float
     angle: float
     mean_angle: float
+    bend: float
+    mean_bend: float
+    relative_bend: float
     where: tuple[float, float, float]
     sewn: bool = True
 
@@ -73,10 +87,10 @@ def seams(model: Model, every: bool = False) -> list[SeamMeasure]:
     """Measure every seam that touches a NURBS face (or just every one), in edge order; coinciding free edges last."""
     pairs = [(edge, *edge.sides) for edge in model.edges if len(edge.sides) == 2 and not edge.degenerate]
     pairs = [pair for pair in pairs if len(pair[0].points) and (every or _nurbs(pair))]
-    jets = _evaluate(model, [side for _, *sides in pairs for side in sides])
+    jets = _evaluate(model, [(edge, side) for edge, *sides in pairs for side in sides])
     found = [_measure(edge, True, (a, b), jets[2 * i], jets[2 * i + 1]) for i, (edge, a, b) in enumerate(pairs)]
     matched = [m for m in coinciding(model, TORN if every else GAP) if every or _nurbs((m[0], m[1], m[2]))]
-    jets = _evaluate(model, [side for _, *sides in matched for side in sides])
+    jets = _evaluate(model, [(edge, side) for edge, *sides in matched for side in sides])
     return found + [
         _measure(edge, False, (a, b), jets[2 * i], jets[2 * i + 1]) for i, (edge, a, b) in enumerate(matched)
     ]
@@ -104,11 +118,16 @@ def _nurbs(pair: tuple[Edge, Side, Side]) -> bool:
 
 
 def _measure(edge: Edge, sewn: bool, sides: tuple[Side, Side], a: Array, b: Array) -> SeamMeasure:
-    """``a`` and ``b``: points and normals ``(2, k, 3)`` of the sides at the edge's samples."""
-    apart = a[0] - b[0]
+    """``a`` and ``b``: points, normals and curvatures of the sides at the edge's samples, ``(k, 7)``."""
+    apart = a[:, :3] - b[:, :3]
     apart -= (apart * edge.tangents).sum(axis=1, keepdims=True) * edge.tangents
     gaps = np.linalg.norm(apart, axis=1)
-    angles = np.degrees(np.arctan2(np.linalg.norm(np.cross(a[1], b[1]), axis=1), (a[1] * b[1]).sum(axis=1)))
+    one, two = a[:, 3:6], b[:, 3:6]
+    angles = np.degrees(np.arctan2(np.linalg.norm(np.cross(one, two), axis=1), (one * two).sum(axis=1)))
+    jumps = np.abs(a[:, 6] - b[:, 6])
+    bent = ~np.isnan(jumps)
+    size = np.maximum(np.maximum(np.abs(a[:, 6]), np.abs(b[:, 6])), FLAT)[bent]
+    jumps = jumps[bent] if bent.any() else np.array([np.nan])
     known = ~np.isnan(angles)
     worst = int(np.nanargmax(angles)) if known.any() else 0
     return SeamMeasure(
@@ -118,30 +137,43 @@ def _measure(edge: Edge, sewn: bool, sides: tuple[Side, Side], a: Array, b: Arra
         mean_gap=float(gaps.mean()),
         angle=float(angles[worst]),
         mean_angle=float(angles[known].mean()) if known.any() else float("nan"),
+        bend=float(jumps.max()),
+        mean_bend=float(jumps.mean()),
+        relative_bend=float((jumps / size).max()) if bent.any() else float("nan"),
         where=tuple(float(x) for x in edge.points[worst]),  # type: ignore[arg-type]
         sewn=sewn,
     )
 
 
-def _evaluate(model: Model, sides: list[Side]) -> list[Array]:
-    """Points and outward normals ``(2, k, 3)`` of each side; surfaces are evaluated once for all their sides."""
-    result: list[Array | None] = [None] * len(sides)
-    by_surface: dict[int, list[int]] = defaultdict(list)
-    for i, side in enumerate(sides):
+def _evaluate(model: Model, uses: list[tuple[Edge, Side]]) -> list[Array]:
+    """Points, outward normals and curvatures across the edge ``(k, 7)`` of each side, seen from inside its face.
+
+    Surfaces are evaluated once for all their sides.
+    """
+    result: list[Array] = [np.empty((0, 7))] * len(uses)
+    groups: dict[tuple[int, tuple[Limit, Limit]], list[tuple[int, Array]]] = defaultdict(list)
+    for i, (edge, side) in enumerate(uses):
         if side.uv is None:
-            result[i] = np.stack([side.points, side.normals])  # type: ignore[list-item]
+            bends = np.full(len(side.points), np.nan) if side.curvatures is None else side.curvatures  # type: ignore[arg-type]
+            result[i] = np.column_stack([side.points, side.normals, bends])  # type: ignore[list-item]
         else:
-            by_surface[_surface(model.faces[side.face])].append(i)
-    for surface, members in by_surface.items():
+            face = model.faces[side.face]
+            surface = _surface(face)
+            uv, limits = from_inside(face, model.surfaces[surface].net, edge.index, side.uv)
+            groups[surface, limits].append((i, uv))
+    for (surface, limits), members in groups.items():
         net = model.surfaces[surface].net
-        uv = np.concatenate([sides[i].uv for i in members])
-        jets = np.stack([net.evaluate(uv), net.normals(uv)])
-        ends = np.cumsum([len(sides[i].uv) for i in members])[:-1]  # type: ignore[arg-type]
-        for i, jet in zip(members, np.split(jets, ends, axis=1), strict=True):
-            face = model.faces[sides[i].face]
-            turn = face.frame[:3, :3]
-            result[i] = np.stack([jet[0] @ turn.T + face.frame[:3, 3], (-1 if face.reversed else 1) * jet[1] @ turn.T])
-    return [jet for jet in result if jet is not None]
+        uv = np.concatenate([uv for _, uv in members])
+        jets = np.stack([*net.evaluate(uv, 2, limits), net.normals(uv, limits)])
+        ends = np.cumsum([len(uv) for _, uv in members])[:-1]
+        for (i, _), jet in zip(members, np.split(jets, ends, axis=1), strict=True):
+            edge, side = uses[i]
+            face = model.faces[side.face]
+            point, *derivatives, normal = jet @ face.frame[:3, :3].T
+            sign = -1 if face.reversed else 1
+            bends = sign * curvature(tuple(derivatives), np.cross(normal, edge.tangents))
+            result[i] = np.column_stack([point + face.frame[:3, 3], sign * normal, bends])
+    return result
 
 
 def _surface(face: Face) -> int:

@@ -235,6 +235,33 @@ class Net:
         return Net(u, v, *_euclidean(poles, self.weights is not None))
 
 
+def curvature(derivatives: tuple[Array, ...], direction: Array) -> Array:
+    """Normal curvature of surfaces in given directions.
+
+    κ = (L a² + 2 M a b + N b²) / |a S_u + b S_v|² with the unit normal S_u × S_v / |…|, the direction's part in the
+    tangent plane being a S_u + b S_v.
+
+    Parameters
+    ----------
+    derivatives : tuple of ndarray (q, 3)
+        ``Su, Sv, Suu, Suv, Svv``.
+    direction : ndarray (q, 3)
+
+    Returns
+    -------
+    ndarray (q,)
+        One over the unit of length; NaN where the surface is degenerate.
+    """
+    su, sv, suu, suv, svv = derivatives
+    e, f, g, p, q = ((x * y).sum(axis=1) for x, y in ((su, su), (su, sv), (sv, sv), (su, direction), (sv, direction)))
+    normal = np.cross(su, sv)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        determinant = e * g - f * f
+        a, b = (p * g - q * f) / determinant, (q * e - p * f) / determinant
+        bend = sum(w * (x * normal).sum(axis=1) for w, x in ((a * a, suu), (2 * a * b, suv), (b * b, svv)))
+        return bend / np.sqrt(determinant) / (e * a * a + 2 * f * a * b + g * b * b)
+
+
 def _check_weights(weights: Array | None, shape: tuple[int, ...]) -> None:
     if weights is None:
         return

@@ -95,4 +95,5 @@ def _baked(points: Array, other: Edge) -> Side:
     side = other.sides[0]
     assert side.points is not None and side.normals is not None
     nearest = np.linalg.norm(points[:, None] - other.points, axis=2).argmin(axis=1)
-    return Side(side.face, points=points, normals=side.normals[nearest])
+    curvatures = None if side.curvatures is None else side.curvatures[nearest]
+    return Side(side.face, points=points, normals=side.normals[nearest], curvatures=curvatures)

@@ -55,7 +55,14 @@ class Separation:
         return self.visible & ~self.frozen
 
 
-def separate(net: Net, faces: Sequence[Face], edited: Collection[int], keep: str = "g1") -> Separation:
+def reached(net: Net, faces: Sequence[Face]) -> dict[int, Array]:
+    """For each face on a surface, the control points ``(nu, nv)`` that some part of it depends on."""
+    return {face.index: supported(net, face_region(net, face).inside) for face in faces}
+
+
+def separate(
+    net: Net, faces: Sequence[Face], edited: Collection[int], keep: str = "g1", moving: Collection[int] = ()
+) -> Separation:
     """Separate the control points of a surface.
 
     Parameters
@@ -68,6 +75,8 @@ def separate(net: Net, faces: Sequence[Face], edited: Collection[int], keep: str
         Indices of those that may move; the others' whole region is frozen.
     keep : {"g0", "g1", "g2"}
         Which continuity each edge keeps with whatever lies beyond it.
+    moving : collection of int
+        Edges that may move, because what lies beyond them moves with them.
     """
     visible = np.zeros(net.poles.shape[:2], bool)
     frozen = np.zeros_like(visible)
@@ -77,7 +86,9 @@ def separate(net: Net, faces: Sequence[Face], edited: Collection[int], keep: str
         reach[face.index] = supported(net, region.inside)
         if face.index in edited:
             visible |= reach[face.index]
-            frozen |= frozen_along(net, [trim.curve for trim in face.trims], region, keep)
+            held = [i for i, trim in enumerate(face.trims) if trim.edge not in moving]
+            crossed = Region(region.inside, tuple(region.crossed[i] for i in held))
+            frozen |= frozen_along(net, [face.trims[i].curve for i in held], crossed, keep)
         else:
             frozen |= reach[face.index]
     return Separation(visible, frozen, reach)
@@ -100,7 +111,7 @@ def frozen_along(net: Net, curves: Sequence[Curve], region: Region, keep: str = 
         for axis, knots in enumerate((net.u, net.v)):
             at = curve.poles[:, axis]
             position = float(at.mean())
-            if np.ptp(at) <= 2 * ISO * _span(knots, position):
+            if np.ptp(at) <= 2 * ISO * local_span(knots, position):
                 rows = jet_support(knots, position, CONTINUITY[keep])
                 across = curve.poles[:, 1 - axis]
                 columns = _meeting((net.u, net.v)[1 - axis], float(across.min()), float(across.max()))
@@ -118,7 +129,7 @@ def jet_support(knots: KnotVector, at: float, highest: int) -> Array:
     if knots.periodic:
         at = start + (at - start) % (end - start)
     nearest = knots.breaks[np.argmin(np.abs(knots.breaks - at))]
-    if abs(nearest - at) <= ISO * _span(knots, at):
+    if abs(nearest - at) <= ISO * local_span(knots, at):
         at = float(nearest)
     at = min(max(at, start), end)
     touched = np.zeros(knots.count, bool)
@@ -143,7 +154,7 @@ def jet_support(knots: KnotVector, at: float, highest: int) -> Array:
     return touched
 
 
-def _span(knots: KnotVector, at: float) -> float:
+def local_span(knots: KnotVector, at: float) -> float:
     """Length of the span at a parameter, the smaller of two at a knot."""
     breaks = knots.breaks
     start, end = knots.domain

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Literal
 
+from mracad.constraint.seam import Treatment
 from mracad.model import Displacement
 
 Status = Literal["edited", "unchanged", "stuck", "held", "unselected", "analytic"]
@@ -57,11 +58,12 @@ class FaceOutcome:
 
 @dataclass(frozen=True, eq=False)
 class Edit:
-    """A displacement and the outcome for each face of the model, in face order."""
+    """A displacement, the outcome for each face of the model in face order, and what was done about each edge."""
 
     displacement: Displacement
     outcomes: tuple[FaceOutcome, ...]
     notes: tuple[str, ...] = field(default=())
+    edges: tuple[Treatment, ...] = field(default=())
 
     def faces(self, *status: Status) -> list[FaceOutcome]:
         """Outcomes with one of the given statuses."""

@@ -19,8 +19,10 @@ from mracad.bspline.basis import basis
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.net import Net
 from mracad.constraint.fairing import Fairing, border_noise
-from mracad.constraint.frozen import Separation, separate
+from mracad.constraint.frozen import Separation, reached, separate
+from mracad.edit.bound import bounded
 from mracad.edit.result import Edit, FaceOutcome, Status
+from mracad.edit.together import Moved, Together
 from mracad.model import Displacement, Face, Model, Offset, Surface
 from mracad.options import Smooth, length
 from mracad.wavelet.ladder import arc_lengths, ladder_for_scale, rungs_by_level
@@ -70,22 +72,27 @@ def smooth(
     selected = set(range(len(model.faces)) if faces is None else faces) - set(held)
     bound = None if options.max_deviation is None else length(options.max_deviation, model.diagonal, "max-deviation")
     scale = None if options.scale is None else length(options.scale, model.diagonal, "scale")
+    movable = {i for i in selected if model.faces[i].surface is not None}
+    works = [_SurfaceSmoothing(model, surface, movable, options) for surface in model.surfaces]
+    together = Together(model, movable, options, {w.index: w.spans for w in works}, {w.index: w.creases for w in works})
+    moved = together.smoothed(scale, bound)
     outcomes: dict[int, FaceOutcome] = {}
     offsets: dict[int, Offset] = {}
-    for done, surface in enumerate(model.surfaces):
+    for done, work in enumerate(works):
         if progress:
-            progress(done, len(model.surfaces))
-        edited = selected.intersection(surface.faces)
-        on_surface = [model.faces[i] for i in surface.faces]
-        work = _SurfaceSmoothing(surface, on_surface, edited, options, scale, bound)
+            progress(done, len(works))
+        if work.index in moved:
+            work.take(moved[work.index])
+        else:
+            work.solve(scale, bound, together.moving)
         if work.offset is not None:
-            offsets[surface.index] = work.offset
-        for face in on_surface:
-            outcomes[face.index] = work.outcome(face, face.index in edited, face.index in held)
+            offsets[work.index] = work.offset
+        for face in work.faces:
+            outcomes[face.index] = work.outcome(face, face.index in movable, face.index in held)
     for face in model.faces:
         if face.index not in outcomes:
             outcomes[face.index] = FaceOutcome(face.index, "analytic", f"{face.kind}, not a NURBS face")
-    return Edit(Displacement(offsets), tuple(outcomes[i] for i in range(len(model.faces))))
+    return Edit(Displacement(offsets), tuple(outcomes[i] for i in range(len(model.faces))), edges=together.treatments())
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,47 +108,58 @@ class _Target:
 class _SurfaceSmoothing:
     """Smoothing of one surface: everything that the outcome of its faces tells."""
 
-    def __init__(
-        self,
-        surface: Surface,
-        faces: list[Face],
-        edited: Collection[int],
-        options: Smooth,
-        scale: float | None,
-        bound: float | None,
-    ) -> None:
-        net = surface.net
-        self.net, self.options = net, options
-        self.spans = (arc_lengths(net, 0), arc_lengths(net, 1))
-        self.separation = separate(net, faces, edited, options.keep)
-        inside = np.logical_or.reduce(list(self.separation.reach.values()))
-        self.creases = (_crease_lines(net, 0, inside), _crease_lines(net, 1, inside))
-        self.fairing, self.inserted, self.offset, self.entangled = 0.0, 0, None, False
+    def __init__(self, model: Model, surface: Surface, movable: Collection[int], options: Smooth) -> None:
+        self.index, self.net, self.options = surface.index, surface.net, options
+        self.faces = [model.faces[i] for i in surface.faces]
+        self.edited = [i for i in surface.faces if i in movable]
+        self.spans = (arc_lengths(self.net, 0), arc_lengths(self.net, 1))
+        self.reach = reached(self.net, self.faces)
+        inside = np.logical_or.reduce(list(self.reach.values()))
+        self.creases = (_crease_lines(self.net, 0, inside), _crease_lines(self.net, 1, inside))
+        self.fairing, self.inserted, self.coarser, self.entangled = 0.0, 0, False, False
+        self.offset: Offset | None = None
+
+    def take(self, moved: Moved) -> None:
+        """Let the surface move with its neighbours."""
+        self.net, self.separation, self.reach = moved.net, moved.separation, moved.separation.reach
+        self.change, self.moved, self.coarser = moved.change, moved.offset, True
+        self.inserted = sum(map(len, moved.inserted))
+        if np.any(self.moved):
+            self.offset = Offset(self.moved, *moved.inserted)
+
+    def solve(self, scale: float | None, bound: float | None, moving: Collection[int]) -> None:
+        """Smooth the surface by itself; all its edges stay but the ``moving`` ones, which its own knots keep smooth."""
+        net, faces, options = self.net, self.faces, self.options
+        self.moving = moving
+        self.separation = separate(net, faces, self.edited, options.keep, moving)
         self.change = self.moved = np.zeros(net.poles.shape)
         target = self._target(scale)
         self.coarser = target is not None
         if target is None:
             return
         self.change = target.poles - net.poles
-        if not edited or not self._detail(self.separation.visible) or options.amount == 0:
+        if not self.edited or not self._detail(self.separation.visible) or options.amount == 0:
             return
         if self._detail(self.separation.free):
             moved = self._solve(net, self.spans, self.separation, target)
             extra_u = extra_v = np.empty(0)
         elif options.refine:
-            refined = self._refine(faces, edited, target)
+            refined = self._refine(faces, self.edited, target)
             if refined is None:
                 return
             moved, extra_u, extra_v = refined
             self.inserted = len(extra_u) + len(extra_v)
         else:
             return
-        if _deviation(net.refined(extra_u, extra_v), moved) > OVERSHOOT * _deviation(net, self.change):
+        most = OVERSHOOT * _deviation(net, self.change)
+        if self.fairing and not self.inserted and _deviation(net, moved) > most:
+            moved, self.fairing = np.where(self.separation.free[..., None], self.change, 0.0), 0.0
+        if _deviation(net.refined(extra_u, extra_v), moved) > most:
             self.fairing, self.inserted, self.entangled = 0.0, 0, True
             return
         moved = options.amount * moved
         if bound is not None:
-            moved = _bounded(moved, bound, self._window(moved))
+            moved = bounded(moved, bound)
         if np.any(moved):
             self.moved = moved
             self.offset = Offset(moved, extra_u, extra_v)
@@ -252,7 +270,7 @@ class _SurfaceSmoothing:
             )
             u_knots, v_knots = np.sort(np.r_[u_knots, halves_u]), np.sort(np.r_[v_knots, halves_v])
             net = self.net.refined(u_knots, v_knots)
-            separation = separate(net, faces, edited, self.options.keep)
+            separation = separate(net, faces, edited, self.options.keep, self.moving)
             fine = [
                 Net(self.net.u, self.net.v, self.net.poles + part, self.net.weights).refined(u_knots, v_knots).poles
                 - net.poles
@@ -267,10 +285,6 @@ class _SurfaceSmoothing:
         if best is None:
             return None
         return self._solve(*best), u_knots, v_knots
-
-    def _window(self, moved: Array) -> tuple[int, int]:
-        """Points over which a bound is blended, about one wavelength of the edit in each direction."""
-        return max(moved.shape[0] // 16, 1), max(moved.shape[1] // 16, 1)
 
 
 def _pair(net: Net) -> tuple[KnotVector, KnotVector]:
@@ -312,21 +326,3 @@ def _crease_lines(net: Net, axis: int, visible: Array) -> frozenset[float]:
     after = net.normals(points)
     turn = np.arctan2(np.linalg.norm(np.cross(before, after), axis=1), (before * after).sum(axis=1))
     return frozenset(float(x) for x in lines[np.unique(line[turn > KINK])])
-
-
-def _bounded(moved: Array, bound: float, window: tuple[int, int]) -> Array:
-    """Offsets blended back locally until none is longer than ``bound``.
-
-    Each point's share a = min(1, bound / |δ|) is replaced by the mean over a window of the least share over the
-    same window around each of its points: never more than a, and smooth.
-    """
-    from scipy.ndimage import minimum_filter, uniform_filter
-
-    size = np.linalg.norm(moved, axis=-1)
-    share = (1 - 1e-12) * bound / np.maximum(size, (1 - 1e-12) * bound)
-    if share.min() == 1.0:
-        return moved
-    shape = (2 * window[0] + 1, 2 * window[1] + 1)
-    least = minimum_filter(share, shape, mode="nearest")
-    share = np.minimum(share, uniform_filter(least, shape, mode="nearest"))
-    return moved * share[..., None]

@@ -17,9 +17,9 @@ from OCP.TopLoc import TopLoc_Location
 from mracad import __version__
 from mracad.errors import FileError, UsageError
 from mracad.occ.document import Document
-from mracad.occ.output import put
 from mracad.occ.settings import quiet
 from mracad.occ.topology import box
+from mracad.output import put
 
 Array = np.ndarray
 _TRIANGLES = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])

@@ -17,7 +17,7 @@ from OCP.TopAbs import TopAbs_FORWARD, TopAbs_REVERSED
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS, TopoDS_Edge, TopoDS_Face
 
-from mracad.bspline.net import Net
+from mracad.bspline.net import Net, curvature
 from mracad.errors import FileError, UsageError
 from mracad.model import Edge, Face, Model, Side, Surface, Trim
 from mracad.occ.convert import conversion
@@ -191,8 +191,8 @@ def _edges(document: Document, found: _Found) -> Iterator[Edge]:
             elif degenerate:
                 sides.append(Side(use.face, points=_NONE, normals=_NONE))
             else:
-                feet, normals = walls[use.face](use, points)
-                sides.append(Side(use.face, points=feet, normals=normals))
+                feet, normals, bends = walls[use.face](use, points, tangents)
+                sides.append(Side(use.face, points=feet, normals=normals, curvatures=bends))
         yield Edge(
             index, points, tangents, tuple(sides), BRep_Tool.Tolerance_s(edge), degenerate,
             part_of[index],
@@ -217,8 +217,8 @@ def _along(edge: TopoDS_Edge) -> tuple[Array, Array]:
     return table[:, :3], _unit(table[:, 3:])
 
 
-def _wall(found: _Found, index: int) -> Callable[[_Use, Array], tuple[Array, Array]]:
-    """How a face that does not move gives its points (memory units) and outward normals along an edge."""
+def _wall(found: _Found, index: int) -> Callable[[_Use, Array, Array], tuple[Array, Array, Array]]:
+    """How a face that does not move gives its points, outward normals and curvatures across an edge."""
     face = found.faces[index]
     sign = -1.0 if face.Orientation() == TopAbs_REVERSED else 1.0
     surface = BRepAdaptor_Surface(face, False)
@@ -226,18 +226,23 @@ def _wall(found: _Found, index: int) -> Callable[[_Use, Array], tuple[Array, Arr
         plane = surface.Plane()
         origin = np.array(plane.Location().Coord())
         normal = np.array(plane.Axis().Direction().Coord()) * (sign if plane.Direct() else -sign)
-        return lambda use, points: (
-            points - ((points - origin) @ normal)[:, None] * normal, np.tile(normal, (_SAMPLES, 1))
-        )  # fmt: skip
+        return lambda use, points, tangents: (
+            points - ((points - origin) @ normal)[:, None] * normal,
+            np.tile(normal, (_SAMPLES, 1)),
+            np.zeros(_SAMPLES),
+        )
 
-    def on_surface(use: _Use, _: Array) -> tuple[Array, Array]:
-        point, du, dv = gp_Pnt(), gp_Vec(), gp_Vec()
+    def on_surface(use: _Use, _: Array, tangents: Array) -> tuple[Array, Array, Array]:
+        point, *derivatives = gp_Pnt(), *(gp_Vec() for _ in range(5))
+        du, dv, duu, dvv, duv = derivatives
         rows = []
         for u, v in _parameters(use).tolist():
-            surface.D1(u, v, point, du, dv)
-            rows.append(point.Coord() + du.Crossed(dv).Coord())
-        table = np.array(rows)
-        return table[:, :3], sign * _unit(table[:, 3:])
+            surface.D2(u, v, point, du, dv, duu, dvv, duv)
+            rows.append(point.Coord() + du.Coord() + dv.Coord() + duu.Coord() + duv.Coord() + dvv.Coord())
+        feet, su, sv, *second = np.array(rows).reshape(-1, 6, 3).swapaxes(0, 1)
+        normals = _unit(np.cross(su, sv))
+        bends = sign * curvature((su, sv, *second), np.cross(normals, tangents))
+        return feet, sign * normals, bends
 
     return on_surface
 

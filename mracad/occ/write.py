@@ -18,10 +18,10 @@ from OCP.TCollection import TCollection_HAsciiString
 from mracad import __version__
 from mracad.errors import FileError, UsageError
 from mracad.occ.document import Document
-from mracad.occ.output import put
 from mracad.occ.part21 import UNNAMED, tidy
 from mracad.occ.settings import exchange, quiet
 from mracad.occ.units import UNITS
+from mracad.output import put
 
 _MODES = ("Name", "Color", "Layer", "DimTol", "Material", "Props", "SHUO")
 _SCHEMAS = {"AP203": "AP203", "AP214": "AP214IS", "AP242": "AP242DIS"}

@@ -22,9 +22,23 @@ def test_the_four_lines(mracad, samples, tmp_path):
     assert valid.startswith("valid: yes (was yes); wrote out.step, ")
 
 
+def test_coupled_seams_move_and_are_counted(mracad, samples, tmp_path):
+    out = tmp_path / "out.step"
+    result = mracad("smooth", samples / "panel.step", "--scale", "16mm", "--edges", "coupled", "-o", out)
+    assert result.code == 0
+    assert result.out.splitlines()[2].endswith("; 7 of 17 edges moved with both faces (not: 10 free edge)")
+    after = judge(out)
+    assert after.validity.valid and len(after.seams) == 7
+    assert max(m.gap for m in after.seams) <= 1e-9 and max(m.angle for m in after.seams) <= 1e-5
+    for a, b in zip(judge(samples / "panel.step").model.surfaces, after.model.surfaces, strict=True):
+        border = np.ones(a.net.poles.shape[:2], bool)
+        border[2:-2, 2:-2] = False
+        assert not np.array_equal(a.net.poles[border], b.net.poles[border])
+
+
 def test_frozen_poles_are_bit_identical_in_the_file(mracad, samples, tmp_path):
     out = tmp_path / "out.step"
-    assert mracad("smooth", samples / "panel.step", "--scale", "16mm", "-o", out).code == 0
+    assert mracad("smooth", samples / "panel.step", "--scale", "16mm", "--edges", "frozen", "-o", out).code == 0
     for before, after in zip(judge(samples / "panel.step").model.surfaces, judge(out).model.surfaces, strict=True):
         border = np.ones(before.net.poles.shape[:2], bool)
         border[2:-2, 2:-2] = False
@@ -84,7 +98,8 @@ def test_dry_run_writes_only_the_report(mracad, samples, tmp_path):
 
 
 def test_the_report_says_everything(mracad, samples, tmp_path):
-    result = mracad("smooth", samples / "panel.step", "--scale", "16mm", "--json", "-o", tmp_path / "out.step")
+    words = ["--scale", "16mm", "--edges", "frozen", "--json", "-o", tmp_path / "out.step"]
+    result = mracad("smooth", samples / "panel.step", *words)
     body = json.loads(result.out)
     assert body["written"] == ["out.step"] and body["options"]["scale"] == "16mm"
     assert body["valid"]["before"]["valid"] is True and body["valid"]["after"]["valid"] is True
@@ -149,7 +164,7 @@ def test_streams_and_equal_bytes_in_any_process(samples, tmp_path):
     assert one.stdout.startswith(b"ISO-10303-21;") and one.stdout == two.stdout
     assert b"smoothed at 16mm" in one.stderr and str(tmp_path).encode() not in one.stdout
     header = one.stdout[: one.stdout.index(b"DATA;")]
-    assert b"scale=16mm" in header and b"mracad" in header
+    assert b"--scale 16mm" in header and b"mracad" in header
 
 
 def test_help_is_quick_and_loads_no_kernel():

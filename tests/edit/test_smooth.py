@@ -129,9 +129,7 @@ def test_levels_are_rungs_and_fractions_lie_between_them():
 
     model = sheet(net)
     target = {
-        level: _SurfaceSmoothing(model.surfaces[0], [model.faces[0]], {0}, Smooth(level=level), None, None)
-        ._target(None)
-        .poles
+        level: _SurfaceSmoothing(model, model.surfaces[0], {0}, Smooth(level=level))._target(None).poles
         for level in (1.0, 2.0, 1.5)
     }
     assert np.abs(target[1.5] - (target[1.0] + target[2.0]) / 2).max() < 1e-12

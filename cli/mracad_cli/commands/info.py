@@ -86,13 +86,15 @@ def command(source: str, input_unit: str | None, scale: str, keep: Any, everythi
         _table(["face", "type", "degree", "net", "shape", "free", "spans mm", "at this scale", "from", "name"], rows)
     if everything and measures:
         _table(
-            ["edge", "faces", "gap mm", "angle °", "at"],
+            ["edge", "faces", "gap mm", "angle °", "curvature jump 1/mm", "relative", "at"],
             [
                 (
                     f"edge#{m.edge + 1}" + ("" if m.sewn else " (not sewn)"),
                     "#{} #{}".format(*(i + 1 for i in m.faces)),
                     f"{m.gap:.2g}",
                     f"{m.angle:.3g}",
+                    f"{m.bend:.2g}",
+                    f"{m.relative_bend:.2g}",
                     " ".join(f"{x:.4g}" for x in m.where),
                 )
                 for m in measures

@@ -13,10 +13,11 @@ from mracad.errors import FileError
 
 
 @contextlib.contextmanager
-def beside(target: str | os.PathLike) -> Iterator[Path]:
+def beside(target: str | os.PathLike, prefix: str = ".mracad-") -> Iterator[Path]:
     """A temporary path in the target's folder, which takes the target's place when the block ends well.
 
-    Nothing is left behind when it does not.
+    Nothing is left behind when it does not, unless the process is killed: then a file whose name begins with
+    ``prefix``.
 
     Raises
     ------
@@ -27,7 +28,7 @@ def beside(target: str | os.PathLike) -> Iterator[Path]:
     try:
         if path.is_dir():
             raise IsADirectoryError("it is a folder")
-        handle, name = tempfile.mkstemp(prefix=".mracad-", suffix=path.suffix, dir=path.parent)
+        handle, name = tempfile.mkstemp(prefix=prefix, suffix=path.suffix, dir=path.parent)
         os.close(handle)
     except OSError as error:
         raise _unwritable(path, error) from error
@@ -46,10 +47,10 @@ def beside(target: str | os.PathLike) -> Iterator[Path]:
         temporary.unlink(missing_ok=True)
 
 
-def put(data: bytes, target: str | os.PathLike | BinaryIO) -> None:
+def put(data: bytes, target: str | os.PathLike | BinaryIO, prefix: str = ".mracad-") -> None:
     """Write bytes to a path (whole or not at all) or to a binary stream; raises FileError."""
     if isinstance(target, str | os.PathLike):
-        with beside(target) as temporary:
+        with beside(target, prefix) as temporary:
             temporary.write_bytes(data)
         return
     try:
@@ -57,6 +58,14 @@ def put(data: bytes, target: str | os.PathLike | BinaryIO) -> None:
         target.flush()
     except OSError as error:
         raise FileError(f"cannot write the output: {error.strerror or error}", "check where it leads") from error
+
+
+def holds(path: Path, data: bytes) -> bool:
+    """Whether a file exists and has this content already."""
+    try:
+        return path.stat().st_size == len(data) and path.read_bytes() == data
+    except OSError:
+        return False
 
 
 def _mode(path: Path) -> int:

@@ -1,0 +1,159 @@
+"""Batches: what two workers gain, what a file costs beside its work, memory, kills and lost workers.
+
+Usage: python benchmarks/batch.py [FILES]     (default: 200)
+
+Both sides of every ratio are measured in this run.  The files are the samples, each made different by a comment.
+"""
+
+from __future__ import annotations
+
+import os
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT))
+
+from mracad.batch.manifest import Manifest  # noqa: E402
+from mracad.batch.pool import Limits, Pool  # noqa: E402
+from mracad.batch.run import Settings, find, run  # noqa: E402
+from mracad.batch.work import warm  # noqa: E402
+from mracad.recipe import load  # noqa: E402
+from tests.batch.runs import batch, environment, kills, outputs, recipe, shams  # noqa: E402
+from tests.batch.tasks import work  # noqa: E402
+from tests.batch.test_cluster import cluster  # noqa: E402
+
+SAMPLES = ("blade", "bottle", "panel", "trimmed")
+
+
+def models(folder: Path, count: int) -> Path:
+    """Files derived from the samples."""
+    folder.mkdir()
+    texts = [(ROOT / "samples" / f"{name}.step").read_text() for name in SAMPLES]
+    for number in range(count):
+        text = texts[number % len(texts)].replace("HEADER;", f"HEADER; /* {number} */", 1)
+        (folder / f"{SAMPLES[number % len(texts)]}{number:03}.step").write_text(text)
+    return folder
+
+
+def timed(*words: object) -> float:
+    """Seconds of a batch."""
+    start = time.perf_counter()
+    code, _, err = batch(*words)
+    assert code == 0, err
+    return time.perf_counter() - start
+
+
+def cpu() -> float:
+    """Processor seconds of all children so far."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
+
+
+def workers(folder: Path, files: int) -> None:
+    """Two workers against one, whole commands."""
+    words = (recipe(folder), models(folder / "in", files), "-O")
+    marks = [cpu()]
+    one = timed(*words, folder / "one", "-j", 1)
+    marks.append(cpu())
+    two = timed(*words, folder / "two", "-j", 2)
+    marks.append(cpu())
+    same = outputs(folder / "one") == outputs(folder / "two")
+    print(f"{files} files: -j 1 {one:.1f} s, -j 2 {two:.1f} s: {one / two:.2f} times as fast; same bytes: {same}")
+    print(f"  processor time: -j 1 {marks[1] - marks[0]:.1f} s, -j 2 {marks[2] - marks[1]:.1f} s")
+
+
+def overhead(folder: Path, files: int) -> None:
+    """Wall time beside the work itself, one warm worker."""
+    items = find([str(models(folder / "in", files + 1))], folder / "out")
+    with Manifest(folder / "out") as manifest, Pool(1, Limits(), warm) as pool:
+        list(run(load(recipe(folder)), items[:1], manifest, pool, Settings()))
+        start = time.perf_counter()
+        outcomes = list(run(load(recipe(folder)), items[1:], manifest, pool, Settings()))
+        wall = time.perf_counter() - start
+    beside = (wall - sum(outcome.seconds for outcome in outcomes)) / files
+    print(f"overhead: {beside * 1e3:.1f} ms a file beside {wall / files * 1e3:.0f} ms")
+
+
+def memory(folder: Path) -> None:
+    """Peak memory of the client for few and for many files of 1 MB."""
+    peaks = []
+    for count in (50, 1000):
+        source = shams(folder / f"in{count}", count)
+        for path in source.iterdir():
+            path.write_text(f"{path}" + "x" * 1_000_000)
+        command = [sys.executable, "-m", "mracad_cli", "batch", recipe(folder), source, "-j", "2", "-O"]
+        process = subprocess.Popen(
+            [*map(str, command), str(folder / f"out{count}")], env=environment(0.0), stdout=subprocess.DEVNULL
+        )
+        peaks.append(os.wait4(process.pid, 0)[2].ru_maxrss / 1024)
+    print(f"client's memory: {peaks[0]:.0f} MB for 50 files, {peaks[1]:.0f} MB for 1000")
+
+
+def flight() -> None:
+    """Tiny tasks in flight."""
+    with Pool(2) as pool:
+        rates = []
+        for count in (500, 10_000):
+            start = time.perf_counter()
+            for future in [pool.submit(work, "good") for _ in range(count)]:
+                future.result()
+            rates.append((time.perf_counter() - start) / count * 1e3)
+    print(f"tiny tasks: {rates[0]:.2f} ms each of 500, {rates[1]:.2f} ms each of 10000")
+
+
+def killed(folder: Path, files: int, count: int) -> None:
+    """The batch killed again and again, then resumed."""
+    words = (recipe(folder), models(folder / "in", files), "-j", 2, "-O")
+    timed(*words, folder / "whole")
+    done = kills(words, folder / "out", count, files)
+    timed(*words, folder / "out")
+    same = outputs(folder / "out") == outputs(folder / "whole")
+    print(f"{count} kills, outputs at each {done} of {files}; resumed: same bytes as undisturbed: {same}")
+
+
+def lost(folder: Path, files: int) -> None:
+    """A cluster of two workers, one killed midway."""
+    words = (recipe(folder), models(folder / "in", files), "-O")
+    local = timed(*words, folder / "local", "-j", 2)
+    with cluster(2) as (address, processes):
+        killer = subprocess.Popen(
+            [
+                sys.executable,
+                "-c",
+                "import glob, os, sys, time\n"
+                "while len(glob.glob(sys.argv[1])) < int(sys.argv[2]): time.sleep(0.01)\n"
+                "os.kill(int(sys.argv[3]), 9)",
+                str(folder / "out" / "*.step"),
+                str(files // 3),
+                str(processes[0].pid),
+            ]
+        )
+        remote = timed(*words, folder / "out", "--cluster", address)
+        killer.wait()
+    same = outputs(folder / "out") == outputs(folder / "local")
+    print(f"cluster of 2, one killed at a third: {files} files in {remote:.1f} s (local {local:.1f} s), same: {same}")
+
+
+def main() -> None:
+    files = int(sys.argv[1]) if len(sys.argv) > 1 else 200
+    tasks = [
+        lambda folder: workers(folder, files),
+        lambda folder: overhead(folder, files),
+        memory,
+        lambda folder: flight(),
+        lambda folder: killed(folder, 100, 20),
+        lambda folder: lost(folder, 40),
+    ]
+    for task in tasks:
+        with tempfile.TemporaryDirectory() as folder:
+            task(Path(folder))
+        sys.stdout.flush()
+
+
+if __name__ == "__main__":
+    main()

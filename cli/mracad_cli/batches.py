@@ -1,0 +1,150 @@
+"""The command ``batch``: what it says while files are done, and at the end."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import time
+from collections import Counter
+from collections.abc import Sequence
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import msgspec
+
+from mracad.batch.cluster import Cluster
+from mracad.batch.manifest import Manifest
+from mracad.batch.pool import Limits, Pool
+from mracad.batch.run import Item, Outcome, Settings, find, run
+from mracad.batch.work import warm
+from mracad.errors import Code, MracadError
+from mracad.guard import size
+from mracad.options import duration
+from mracad.recipe import Recipe
+from mracad_cli.files import check_target, depfile_text, write_text
+from mracad_cli.progress import Progress
+from mracad_cli.steps import needed, plan
+from mracad_cli.verdicts import clean
+
+
+def run_batch(
+    recipe: Recipe,
+    sources: Sequence[str],
+    *,
+    folder: str,
+    jobs: int | None,
+    cluster: str | None,
+    time_limit: str,
+    memory_limit: str | None,
+    keep_going: bool,
+    retry: int,
+    input_unit: str | None,
+    schema: str,
+    overwrite: bool,
+    if_changed: bool,
+    record: bool,
+    report: str | None,
+    junit: str | None,
+    depfile: str | None,
+    dry_run: bool,
+    as_json: bool,
+) -> int:
+    """Take many files through a recipe; see :mod:`mracad_cli.commands.batch` for the parameters."""
+    settings = Settings(input_unit, schema.upper(), overwrite, if_changed, record, retry, fail_fast=not keep_going)
+    limits = Limits(duration(time_limit, "time-limit"), size(memory_limit) if memory_limit else 0)
+    for path in filter(None, (report, junit, depfile)):
+        check_target(Path(path), overwrite=True)
+    words = [word for given in sources for word in (sys.stdin.read().splitlines() if given == "-" else [given]) if word]
+    items = find(words, Path(folder))
+    steps = recipe.steps(items[0].source)
+    if dry_run:
+        for line in [*plan(steps), *(f"{item.source} -> {Path(folder, item.output)}" for item in items)]:
+            print(line)
+        return 0
+    workers = min(jobs or os.cpu_count() or 1, len(items))
+    start = time.perf_counter()
+    outcomes: list[Outcome] = []
+    failed = 0
+    with (
+        Manifest(Path(folder)) as manifest,
+        Cluster(cluster, limits, workers) if cluster else Pool(workers, limits, warm) as executor,
+        closing(run(recipe, items, manifest, executor, settings)) as results,
+        Progress(rate=True) as progress,
+    ):
+        try:
+            for outcome in results:
+                outcomes.append(outcome)
+                if as_json and outcome.status != "not tried":
+                    print(json.dumps(msgspec.to_builtins(outcome), ensure_ascii=False), flush=True)
+                failed += outcome.status == "failed"
+                progress(f"{recipe.name}, {failed} failed" if failed else recipe.name, len(outcomes), len(items))
+        except KeyboardInterrupt:
+            text = f"interrupted after {len(outcomes)} of {len(items)} files"
+            raise MracadError(text, "run it again to go on", Code.INTERRUPTED) from None
+    place = {item.output: number for number, item in enumerate(items)}
+    outcomes.sort(key=lambda outcome: place[outcome.output])
+    seconds = time.perf_counter() - start
+    counts = Counter(outcome.status for outcome in outcomes)
+    body: dict[str, Any] = {
+        "recipe": recipe.name,
+        "files": len(items),
+        **{str(k): n for k, n in counts.items()},
+        "seconds": seconds,
+    }
+    if report:
+        write_text(Path(report), json.dumps({**body, "each": msgspec.to_builtins(outcomes)}, indent=1) + "\n")
+    if junit:
+        write_text(Path(junit), junit_text(recipe.name, outcomes, seconds))
+    if depfile:
+        write_text(Path(depfile), _depfile(recipe, items, Path(folder)))
+    if as_json:
+        print(json.dumps({"summary": body}, ensure_ascii=False))
+    else:
+        for line in summary(outcomes, seconds):
+            print(line)
+    return 1 if failed else 0
+
+
+def summary(outcomes: Sequence[Outcome], seconds: float) -> list[str]:
+    """The batch in a line, and one for each file that failed."""
+    counts = Counter(outcome.status for outcome in outcomes)
+    parts = [f"{counts[status]} {status}" for status in ("done", "unchanged", "failed", "not tried") if counts[status]]
+    lines = [f"{len(outcomes)} file{'s' * (len(outcomes) != 1)}: {', '.join(parts)}; {seconds:.1f} s"]
+    failed = [outcome for outcome in outcomes if outcome.status == "failed"]
+    return lines + [f"failed: {o.file}: {o.message}" + (f"; {o.hint}" if o.hint else "") for o in failed]
+
+
+def junit_text(name: str, outcomes: Sequence[Outcome], seconds: float) -> str:
+    """The batch as a JUnit report: a failure is a check that did not hold, an error anything else."""
+    counts = Counter("failure" if o.code == 1 else "error" for o in outcomes if o.status == "failed")
+    skipped = sum(o.status == "not tried" for o in outcomes)
+    totals = {"tests": len(outcomes), "failures": counts["failure"], "errors": counts["error"], "skipped": skipped}
+    shared: dict[str, str] = {key: str(value) for key, value in totals.items()} | {"time": f"{seconds:.3f}"}
+    root = ElementTree.Element("testsuites", shared)
+    suite = ElementTree.SubElement(root, "testsuite", {"name": name, **shared})
+    for outcome in outcomes:
+        case = ElementTree.SubElement(
+            suite, "testcase", {"classname": name, "name": clean(outcome.file), "time": f"{outcome.seconds:.3f}"}
+        )
+        if outcome.status == "failed":
+            tag = "failure" if outcome.code == 1 else "error"
+            ElementTree.SubElement(
+                case, tag, {"message": outcome.message, "type": str(outcome.code)}
+            ).text = outcome.hint
+        elif outcome.status == "not tried":
+            ElementTree.SubElement(case, "skipped", {"message": "the batch stopped before"})
+        elif outcome.status == "unchanged":
+            ElementTree.SubElement(case, "system-out").text = "unchanged"
+    ElementTree.indent(root)
+    return '<?xml version="1.0" encoding="utf-8"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"
+
+
+def _depfile(recipe: Recipe, items: Sequence[Item], folder: Path) -> str:
+    """A rule for make for each output."""
+    return "".join(
+        depfile_text([str(folder / item.output)], [item.source, *needed(recipe.steps(item.source), recipe)])
+        for item in items
+    )

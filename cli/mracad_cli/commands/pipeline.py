@@ -1,0 +1,19 @@
+"""Take a STEP file through steps given in one argument: 'smooth --scale 5mm ! check'."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import click
+
+from mracad_cli import options
+from mracad_cli.steps import run_recipe
+
+
+@click.command(help=__doc__)
+@click.argument("steps", metavar="STEPS")
+@options.apply(options.reading, options.writing, options.record, options.editing, options.printing)
+def command(steps: str, source: str, **given: Any) -> int:
+    from mracad.recipe import pipeline
+
+    return run_recipe(pipeline(steps), source, **given)

@@ -1,0 +1,40 @@
+"""Check a recipe without running it, or print the JSON schema of recipes."""
+
+from __future__ import annotations
+
+import json
+
+import click
+
+from mracad_cli import options
+from mracad_cli.steps import plan
+
+
+@click.group(help=__doc__)
+def command() -> None:
+    pass
+
+
+@command.command()
+@click.argument("file", metavar="RECIPE", type=click.Path())
+@options.apply(options.assignments, options.printing)
+def check(file: str, assignments: tuple[str, ...], as_json: bool) -> None:
+    """Say what a recipe would do; exit code 2 when something in it is wrong."""
+    from mracad import recipe
+
+    found = recipe.load(file).with_values(assignments)
+    steps = found.steps("model.step")
+    if as_json:
+        listed = [{"id": step.id, "use": step.use, "text": step.text()} for step in steps]
+        print(json.dumps({"recipe": found.name, "steps": listed}, ensure_ascii=False))
+    else:
+        for line in plan(steps):
+            print(line)
+
+
+@command.command()
+def schema() -> None:
+    """Print the JSON schema of recipes, for editors and validators."""
+    from mracad import recipe
+
+    print(json.dumps(recipe.schema(), indent=1, ensure_ascii=False))

@@ -1,0 +1,19 @@
+"""Take a STEP file through the steps of a recipe (TOML): one read, one write."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import click
+
+from mracad_cli import options
+from mracad_cli.steps import run_recipe
+
+
+@click.command(help=__doc__)
+@click.argument("recipe", metavar="RECIPE", type=click.Path())
+@options.apply(options.reading, options.assignments, options.writing, options.record, options.editing, options.printing)
+def command(recipe: str, source: str, **given: Any) -> int:
+    from mracad.recipe import load
+
+    return run_recipe(load(recipe), source, **given)

@@ -1,0 +1,98 @@
+"""Workers on other machines: Dask's ``distributed`` behind the interface of the local pool.
+
+A task goes to a Dask worker and there into a pool of its own (:mod:`mracad.batch.pool`), so that limits, crashes and
+their reasons are the same as at home, and a bad file never takes a Dask worker with it.  When a Dask worker is lost,
+its tasks are done again elsewhere.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from concurrent.futures import CancelledError, Executor, Future
+from typing import Any
+
+from mracad.batch.pool import CrashError, Limits, Pool
+from mracad.batch.work import warm
+from mracad.errors import FileError, UsageError
+
+PATIENCE = 30
+"""Seconds to wait for the scheduler and its first worker."""
+
+_pools: dict[Limits, Pool] = {}
+_lock = threading.Lock()
+
+
+class Cluster(Executor):
+    """Tasks done by the workers of a Dask cluster.
+
+    Parameters
+    ----------
+    address : str
+        Of the scheduler, ``"tcp://host:8786"``; or ``"local"`` to start a cluster on this machine.
+    limits : Limits
+        Of each task; the memory is that of each worker machine by default.
+    workers : int
+        How many workers a local cluster has.
+
+    Raises
+    ------
+    UsageError
+        When Dask is not installed.
+    FileError
+        When the cluster cannot be reached or has no workers.
+    """
+
+    def __init__(self, address: str, limits: Limits, workers: int = 1) -> None:
+        try:
+            import dask
+            import distributed
+        except ImportError as error:
+            raise UsageError(f"a cluster needs Dask ({error})", "pip install 'mracad[cluster]'") from error
+        dask.config.set({"distributed.admin.large-graph-warning-threshold": "1TB"})  # the models travel with the tasks
+        self._limits = limits
+        self._own = None
+        if address == "local":
+            self._own = distributed.LocalCluster(
+                n_workers=workers, threads_per_worker=1, host="127.0.0.1", dashboard_address=None, memory_limit=0
+            )
+        try:
+            self._client = distributed.Client(self._own or address, timeout=PATIENCE, set_as_default=False)
+            self._client.wait_for_workers(1, timeout=PATIENCE)
+        except (OSError, TimeoutError, ValueError) as error:
+            hint = "start it with 'dask scheduler', and workers with 'dask worker ADDRESS'"
+            raise FileError(f"no cluster with workers at {address}", hint) from error
+        self._executor = self._client.get_executor(pure=False)
+
+    @property
+    def workers(self) -> int:
+        """Tasks that the cluster can do at a time, just now."""
+        return max(1, sum(self._client.nthreads().values()))
+
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+        future: Future[Any] = self._executor.submit(isolated, self._limits, fn, *args, **kwargs)
+        return future
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        self._executor.shutdown(wait=wait and not cancel_futures)
+        self._client.close()
+        if self._own:
+            self._own.close()
+
+
+def isolated(limits: Limits, fn: Callable[..., Any], *args: Any, **kwargs: Any) -> Any:
+    """Call in a process of its own on the machine of this Dask worker."""
+    from distributed import get_worker
+
+    with _lock:
+        if limits not in _pools:
+            _pools[limits] = Pool(get_worker().state.nthreads, limits, warm)
+        pool = _pools[limits]
+    return pool.submit(fn, *args, **kwargs).result()
+
+
+def lost(error: Exception) -> Exception:
+    """The error of a task; in the words of the local pool where the cluster lost it."""
+    if isinstance(error, CancelledError) or type(error).__module__.startswith("distributed"):
+        return CrashError(f"the cluster lost it ({type(error).__name__})", "see the logs of its workers")
+    return error

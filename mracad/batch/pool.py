@@ -1,0 +1,279 @@
+"""Workers in processes of their own: a crash, a hang or a hunger for memory costs the one task that brought it.
+
+The pool is an :class:`concurrent.futures.Executor`.  Each worker is a process that imports what it needs once and
+then does one task after another, told over a pipe; a thread of the pool waits on each, and one more watches the time
+and the memory of all.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import os
+import pickle
+import queue
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable
+from concurrent.futures import Executor, Future
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import psutil
+
+from mracad.errors import Code, MracadError
+
+TICK = 0.05
+"""Seconds between two looks at the workers."""
+
+GRACE = 5
+"""Seconds beyond its time limit after which a worker that nobody watches any more ends itself."""
+
+READY = 120.0
+"""Seconds in which a worker must have started."""
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What one task may use.
+
+    Attributes
+    ----------
+    seconds : float
+    memory : int
+        Bytes that the worker may occupy; 0 for its share of four fifths of the machine's memory.
+    """
+
+    seconds: float = 600.0
+    memory: int = 0
+
+
+class LimitError(MracadError):
+    """A task that took more time or memory than it may."""
+
+    def __init__(self, message: str, hint: str = "") -> None:
+        super().__init__(message, hint, Code.LIMIT)
+
+
+class CrashError(MracadError):
+    """A worker that ended in the middle of a task."""
+
+    def __init__(self, message: str, hint: str = "") -> None:
+        super().__init__(message, hint, Code.INTERNAL)
+
+
+class Pool(Executor):
+    """Processes that do tasks, each within limits.
+
+    Parameters
+    ----------
+    workers : int
+        Most tasks done at a time.
+    limits : Limits
+    warm : callable, optional
+        Called once in each worker before its first task; must be importable.
+    """
+
+    def __init__(self, workers: int, limits: Limits = Limits(), warm: Callable[[], object] | None = None) -> None:
+        self.workers = workers
+        self._seconds = limits.seconds
+        self._memory = limits.memory or int(0.8 * psutil.virtual_memory().total / workers)
+        self._warm = warm
+        self._tasks: queue.SimpleQueue[_Task | None] = queue.SimpleQueue()
+        self._slots: list[threading.Thread] = []
+        self._workers: list[_Worker] = []
+        self._open = 0  # tasks that are not done
+        self._lock = threading.Lock()
+        self._closing = self._stopped = False
+
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+        if self._closing:
+            raise RuntimeError("the pool is closed")
+        task = _Task(pickle.dumps((fn, args, kwargs), protocol=5))
+        self._tasks.put(task)
+        with self._lock:
+            self._open += 1
+            if self._open > len(self._slots) < self.workers:
+                self._slots.append(threading.Thread(target=self._slot, daemon=True))
+                self._slots[-1].start()
+                if len(self._slots) == 1:
+                    threading.Thread(target=self._watch, daemon=True).start()
+        return task.future
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        """Let what was submitted finish; with ``cancel_futures`` end the workers at once."""
+        self._closing = True
+        if cancel_futures:
+            self._stopped = True
+            for worker in list(self._workers):
+                worker.kill(CrashError("stopped"))
+        for _ in self._slots:
+            self._tasks.put(None)
+        if wait:
+            for slot in self._slots:
+                slot.join()
+
+    def _slot(self) -> None:
+        """Do tasks, in a worker that is replaced when it is lost or has grown."""
+        worker: _Worker | None = None
+        while (task := self._tasks.get()) is not None:
+            tell: Callable[[], object] = bool
+            if not self._stopped and task.future.set_running_or_notify_cancel():
+                if worker and worker.lost():
+                    worker = self._retired(worker)
+                try:
+                    worker = worker or self._started()
+                    tell = partial(task.future.set_result, worker.call(self._seconds, task.payload))
+                except BaseException as error:
+                    tell = partial(task.future.set_exception, error)
+                if worker and (worker.lost() or worker.memory() > self._memory / 2):
+                    worker = self._retired(worker)
+            else:
+                task.future.cancel()
+            with self._lock:
+                self._open -= 1
+            tell()
+        if worker:
+            self._retired(worker)
+
+    def _started(self) -> _Worker:
+        """A worker that is warm."""
+        worker = _Worker()
+        self._workers.append(worker)
+        try:
+            worker.call(READY, pickle.dumps((self._warm or bool, (), {})))
+        except BaseException:
+            self._retired(worker)
+            raise
+        return worker
+
+    def _retired(self, worker: _Worker) -> None:
+        self._workers.remove(worker)
+        worker.close()
+
+    def _watch(self) -> None:
+        """End the workers that overstep a limit."""
+        while any(slot.is_alive() for slot in self._slots):
+            time.sleep(TICK)
+            for worker in list(self._workers):
+                if time.monotonic() > worker.deadline:
+                    hint = "raise --time-limit, or look into the file"
+                    worker.kill(LimitError(f"not done within the time limit of {worker.seconds:g} s", hint))
+                elif (used := worker.memory()) > self._memory:
+                    text = f"over the memory limit of {self._memory / 1e6:.0f} MB (at {used / 1e6:.0f} MB)"
+                    worker.kill(LimitError(text, "raise --memory-limit, or use fewer workers"))
+
+
+class _Task:
+    """A call, pickled, and the future of its result."""
+
+    def __init__(self, payload: bytes) -> None:
+        self.payload = payload
+        self.future: Future[Any] = Future()
+
+
+class _Worker:
+    """One process that does tasks."""
+
+    def __init__(self) -> None:
+        environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
+        for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
+            environment.setdefault(name, "1")  # as in one command: results must not depend on the number of cores
+        self.process = subprocess.Popen(
+            [sys.executable, "-P", "-c", "from mracad.batch.pool import serve; serve()"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            env=environment,
+            process_group=None if sys.platform == "win32" else 0,  # an interrupt is for the client to act upon
+        )
+        self.reason: MracadError | None = None
+        self.seconds, self.deadline = 0.0, math.inf
+        self._process = psutil.Process(self.process.pid)
+
+    def call(self, seconds: float, payload: bytes) -> Any:
+        """Do a task and return its result, or raise its error."""
+        assert self.process.stdin and self.process.stdout
+        self.seconds, self.deadline = seconds, time.monotonic() + seconds
+        try:
+            pickle.dump((seconds, payload), self.process.stdin, protocol=5)
+            self.process.stdin.flush()
+            done, value = pickle.load(self.process.stdout)
+        except (EOFError, OSError, pickle.UnpicklingError) as error:
+            raise self._loss() from error
+        finally:
+            self.deadline = math.inf
+        if not done:
+            raise value
+        return value
+
+    def lost(self) -> bool:
+        return self.process.poll() is not None
+
+    def memory(self) -> int:
+        """Bytes that the process occupies; 0 once it is gone."""
+        try:
+            return int(self._process.memory_info().rss)
+        except psutil.Error:
+            return 0
+
+    def kill(self, reason: MracadError) -> None:
+        self.reason = self.reason or reason
+        self.process.kill()
+
+    def close(self) -> None:
+        """Let the process end: there are no more tasks."""
+        assert self.process.stdin and self.process.stdout
+        with contextlib.suppress(OSError):
+            self.process.stdin.close()
+        self.process.wait()
+        self.process.stdout.close()
+
+    def _loss(self) -> MracadError:
+        """Why the process is gone."""
+        code = self.process.wait()
+        if self.reason:
+            return self.reason
+        if code == -getattr(signal, "SIGKILL", 9):
+            return CrashError("the worker was killed (out of memory, maybe)", "try again with fewer workers")
+        name = signal.Signals(-code).name if code < 0 else f"exit code {code}"
+        return CrashError(f"the worker crashed ({name})", "the file breaks the CAD kernel: export it again")
+
+
+def serve() -> None:
+    """What a worker process does: tasks from standard input, results to standard output, until that is closed."""
+    requests, replies = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
+    os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
+    os.dup2(2, 1)
+    with contextlib.suppress(EOFError, BrokenPipeError):
+        while True:
+            seconds, payload = pickle.load(requests)
+            _alarm(seconds + GRACE)
+            answer = _attempt(payload)
+            _alarm(0)
+            pickle.dump(answer, replies, protocol=5)
+            replies.flush()
+
+
+def _attempt(payload: bytes) -> tuple[bool, Any]:
+    """Whether the task came to an end, and its value or error."""
+    try:
+        fn, args, kwargs = pickle.loads(payload)
+        return True, fn(*args, **kwargs)
+    except MemoryError:
+        return False, LimitError("out of memory", "use a machine with more memory, or fewer workers")
+    except MracadError as error:
+        return False, error
+    except BaseException as error:
+        text = " ".join(str(error).split())
+        return False, CrashError(f"internal error: {type(error).__name__}: {text}", "please report it with the file")
+
+
+def _alarm(seconds: float) -> None:
+    """End the process after some seconds, whatever it is doing then: the kernel does not let Python in to look."""
+    if hasattr(signal, "setitimer"):
+        signal.setitimer(signal.ITIMER_REAL, seconds)

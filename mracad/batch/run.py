@@ -1,0 +1,293 @@
+"""A batch: inputs found, done by an executor, written one by one as they come."""
+
+from __future__ import annotations
+
+import glob
+import json
+import os
+import time
+from collections.abc import Generator, Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Future, wait
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal, Protocol
+
+from mracad.batch.cluster import lost
+from mracad.batch.manifest import UNFINISHED, Manifest, digest
+from mracad.batch.work import Product, Work, do
+from mracad.errors import Code, FileError, MracadError, UsageError
+from mracad.output import put
+from mracad.recipe import Recipe, record_of
+
+ENDINGS = frozenset({".step", ".stp", ".p21"})
+AHEAD = 2
+"""Files given to the executor for each of its workers: enough that none waits, few enough to hold in memory."""
+
+RETRIED = frozenset({Code.LIMIT, Code.INTERNAL})
+"""What may go better the next time: limits and crashes."""
+
+Status = Literal["done", "unchanged", "failed", "not tried"]
+
+
+@dataclass(frozen=True)
+class Item:
+    """One file of a batch, and its output relative to the output folder."""
+
+    source: str
+    output: str
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How the files of a batch are read and written.
+
+    Attributes
+    ----------
+    input_unit : str or None
+    schema : str
+    overwrite : bool
+        Replace files in the output folder that no batch has made.
+    if_changed : bool
+        Leave outputs alone whose content would not change.
+    record : bool
+        Write the resolved recipe beside each output.
+    retry : int
+        How often a file is tried again after a crash or a limit.
+    fail_fast : bool
+        Stop at the first failure.
+    """
+
+    input_unit: str | None = None
+    schema: str = "AP214"
+    overwrite: bool = False
+    if_changed: bool = False
+    record: bool = False
+    retry: int = 0
+    fail_fast: bool = False
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of one file.
+
+    Attributes
+    ----------
+    file, output : str
+    status : Status
+        ``done``; ``unchanged``: it was done before; ``failed``; ``not tried``: the batch stopped before.
+    code : int
+        The exit code that a command would have.
+    message, hint : str
+        Why it failed, and what to do.
+    seconds : float
+        Of the work itself; for a file that failed, since it was given to the executor.
+    attempts : int
+    steps : tuple of dict
+        What each step did, in short.
+    """
+
+    file: str
+    output: str
+    status: Status
+    code: int = 0
+    message: str = ""
+    hint: str = ""
+    seconds: float = 0.0
+    attempts: int = 0
+    steps: tuple[dict[str, Any], ...] = ()
+
+
+class Workers(Protocol):
+    """An executor that says how many tasks it does at a time."""
+
+    @property
+    def workers(self) -> int: ...
+
+    def submit(self, fn: Any, /, *args: Any) -> Future[Any]: ...
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None: ...
+
+
+def find(words: Iterable[str], folder: Path) -> list[Item]:
+    """The files of a batch from paths, folders (all STEP files below them) and patterns.
+
+    Outputs have the names of their inputs; those of a folder keep their place below it.  What lies in the output
+    folder is not taken for an input.
+
+    Raises
+    ------
+    FileError
+        When a folder or pattern holds no STEP file.
+    UsageError
+        When two inputs would be written to the same output.
+    """
+    found: dict[str, str] = {}
+    own = folder.resolve()
+    for word in words:
+        for source, output in _expanded(word):
+            if Path(source).resolve().is_relative_to(own):
+                continue
+            if found.get(output, source) != source:
+                raise UsageError(
+                    f"'{found[output]}' and '{source}' would both be written to '{folder / output}'",
+                    "give the folder that holds both, or one batch each",
+                )
+            found[output] = source
+    if not found:
+        raise FileError("there is nothing to do: no STEP files", "give files, folders or patterns")
+    return [Item(source, output) for output, source in found.items()]
+
+
+def _expanded(word: str) -> list[tuple[str, str]]:
+    """The files that a word on the command line means, each with its output."""
+    if Path(word).is_dir():
+        files = sorted(path for path in Path(word).rglob("*") if path.suffix.lower() in ENDINGS)
+        pairs = [(str(path), str(path.relative_to(word))) for path in files]
+    elif glob.has_magic(word) and not Path(word).exists():
+        pairs = [(path, Path(path).name) for path in sorted(glob.glob(word, recursive=True))]
+    else:
+        return [(word, Path(word).name)]
+    if not pairs:
+        raise FileError(f"no STEP files in '{word}'", f"they end in {', '.join(sorted(ENDINGS))}")
+    return pairs
+
+
+def run(
+    recipe: Recipe, items: Iterable[Item], manifest: Manifest, executor: Workers, settings: Settings
+) -> Generator[Outcome, None, None]:
+    """Take files through a recipe; yields outcomes as they come.
+
+    Parameters
+    ----------
+    recipe : Recipe
+    items : iterable of Item
+        Looked at only as fast as they are done.
+    manifest : Manifest
+        Of the output folder.
+    executor : Workers
+        Shut down when the batch stops early.
+    settings : Settings
+    """
+    batch = _Batch(recipe, manifest, executor, settings)
+    waiting = iter(items)
+    stopped = False
+    try:
+        while True:
+            while not stopped and len(batch.pending) < AHEAD * executor.workers:
+                item = next(waiting, None)
+                if item is None:
+                    break
+                if outcome := batch.start(item):
+                    yield outcome
+                    stopped = settings.fail_fast and outcome.status == "failed"
+            if stopped or not batch.pending:
+                break
+            for outcome in batch.finished():
+                yield outcome
+                stopped = stopped or (settings.fail_fast and outcome.status == "failed")
+        left = [task.item for task in batch.pending.values()] + (list(waiting) if stopped else [])
+        yield from (Outcome(item.source, item.output, "not tried") for item in left)
+    finally:
+        if batch.pending:
+            executor.shutdown(wait=True, cancel_futures=True)
+
+
+@dataclass
+class _Task:
+    """A file in the hands of the executor."""
+
+    item: Item
+    work: Work
+    key: str
+    attempts: int
+    start: float
+
+
+class _Batch:
+    """The tasks that are under way."""
+
+    def __init__(self, recipe: Recipe, manifest: Manifest, executor: Workers, settings: Settings) -> None:
+        self.recipe, self.manifest, self.executor, self.settings = recipe, manifest, executor, settings
+        self.pending: dict[Future[Any], _Task] = {}
+        self._epoch = os.environ.get("SOURCE_DATE_EPOCH")
+
+    def start(self, item: Item) -> Outcome | None:
+        """Give a file to the executor, unless it is done or cannot be."""
+        try:
+            steps = self.recipe.steps(item.source)
+            files = {file: _bytes(file) for step in steps for file in step.options.files()}
+            data = _bytes(item.source)
+            self._check_target(item)
+        except MracadError as error:
+            return _failed(item, error)
+        work = Work(
+            Path(item.source).name, data, steps, self.settings.input_unit, self.settings.schema, files, self._epoch
+        )
+        key = self._key(work)
+        if self.manifest.done(item.output, key):
+            return Outcome(item.source, item.output, "unchanged")
+        self._submit(_Task(item, work, key, 0, 0.0))
+        return None
+
+    def finished(self) -> Iterator[Outcome]:
+        """Wait for tasks, and write what they made."""
+        for future in wait(self.pending, return_when=FIRST_COMPLETED).done:
+            task = self.pending.pop(future)
+            try:
+                outcome = self._written(task, future.result())
+            except Exception as failure:
+                error = lost(failure)
+                if not isinstance(error, MracadError):
+                    raise
+                if error.code in RETRIED and task.attempts <= self.settings.retry:
+                    self._submit(task)
+                    continue
+                outcome = _failed(task.item, error, task)
+            yield outcome
+
+    def _submit(self, task: _Task) -> None:
+        task.attempts += 1
+        task.start = time.perf_counter()
+        self.pending[self.executor.submit(do, task.work)] = task
+
+    def _check_target(self, item: Item) -> None:
+        target = self.manifest.folder / item.output
+        if target.exists() and not (self.settings.overwrite or self.manifest.made(item.output)):
+            raise UsageError(f"'{target}' exists, and no batch has made it", "give --overwrite to replace it")
+
+    def _key(self, work: Work) -> str:
+        """A hash of everything that the output depends on."""
+        files = {Path(name).name: digest(data) for name, data in work.files.items()}
+        parts = [work.name, digest(work.data), record_of(work.steps), files]
+        return digest(json.dumps([*parts, work.input_unit, work.schema, work.epoch], sort_keys=True).encode())
+
+    def _written(self, task: _Task, product: Product) -> Outcome:
+        output = task.item.output
+        self.manifest.write(output, task.key, product.data, self.settings.if_changed)
+        if self.settings.record:
+            put(record_of(task.work.steps).encode(), self.manifest.folder / f"{output}.toml", UNFINISHED)
+        return Outcome(
+            task.item.source, output, "done", seconds=product.seconds, attempts=task.attempts, steps=product.steps
+        )
+
+
+def _bytes(path: str) -> bytes:
+    try:
+        return Path(path).read_bytes()
+    except OSError as error:
+        raise FileError(
+            f"cannot read '{path}': {error.strerror or error}", "look at its path and permissions"
+        ) from error
+
+
+def _failed(item: Item, error: MracadError, task: _Task | None = None) -> Outcome:
+    return Outcome(
+        item.source,
+        item.output,
+        "failed",
+        code=int(error.code),
+        message=error.message,
+        hint=error.hint,
+        seconds=time.perf_counter() - task.start if task else 0.0,
+        attempts=task.attempts if task else 0,
+    )

@@ -1,0 +1,136 @@
+"""What a worker does with one file: bytes in, bytes out."""
+
+from __future__ import annotations
+
+import importlib
+import io
+import os
+import tempfile
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from mracad import __version__
+from mracad.errors import Code, MracadError
+from mracad.options import STEPS
+from mracad.recipe import Step, relocated, title
+
+if TYPE_CHECKING:
+    from mracad.job import Judged, Report
+    from mracad.occ import Document
+
+
+@dataclass(frozen=True)
+class Work:
+    """One file and what is to be done with it; everything that the result depends on, so it can be done anywhere.
+
+    Attributes
+    ----------
+    name : str
+        Of the file, without folder.
+    data : bytes
+        Its content.
+    steps : tuple of Step
+    input_unit : str or None
+    schema : str
+    files : mapping
+        The content of the files that the steps name.
+    epoch : str or None
+        ``SOURCE_DATE_EPOCH``.
+    version : str
+        Of the client.
+    """
+
+    name: str
+    data: bytes = field(repr=False)
+    steps: tuple[Step, ...]
+    input_unit: str | None = None
+    schema: str = "AP214"
+    files: Mapping[str, bytes] = field(default_factory=dict, repr=False)
+    epoch: str | None = None
+    version: str = __version__
+
+
+@dataclass(frozen=True)
+class Product:
+    """The file that came out, for each step what it did, in short, and the seconds that it took."""
+
+    data: bytes = field(repr=False)
+    steps: tuple[dict[str, Any], ...]
+    seconds: float
+
+
+def warm() -> None:
+    """Load what the steps need."""
+    for module in ("mracad.occ", *(struct.function.partition(":")[0] for struct in STEPS.values())):
+        importlib.import_module(module)
+
+
+def do(work: Work) -> Product:
+    """Take one file through its steps.
+
+    Raises
+    ------
+    MracadError
+        When a step cannot be done or a check fails.
+    """
+    from mracad.job import Judged, play
+    from mracad.occ import write_step
+
+    start = time.perf_counter()
+    if work.version != __version__:
+        raise MracadError(f"the worker has mracad {__version__}, not {work.version}", "install the same version there")
+    if work.epoch is None:
+        os.environ.pop("SOURCE_DATE_EPOCH", None)
+    else:
+        os.environ["SOURCE_DATE_EPOCH"] = work.epoch
+    document = _read(work)
+    with tempfile.TemporaryDirectory() as folder:
+        results = play(document, _here(work, Path(folder)), original=lambda: _read(work))
+    last = results[-1]
+    if isinstance(last, Judged) and not last.passed:
+        more = f" (and {len(last.failures) - 1} more)" if len(last.failures) > 1 else ""
+        raise MracadError(f"{work.steps[len(results) - 1].id}: {last.failures[0]}{more}", code=Code.FAILED_CHECK)
+    written = io.BytesIO()
+    write_step(document, written, schema=work.schema, options_text=title(work.steps))
+    short = ({"step": step.id, **_short(result)} for step, result in zip(work.steps, results, strict=True))
+    return Product(written.getvalue(), tuple(short), time.perf_counter() - start)
+
+
+def _read(work: Work) -> Document:
+    from mracad.occ import read_step
+
+    source = _Named(work.data)
+    source.name = work.name
+    return read_step(source, work.input_unit)
+
+
+class _Named(io.BytesIO):
+    name: str
+
+
+def _here(work: Work, folder: Path) -> list[Step]:
+    """The steps, with the files that they name put into a folder of this machine."""
+    places: dict[str, str] = {}
+    for number, (name, data) in enumerate(work.files.items()):
+        place = folder / str(number) / Path(name).name
+        place.parent.mkdir()
+        place.write_bytes(data)
+        places[name] = str(place)
+    return [replace(step, options=relocated(step.options, places)) for step in work.steps]
+
+
+def _short(result: Report | Judged) -> dict[str, Any]:
+    """What a step did, without the long lists."""
+    from mracad.job import Judged
+
+    if isinstance(result, Judged):
+        return {"passed": result.passed}
+    return {
+        "edited": len(result.edit.faces("edited")),
+        "faces": len(result.edit.outcomes),
+        "deviation": max((d.largest for d in result.deviations), default=0.0),
+        "valid": result.valid_after.valid,
+    }

@@ -1,0 +1,421 @@
+"""Seams that can move: where two edited faces meet along isoparametric curves, and the joint they have there.
+
+Let S and T be the surfaces of a seam, n the parameter across it and t the one along it on S, φ the affine map to T's.
+The joint of the input is
+
+    G0   S = T∘φ,    G1   T_n = a S_n + b S_t,    G2   T_nn = a² S_nn + r S_n + s S_t   (a constant, b = 0)
+
+with scalar functions of t that are polynomials as simple as the input allows.  With a, b, r, s kept, these are linear
+conditions on a displacement; what the input misses them by (gap, tilt) is then carried unchanged.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mracad.bspline.knots import Side as Limit
+from mracad.bspline.net import Net
+from mracad.constraint.coincide import GAP, coinciding
+from mracad.constraint.frozen import CONTINUITY, ISO, local_span
+from mracad.model import Edge, Face, Model, Side
+
+Array = np.ndarray
+
+TRIMMED, UNEVEN, VARYING = "trimmed", "parameters differ along the seam", "ratio varies along the seam"
+"""Reasons for which a seam cannot move exactly, though it may to a tolerance."""
+
+CREASE = np.radians(1.0)
+"""A seam along which the normals differ by more anywhere is a crease: it keeps G0 only."""
+
+AFFINE = 1e-7
+"""Largest deviation, as a fraction of the seam, from an affine map between the parameters along it."""
+
+SLIP = 1e-2
+"""Largest distance, mm, between points of equal parameter measured along the seam (or 1e-5 of its length)."""
+
+EXACT, CLOSE = 1e-8, 2e-3
+"""A joint's polynomials fit when they miss the input by EXACT of |T_n|; they serve up to CLOSE: the angle of the seam
+then grows by at most CLOSE of the angle by which the normal turns."""
+
+_SAMPLES = 0.5 - 0.5 * np.cos(np.pi * (np.arange(33) + 0.5) / 33)
+_SHAPES = ((0, -1), (0, 0), (1, -1), (1, 1), (2, -1), (2, 2))
+
+
+@dataclass(frozen=True)
+class Wishes:
+    """What seams are to keep, and what is to be mended.
+
+    Attributes
+    ----------
+    keep : {"g0", "g1", "g2"}
+    fit : float
+        Seams whose normals differ by up to this angle anywhere are made tangent.
+    close_gaps : bool
+    """
+
+    keep: str = "g1"
+    fit: float = 0.0
+    close_gaps: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Border:
+    """One side of a seam: an isoparametric curve of a surface.
+
+    Attributes
+    ----------
+    face, surface : int
+    axis : {0, 1}
+        The direction across the seam: 0 where it lies on a line u = const.
+    at : float
+        Parameter of the line.
+    limit : {"right", "left"}
+        The side of the line on which the face lies.
+    start, stop : float
+        Parameters along the line where the edge begins and ends.
+    """
+
+    face: int
+    surface: int
+    axis: int
+    at: float
+    limit: Limit
+    start: float
+    stop: float
+
+    def places(self, share: Array) -> Array:
+        """Parameters ``(q, 2)`` at fractions of the edge."""
+        along = (1.0 - share) * self.start + share * self.stop
+        return np.stack([np.full_like(along, self.at), along][:: 1 - 2 * self.axis], axis=-1)
+
+    def limits(self, along: Limit) -> tuple[Limit, Limit]:
+        """Limits in u and in v."""
+        return (self.limit, along) if self.axis == 0 else (along, self.limit)
+
+
+@dataclass(frozen=True, eq=False)
+class Joint:
+    """How smoothly two surfaces meet: coefficients of polynomials in the fraction of the edge, lowest degree first.
+
+    Attributes
+    ----------
+    order : {0, 1, 2}
+        Cross derivatives that the seam keeps.
+    across, along : ndarray
+        a and b; b is empty where it vanishes.
+    bend, shear : float
+        r and s.
+    missed : float
+        Largest part of T_n within the tangent plane that a S_n + b S_t misses, relative.
+    close, fit : bool
+        Whether the gap and the tilt of the input are to be pulled shut instead of carried.
+    """
+
+    order: int
+    across: Array
+    along: Array
+    bend: float = 0.0
+    shear: float = 0.0
+    missed: float = 0.0
+    close: bool = False
+    fit: bool = False
+
+    @property
+    def varying(self) -> bool:
+        """Whether a smooth T does not follow from a smooth S of the same degree."""
+        return self.order > 0 and (len(self.across) > 1 or len(self.along) > 0)
+
+
+@dataclass(frozen=True, eq=False)
+class Seam:
+    """Two borders of edited faces that meet, and their joint; its fractions run from start to stop on both.
+
+    Attributes
+    ----------
+    edge, twin : int
+        The edge; twice, or the two free edges that coincide in an unsewn model.
+    gap, angle : float
+        Largest distance at equal fractions, mm, and angle between the outward normals.
+    """
+
+    edge: int
+    twin: int
+    a: Border
+    b: Border
+    joint: Joint
+    gap: float
+    angle: float
+
+
+@dataclass(frozen=True)
+class Treatment:
+    """What an edit did about one seam or free edge.
+
+    Attributes
+    ----------
+    edge : int
+        Index in ``Model.edges``.
+    faces : tuple of int
+        Faces that meet there.
+    how : {"coupled", "to tolerance", "frozen"}
+    reason : str
+        Why it is frozen.
+    freedom : int
+        Degrees of freedom of the edge's curve in the coarse space, where coupled.
+    """
+
+    edge: int
+    faces: tuple[int, ...]
+    how: str
+    reason: str = ""
+    freedom: int = 0
+
+
+def seams(model: Model, movable: Collection[int], wishes: Wishes) -> tuple[list[Seam], set[int], dict[int, str]]:
+    """Seams that can move exactly.
+
+    Parameters
+    ----------
+    model : Model
+    movable : collection of int
+        Faces that the edit may move.
+    wishes : Wishes
+
+    Returns
+    -------
+    found : list of Seam
+    smooth : set of int
+        Closing edges inside a periodic direction, which its spline space keeps smooth by itself.
+    frozen : dict of int to str
+        Every other edge of a movable face, and why it does not move.
+    """
+    found: list[Seam] = []
+    closing: set[int] = set()
+    frozen: dict[int, str] = {}
+    for edge in model.edges:
+        if not any(side.face in movable for side in edge.sides):
+            continue
+        if edge.degenerate:
+            frozen[edge.index] = "pole"
+        elif len(edge.sides) == 1:
+            frozen[edge.index] = "free edge"
+        elif len(edge.sides) > 2:
+            frozen[edge.index] = "more than two faces"
+        else:
+            result = _seam(model, movable, wishes, (edge, edge), edge.sides)
+            if isinstance(result, Seam):
+                found.append(result)
+            elif result:
+                frozen[edge.index] = result
+            else:
+                closing.add(edge.index)
+    for edge, one, two in coinciding(model):
+        other = _twin(model, edge, two.face)
+        if edge.index not in frozen or (other and other.index not in frozen):
+            continue
+        result = "coincides with a part of another edge"
+        if other:
+            result = _seam(model, movable, wishes, (edge, other), (one, other.sides[0]))
+        if isinstance(result, Seam):
+            found.append(result)
+            del frozen[result.edge], frozen[result.twin]
+        else:
+            frozen[edge.index] = result
+    return found, closing, frozen
+
+
+def _twin(model: Model, edge: Edge, face: int) -> Edge | None:
+    """The free edge of a face that coincides with another free edge as a whole."""
+    limit = max(GAP, 1e-6 * model.diagonal)
+    for other in model.edges:
+        if other.free and other.sides[0].face == face and other.points.shape == edge.points.shape:
+            apart = [np.abs(points - edge.points).max() for points in (other.points, other.points[::-1])]
+            if min(apart) <= limit:
+                return other
+    return None
+
+
+def _seam(
+    model: Model, movable: Collection[int], wishes: Wishes, edges: tuple[Edge, Edge], sides: Sequence[Side]
+) -> Seam | str:
+    """The seam, why there is none, or ``""`` where a periodic space closes it."""
+    for side in sides:
+        face = model.faces[side.face]
+        if face.surface is None:
+            return f"{face.kind} neighbour"
+        if side.face not in movable:
+            return "neighbour does not move"
+    a, b = (border(model, edge, side, use) for use, (edge, side) in enumerate(zip(edges, sides, strict=True)))
+    if a is None or b is None:
+        return TRIMMED
+    if edges[0] is not edges[1]:
+        apart = [np.abs(points - edges[0].points).max() for points in (edges[1].points, edges[1].points[::-1])]
+        if apart[1] < apart[0]:
+            b = replace(b, start=b.stop, stop=b.start)
+    fa, fb = model.faces[a.face], model.faces[b.face]
+    if not np.allclose(fa.frame[:3, :3], fb.frame[:3, :3], rtol=0, atol=1e-12):
+        return "faces are placed differently"
+    if a.surface == b.surface and a.axis == b.axis:
+        net = model.surfaces[a.surface].net
+        knots = (net.u, net.v)[a.axis]
+        if knots.periodic and abs(abs(a.at - b.at) - knots.period) <= ISO * knots.period:
+            return ""
+    joint = _joint(model, a, b, wishes)
+    if isinstance(joint, str):
+        return joint
+    return Seam(edges[0].index, edges[1].index, a, b, joint, *opening(model, a, b))
+
+
+def border(model: Model, edge: Edge, side: Side, use: int) -> Border | None:
+    """The isoparametric curve by which a face meets an edge, run through at a steady pace; None for any other."""
+    face = model.faces[side.face]
+    assert face.surface is not None and side.uv is not None
+    net = model.surfaces[face.surface].net
+    trims = [trim for trim in face.trims if trim.edge == edge.index]
+    trim = trims[use if len(trims) > 1 else 0]
+    ends = trim.curve.evaluate(np.array(trim.curve.knots.domain))[0]
+    for axis, knots in enumerate((net.u, net.v)):
+        at = trim.curve.poles[:, axis]
+        place = float(at.mean())
+        if np.ptp(at) > 2 * ISO * local_span(knots, place):
+            continue
+        low, high = knots.domain
+        nearest = float(knots.breaks[np.argmin(np.abs(knots.breaks - place))])
+        place = nearest if abs(nearest - place) <= ISO * local_span(knots, place) else place
+        along = (net.u, net.v)[1 - axis]
+        start, stop = (_snapped(along.breaks, float(x)) for x in ends[:, 1 - axis])
+        share = (side.uv[:, 1 - axis] - ends[0, 1 - axis]) / (ends[1, 1 - axis] - ends[0, 1 - axis])
+        if abs(share - _pace(len(share))).max() > AFFINE:
+            return None
+        limit: Limit = "right" if place <= low else "left"
+        if low < place < high:
+            limit = _inner_side(face, trim.edge, axis, place)
+        return Border(face.index, face.surface, axis, place, limit, start, stop)
+    return None
+
+
+def from_inside(face: Face, net: Net, edge: int, uv: Array) -> tuple[Array, tuple[Limit, Limit]]:
+    """Parameters ``uv`` (k, 2) along an edge of a face, moved onto the knot line that it lies on, and the limits there.
+
+    They matter where the surface goes on beyond the edge, unseen, another way.
+    """
+    found: list[Limit] = ["right", "right"]
+    for axis, knots in enumerate((net.u, net.v)):
+        at = float(uv[:, axis].mean())
+        low, high = knots.domain
+        near = 2 * ISO * local_span(knots, at)
+        nearest = float(knots.breaks[np.argmin(np.abs(knots.breaks - at))])
+        if low < at < high and np.abs(uv[:, axis] - nearest).max() <= near:
+            found[axis] = _inner_side(face, edge, axis, nearest)
+            uv = np.where(np.arange(2) == axis, nearest, uv)
+    return uv, (found[0], found[1])
+
+
+def _pace(count: int) -> Array:
+    """Fractions of an edge at which the model samples it."""
+    return 0.5 - 0.5 * np.cos(np.pi * (np.arange(count) + 0.5) / count)
+
+
+def _snapped(breaks: Array, x: float) -> float:
+    nearest = float(breaks[np.argmin(np.abs(breaks - x))])
+    return nearest if abs(nearest - x) <= 1e-9 * (breaks[-1] - breaks[0]) else x
+
+
+def _inner_side(face: Face, edge: int, axis: int, at: float) -> Limit:
+    """On which side of the line ``at`` the rest of the face's boundary lies."""
+    others = [trim.curve.poles[:, axis] for trim in face.trims if trim.edge != edge]
+    return "right" if others and np.concatenate(others).mean() > at else "left"
+
+
+def jets(model: Model, border: Border, share: Array, order: int) -> tuple[Array, ...]:
+    """``S, S_n, S_t`` and for order 2 ``S_nn`` at fractions of the edge in the part's frame; t is the fraction."""
+    face, net = model.faces[border.face], model.surfaces[border.surface].net
+    values = net.evaluate(border.places(share), order, border.limits("right"))
+    s, su, sv, *second = (x @ face.frame[:3, :3].T for x in values)
+    pace = border.stop - border.start
+    first = (su, sv * pace) if border.axis == 0 else (sv, su * pace)
+    return (s + face.frame[:3, 3], *first, *second[:: 2 if border.axis == 0 else -2][:1])
+
+
+def opening(model: Model, a: Border, b: Border) -> tuple[float, float]:
+    """Largest distance (mm) and angle between the outward normals of two borders at equal fractions."""
+    s, sn, st = jets(model, a, _SAMPLES, 1)
+    t, tn, tt = jets(model, b, _SAMPLES, 1)
+    angle = between(_outward(model, a, sn, st), _outward(model, b, tn, tt))
+    return float(np.linalg.norm(s - t, axis=1).max()), float(angle.max())
+
+
+def _outward(model: Model, border: Border, across: Array, along: Array) -> Array:
+    """Outward normals, not of unit length, from the derivatives across and along a border."""
+    turned = model.faces[border.face].reversed != (border.stop < border.start)
+    return (-1 if turned else 1) * np.cross(*((across, along) if border.axis == 0 else (along, across)))
+
+
+def between(one: Array, two: Array) -> Array:
+    """Angles between vectors."""
+    return np.arctan2(np.linalg.norm(np.cross(one, two), axis=1), (one * two).sum(axis=1))
+
+
+def _joint(model: Model, a: Border, b: Border, wishes: Wishes) -> Joint | str:
+    """The joint between two borders, or why it cannot be kept."""
+    s, sn, st, snn = jets(model, a, _SAMPLES, 2)
+    t, tn, tt, tnn = jets(model, b, _SAMPLES, 2)
+    length = np.linalg.norm(st, axis=1).mean()
+    slip = np.abs(((s - t) * st).sum(axis=1) / np.maximum(np.linalg.norm(st, axis=1), 1e-12 * length)).max()
+    if slip > max(SLIP, 1e-5 * length):
+        return UNEVEN
+    normals = _outward(model, a, sn, st), _outward(model, b, tn, tt)
+    sizes = [np.linalg.norm(n, axis=1) for n in normals]
+    if min(size.min() / max(size.max(), 1e-300) for size in sizes) < 1e-9:
+        return "degenerate along the seam"
+    angle = between(*normals)
+    order, close = CONTINUITY[wishes.keep], wishes.close_gaps
+    if order == 0 or angle.max() > max(CREASE, wishes.fit):
+        return Joint(0, np.ones(1), np.empty(0), close=close)
+    fit = bool(angle.max() <= wishes.fit)
+    across, along = _components(sn, st, tn)
+    size = np.linalg.norm(tn, axis=1)
+    for limit in (EXACT, CLOSE):
+        for degree, shear in _SHAPES:
+            p, q = _polynomial(across, degree), _polynomial(along, shear)
+            off = sn * (across - _value(p))[:, None] + st * (along - _value(q))[:, None]
+            missed = float((np.linalg.norm(off, axis=1) / size).max())
+            if missed <= limit:
+                joint = Joint(1, p, q, missed=missed, close=close, fit=fit)
+                return joint if order == 1 else _bent(joint, sn, st, snn, tnn)
+    return VARYING
+
+
+def _bent(joint: Joint, sn: Array, st: Array, snn: Array, tnn: Array) -> Joint | str:
+    """The joint with its second derivatives."""
+    if joint.varying:
+        return "curvature joint varies along the seam"
+    bend, shear = _components(sn, st, tnn - joint.across[0] ** 2 * snn)
+    scale = np.linalg.norm(tnn, axis=1).max() + 1e-300
+    fitted = [
+        float(x.mean()) if np.abs(x[:, None] * d).max() > EXACT * scale else 0.0 for x, d in ((bend, sn), (shear, st))
+    ]
+    off = sn * (bend - fitted[0])[:, None] + st * (shear - fitted[1])[:, None]
+    if np.linalg.norm(off, axis=1).max() > CLOSE * scale:
+        return "curvature joint varies along the seam"
+    return replace(joint, order=2, bend=fitted[0], shear=fitted[1])
+
+
+def _components(sn: Array, st: Array, vector: Array) -> tuple[Array, Array]:
+    """``x`` and ``y`` of the part x S_n + y S_t of ``vector`` in the tangent plane."""
+    nn, nt, tt = ((p * q).sum(axis=1) for p, q in ((sn, sn), (sn, st), (st, st)))
+    vn, vt = ((vector * p).sum(axis=1) for p in (sn, st))
+    det = nn * tt - nt * nt
+    return (vn * tt - vt * nt) / det, (vt * nn - vn * nt) / det
+
+
+def _polynomial(values: Array, degree: int) -> Array:
+    """Coefficients in the fraction of the edge that fit values at the samples; none for degree −1."""
+    return np.polynomial.polynomial.polyfit(_SAMPLES, values, degree) if degree >= 0 else np.empty(0)
+
+
+def _value(coefficients: Array) -> Array:
+    return np.polynomial.polynomial.polyval(_SAMPLES, coefficients) if len(coefficients) else np.zeros_like(_SAMPLES)

@@ -1,0 +1,328 @@
+"""Smoothing of surfaces whose common edges move with them.
+
+The target is the coupled projection (:mod:`mracad.constraint.couple`) in place of the projection of each surface by
+itself.  Points that some other edge freezes stay, and the seam conditions are restored where that broke them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from mracad.bspline.knots import KnotVector
+from mracad.bspline.net import Net
+from mracad.constraint.couple import Coupling, Patch
+from mracad.constraint.frozen import Separation, jet_support, separate
+from mracad.constraint.seam import TRIMMED, UNEVEN, VARYING, Border, Seam, Treatment, Wishes, opening, seams
+from mracad.constraint.strip import Coarse, Direction, Line, Strip, line, members, strips
+from mracad.constraint.trimmed import TrimmedSeam, parted, trimmed
+from mracad.edit.bound import bounded
+from mracad.model import Model, Surface
+from mracad.options import Smooth, length
+from mracad.wavelet.ladder import ladder_for_scale, rungs_by_level
+
+Array = np.ndarray
+
+WIDER = 1e-6
+"""A seam may end up with so much more of a gap, mm; otherwise it is frozen."""
+
+STEEPER, SHARE = math.radians(0.01), 0.05
+"""A seam that was smooth may end up with so much more of an angle, and so much of that it had (a tilt that is carried
+turns with the faces); otherwise it is frozen."""
+
+MENDED, BENT = 0.1, math.radians(0.1)
+"""The same where defects are mended: beside points that stay, the shares that gap and angle may gain are these and the
+gap tolerance."""
+
+LEAST = 0.5
+"""A seam with less of the freedom of the smoother of its two sides is frozen."""
+
+
+@dataclass(frozen=True, eq=False)
+class Moved:
+    """A surface that moves together with others.
+
+    Attributes
+    ----------
+    net : Net
+        The surface, refined so that it can follow the others.
+    inserted : (ndarray, ndarray)
+        Knots inserted in u and v.
+    separation : Separation
+        On that net.
+    change, offset : ndarray (nu, nv, 3)
+        What the edit would do were nothing frozen, and what it does, mm.
+    """
+
+    net: Net
+    inserted: tuple[Array, Array]
+    separation: Separation
+    change: Array
+    offset: Array
+
+
+class Together:
+    """The surfaces of a model that move together.
+
+    Parameters
+    ----------
+    model : Model
+    movable : collection of int
+        Faces that the edit may move.
+    options : Smooth
+    spans : mapping of int to pair of ndarray
+        Arc lengths of the knot spans in u and v of each surface, mm.
+    creases : mapping of int to pair of frozenset
+        Crease lines of each surface.
+
+    Attributes
+    ----------
+    found : list of Seam
+    closing : set of int
+        Closing edges that need no condition.
+    frozen : dict of int to str
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        movable: Collection[int],
+        options: Smooth,
+        spans: Mapping[int, tuple[Array, Array]],
+        creases: Mapping[int, tuple[frozenset[float], frozenset[float]]],
+    ) -> None:
+        self.model, self.movable, self.options = model, movable, options
+        self.spans, self.creases = spans, creases
+        self.gap = length(options.gap_tolerance, model.diagonal, "gap-tolerance")
+        self.mending = options.close_gaps or options.fit_g1 is not None
+        self.trimmed: list[TrimmedSeam] = []
+        self.found: list[Seam] = []
+        self.closing: set[int] = set()
+        self.frozen: dict[int, str] = {}
+        if options.edges == "coupled":
+            wishes = Wishes(options.keep, math.radians(options.fit_g1 or 0.0), options.close_gaps)
+            self.found, self.closing, self.frozen = seams(model, movable, wishes)
+            self._try_trimmed(wishes)
+        self.freedom: dict[int, int] = {}
+        self.inserted: dict[int, tuple[Array, Array]] = {}
+
+    def _try_trimmed(self, wishes: Wishes) -> None:
+        """Let seams that cannot move exactly move to the gap tolerance."""
+        for index, reason in list(self.frozen.items()):
+            edge = self.model.edges[index]
+            if reason in (TRIMMED, UNEVEN, VARYING) and len(edge.sides) == 2:
+                seam = trimmed(self.model, edge, edge.sides, wishes)
+                if isinstance(seam, TrimmedSeam):
+                    self.trimmed.append(seam)
+                    del self.frozen[index]
+                else:
+                    self.frozen[index] = seam
+
+    @property
+    def moving(self) -> set[int]:
+        """Edges that move."""
+        exact = {edge for seam in self.found for edge in (seam.edge, seam.twin)}
+        return self.closing | exact | {seam.edge for seam in self.trimmed}
+
+    def treatments(self) -> tuple[Treatment, ...]:
+        """What was done about each edge of a movable face, in edge order."""
+        loose = {seam.edge for seam in self.trimmed}
+
+        def of(edge: int) -> Treatment:
+            faces = tuple(side.face for side in self.model.edges[edge].sides)
+            if edge in self.frozen:
+                return Treatment(edge, faces, "frozen", self.frozen[edge])
+            if edge in loose:
+                return Treatment(edge, faces, "to tolerance")
+            return Treatment(edge, faces, "coupled", freedom=self.freedom.get(edge, 0))
+
+        return tuple(of(edge) for edge in sorted(self.moving | set(self.frozen)))
+
+    def smoothed(self, scale: float | None, bound: float | None) -> dict[int, Moved]:
+        """Smooth the surfaces that coupled seams join; a seam that does not hold is frozen and the rest done again.
+
+        Parameters
+        ----------
+        scale : float or None
+            Wavelength, mm; None for the level of the options.
+        bound : float or None
+            On the displacement of any control point, mm.
+        """
+        while True:
+            lines = [(strip, line(strip, self._knots, self._lengths, self._creases)) for strip in self._strips()]
+            if not self._joined():
+                return {}
+            couplings = self._couplings(lines, scale)
+            broken = self._locked(couplings[0][1])
+            if not broken:
+                moved = self._moved(couplings, bound)
+                broken = self._broken(moved)
+            if not broken:
+                return moved
+            self._freeze(broken)
+
+    def _freeze(self, reasons: Mapping[int, str]) -> None:
+        self.frozen |= reasons
+        self.frozen |= {seam.twin: reasons[seam.edge] for seam in self.found if seam.edge in reasons}
+        self.found = [seam for seam in self.found if seam.edge not in reasons]
+        self.trimmed = [seam for seam in self.trimmed if seam.edge not in reasons]
+
+    def _knots(self, direction: Direction) -> KnotVector:
+        net = self.model.surfaces[direction[0]].net
+        return (net.u, net.v)[direction[1]]
+
+    def _lengths(self, direction: Direction) -> Array:
+        return self.spans[direction[0]][direction[1]]
+
+    def _creases(self, direction: Direction) -> frozenset[float]:
+        return self.creases[direction[0]][direction[1]]
+
+    def _strips(self) -> list[Strip]:
+        """Strips of all directions of the surfaces that seams join; seams that contradict are frozen."""
+        while True:
+            found, refused = strips(self.found, self._knots)
+            if not refused:
+                break
+            self._freeze(refused)
+        there = {m for strip in found for m in strip.members}
+        lone = [(i, axis) for i in self._joined() for axis in (0, 1) if (i, axis) not in there]
+        return found + [Strip({direction: (1.0, 0.0)}) for direction in lone]
+
+    def _joined(self) -> list[int]:
+        every: list[Seam | TrimmedSeam] = [*self.found, *self.trimmed]
+        return sorted({side.surface for seam in every for side in (seam.a, seam.b)})
+
+    def _couplings(self, lines: list[tuple[Strip, Line]], scale: float | None) -> list[tuple[float, Coupling]]:
+        """Coupled projections to blend and their weights; all on the same nets."""
+        if scale is not None:
+            steps = [(1.0, [_at_scale(each, scale) for _, each in lines])]
+        else:
+            steps = _at_level([each for _, each in lines], self.options.level or 0.0)
+        coarse = [self._members(lines, knots) for _, knots in steps]
+        self.inserted = {
+            i: (_union([c[i, 0].inserted for c in coarse]), _union([c[i, 1].inserted for c in coarse]))
+            for i in self._joined()
+        }
+        nets = {i: self.model.surfaces[i].net.refined(*inserted) for i, inserted in self.inserted.items()}
+        return [
+            (weight, Coupling({i: self._patch(i, nets[i], (c[i, 0], c[i, 1])) for i in nets}, self.found, self.trimmed))
+            for (weight, _), c in zip(steps, coarse, strict=True)
+        ]
+
+    def _locked(self, coupling: Coupling) -> dict[int, str]:
+        """Seams whose conditions leave too little freedom; counts the freedom of all."""
+        result = {}
+        for number, seam in enumerate(self.found):
+            whole = min(self._functions(coupling.patches[b.surface].base, b) for b in (seam.a, seam.b))
+            degrees = {coupling.patches[b.surface].base[1 - b.axis].degree for b in (seam.a, seam.b)}
+            plain = len(degrees) == 1 and not seam.joint.varying
+            self.freedom[seam.edge] = whole if plain else coupling.freedom(number)
+            if self.freedom[seam.edge] < LEAST * whole:
+                result[seam.edge] = f"would lock ({self.freedom[seam.edge]} of {whole} degrees of freedom)"
+        return result
+
+    @staticmethod
+    def _functions(base: tuple[KnotVector, KnotVector], border: Border) -> int:
+        """Coarse functions that a border depends on."""
+        knots = base[1 - border.axis]
+        low, high = sorted((border.start, border.stop))
+        inside = (knots.breaks > low) & (knots.breaks < high)
+        return min(int(knots.multiplicities[inside].sum()) + knots.degree + 1, knots.count)
+
+    def _moved(self, couplings: list[tuple[float, Coupling]], bound: float | None) -> dict[int, Moved]:
+        coupling = couplings[0][1]
+        nets = {i: patch.net for i, patch in coupling.patches.items()}
+        change: dict[int, Array] = {}
+        for weight, each in couplings:
+            for i, delta in each.displacement().items():
+                change[i] = weight * delta + change.get(i, 0.0)
+        separations = {i: self._separated(self.model.surfaces[i], net, self.moving) for i, net in nets.items()}
+        free = {i: s.free for i, s in separations.items()}
+        amount = self.options.amount
+        offsets = coupling.held({i: amount * x for i, x in change.items()}, free, amount)
+        if bound is not None:
+            offsets = coupling.held({i: bounded(x, bound) for i, x in offsets.items()}, free, amount)
+            largest = max(float(np.linalg.norm(x, axis=-1).max()) for x in offsets.values())
+            offsets = {i: min(1.0, bound / max(largest, 1e-300)) * x for i, x in offsets.items()}
+        return {i: Moved(net, self.inserted[i], separations[i], change[i], offsets[i]) for i, net in nets.items()}
+
+    def _members(self, lines: list[tuple[Strip, Line]], coarse: list[KnotVector]) -> dict[Direction, Coarse]:
+        """Coarse knots and knots to insert of every direction."""
+        found = (
+            members(strip, each, knots, self._knots, self._creases)
+            for (strip, each), knots in zip(lines, coarse, strict=True)
+        )
+        return {direction: vectors for part in found for direction, vectors in part.items()}
+
+    def _patch(self, surface: int, net: Net, coarse: tuple[Coarse, Coarse]) -> Patch:
+        near = np.zeros(coarse[0].base.count, bool), np.zeros(coarse[1].base.count, bool)
+        for seam in self.found:
+            for border in (seam.a, seam.b):
+                if border.surface == surface:
+                    near[border.axis][:] |= jet_support(coarse[border.axis].base, border.at, seam.joint.order)
+        base, lifted = (coarse[0].base, coarse[1].base), (coarse[0].lifted, coarse[1].lifted)
+        return Patch(net, base, lifted, near, self._area(surface))
+
+    def _separated(self, surface: Surface, net: Net, moving: Collection[int]) -> Separation:
+        faces = [self.model.faces[i] for i in surface.faces]
+        return separate(net, faces, [i for i in surface.faces if i in self.movable], self.options.keep, moving)
+
+    def _area(self, surface: int) -> float:
+        """Area per unit of the parameter plane."""
+        net = self.model.surfaces[surface].net
+        return math.prod(
+            float(lengths.sum()) / knots.period
+            for lengths, knots in zip(self.spans[surface], (net.u, net.v), strict=True)
+        )
+
+    def _broken(self, moved: Mapping[int, Moved]) -> dict[int, str]:
+        """Seams that are wider or steeper than they may be, and what is wrong with them."""
+        surfaces = list(self.model.surfaces)
+        for i, m in moved.items():
+            surfaces[i] = Surface(i, Net(m.net.u, m.net.v, m.net.poles + m.offset, m.net.weights), surfaces[i].faces)
+        after = self.model.with_surfaces(surfaces)
+        worst: dict[int, float] = {}
+        for loose in self.trimmed:
+            gap, angle = parted(after, loose.a, loose.b)
+            excess = gap / max(loose.gap, self.gap)
+            if loose.order:
+                excess = max(excess, angle / ((1 + SHARE) * loose.angle + STEEPER))
+            if excess > 1:
+                worst[loose.edge] = excess
+        if worst:
+            # what is far off spoils its neighbours: try again without it before judging them
+            limit = math.sqrt(max(worst.values()))
+            return {edge: f"{TRIMMED}: not within the tolerance" for edge, x in worst.items() if x >= limit}
+        result = {}
+        for seam in self.found:
+            gap, angle = opening(after, seam.a, seam.b)
+            wider = MENDED * seam.gap + self.gap if self.mending else WIDER
+            if gap > seam.gap + wider:
+                result[seam.edge] = "would gape"
+            elif seam.joint.order and angle > (1 + SHARE) * seam.angle + (BENT if self.mending else STEEPER):
+                result[seam.edge] = "would kink"
+        return result
+
+
+def _at_scale(line: Line, scale: float) -> KnotVector:
+    return ladder_for_scale(line.knots, line.lengths, scale, keep=line.kept)
+
+
+def _at_level(lines: list[Line], level: float) -> list[tuple[float, list[KnotVector]]]:
+    """Weights and coarse knots of the one or two levels to blend."""
+    ladders = [rungs_by_level(each.knots, keep=each.kept, lengths=each.lengths) for each in lines]
+    whole, part = int(level), level % 1.0
+    weights = [(1.0 - part, whole)] + ([(part, whole + 1)] if part else [])
+    return [(weight, [rungs[min(rung, len(rungs) - 1)] for rungs in ladders]) for weight, rung in weights]
+
+
+def _union(knots: list[Array]) -> Array:
+    """Knots of several lists, each as often as where it is most frequent."""
+    counts: dict[float, int] = {}
+    for each in knots:
+        for value, count in zip(*np.unique(each, return_counts=True), strict=True):
+            counts[float(value)] = max(counts.get(float(value), 0), int(count))
+    return np.sort(np.repeat(list(counts), list(counts.values()))) if counts else np.empty(0)

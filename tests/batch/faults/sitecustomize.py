@@ -1,0 +1,30 @@
+"""On the path of a process, this makes files whose text says so crash, hang or eat memory; or all work a mere sham."""
+
+import hashlib
+import os
+import signal
+import time
+
+from mracad.batch import work
+
+real = work.do
+
+
+def do(task):
+    if b"/* crash */" in task.data:
+        os.kill(os.getpid(), signal.SIGSEGV)
+    if b"/* hang */" in task.data:
+        time.sleep(600)
+    if b"/* eat */" in task.data:
+        eaten = []
+        while True:
+            eaten.append(b"x" * 20_000_000)
+    if not os.environ.get("SHAM"):
+        return real(task)
+    time.sleep(float(os.environ["SHAM"]))
+    return work.Product(hashlib.sha256(task.data).hexdigest().encode() * 2000, (), 0.0)
+
+
+work.do = do
+if os.environ.get("SHAM"):
+    work.warm = bool

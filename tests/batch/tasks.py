@@ -1,0 +1,33 @@
+"""A task that does what it is told."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+
+from mracad.errors import UsageError
+
+MB = 1_000_000
+
+
+def work(what: str) -> object:
+    if what == "crash":
+        os.kill(os.getpid(), signal.SIGSEGV)
+    elif what == "kill":
+        os.kill(os.getpid(), signal.SIGKILL)
+    elif what == "exit":
+        os._exit(3)
+    elif what == "hang":
+        time.sleep(60)
+    elif what == "eat":
+        eaten = []
+        while True:
+            eaten.append(b"x" * MB * 10)
+    elif what == "wrong":
+        raise UsageError("no", "do better")
+    elif what == "bug":
+        raise EOFError("of a file")
+    elif what == "print":
+        os.write(1, b"kernel chatter")
+    return what

@@ -1,0 +1,69 @@
+"""A task that ends its worker, oversteps a limit or fails costs itself alone."""
+
+from __future__ import annotations
+
+import os
+import time
+
+import pytest
+
+from mracad.batch.pool import CrashError, LimitError, Limits, Pool
+from mracad.errors import UsageError
+from tests.batch.tasks import MB, work
+
+
+def test_bad_tasks_cost_themselves_alone():
+    bad = {
+        "crash": (CrashError, "SIGSEGV"),
+        "kill": (CrashError, "killed"),
+        "exit": (CrashError, "exit code 3"),
+        "hang": (LimitError, "time limit of 2 s"),
+        "eat": (LimitError, "memory limit of 400 MB"),
+        "wrong": (UsageError, "no"),
+        "bug": (CrashError, "EOFError: of a file"),
+    }
+    with Pool(2, Limits(2.0, 400 * MB)) as pool:
+        futures = {f"{what} {i}": pool.submit(work, what) for i, what in enumerate([*bad, "print"])}
+        good = [pool.submit(work, "good") for _ in range(20)]
+        assert all(future.result() == "good" for future in good)
+        for name, future in futures.items():
+            what = name.split()[0]
+            if what in bad:
+                kind, text = bad[what]
+                error = future.exception()
+                assert isinstance(error, kind) and text in str(error), what
+            else:
+                assert future.result() == what
+
+
+def test_a_worker_does_one_task_after_another():
+    with Pool(1) as pool:
+        assert len({pool.submit(os.getpid).result() for _ in range(10)}) == 1
+
+
+def test_cancelling_ends_what_is_under_way():
+    pool = Pool(1)
+    futures = [pool.submit(work, "hang"), pool.submit(work, "good")]
+    time.sleep(0.5)
+    start = time.monotonic()
+    pool.shutdown(cancel_futures=True)
+    assert time.monotonic() - start < 5
+    assert futures[0].exception() and futures[1].cancelled()
+    with pytest.raises(RuntimeError):
+        pool.submit(work, "good")
+
+
+def test_ten_thousand_tasks_in_flight_do_not_slow_the_client():
+    with Pool(2) as pool:
+        for warm in [pool.submit(work, "good") for _ in range(20)]:
+            warm.result()
+
+        def each(count: int) -> float:
+            start = time.perf_counter()
+            for future in [pool.submit(work, "good") for _ in range(count)]:
+                future.result()
+            return (time.perf_counter() - start) / count
+
+        few, many = min(each(500) for _ in range(3)), each(10_000)
+    print(f"each of 500: {few * 1e3:.2f} ms, each of 10000: {many * 1e3:.2f} ms")
+    assert many < 3 * few

@@ -1,0 +1,207 @@
+"""Seams that move: how close a panel of patches comes to the unsplit surface, and what holds along its seams."""
+
+import io
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mracad import job
+from mracad.audit.continuity import seams
+from mracad.bspline.knots import KnotVector
+from mracad.bspline.net import Net
+from mracad.edit.smooth import smooth
+from mracad.occ.read import read_step
+from mracad.occ.view import view
+from mracad.occ.write import write_step
+from mracad.options import Smooth
+from mracad.wavelet.ladder import arc_lengths, ladder_for_scale, rungs_by_level
+from mracad.wavelet.project import projection
+from tests.edit import panels
+
+SPANS, NOISE = 32, 0.3
+TURNS = ["", "u", "v", "x", "uv", "ux", "vx", "uvx"]
+
+
+def ideal(noisy, shape, keep="g1", level=None, scale=None):
+    """The unsplit surface smoothed on a ladder that keeps the seam knots, its outer rows frozen."""
+    coarse = []
+    for axis, (knots, count) in enumerate(zip((noisy.u, noisy.v), shape, strict=True)):
+        kept, lengths = frozenset(panels.SIZE * np.arange(1, count)), arc_lengths(noisy, axis)
+        if scale is None:
+            coarse.append(rungs_by_level(knots, keep=kept, lengths=lengths)[level])
+        else:
+            coarse.append(ladder_for_scale(knots, lengths, float(scale), keep=kept))
+    poles = projection(coarse[1], noisy.v).apply(projection(coarse[0], noisy.u).apply(noisy.poles, 0), 1)
+    rows = int(keep[1]) + 1
+    free = np.zeros(poles.shape[:2], bool)
+    free[rows:-rows, rows:-rows] = True
+    return Net(noisy.u, noisy.v, np.where(free[..., None], poles, noisy.poles))
+
+
+def reference(clean, noisy, shape, **options):
+    """How far the ideal is from the truth, mm."""
+    return panels.rms(
+        {k: p.net for k, p in panels.cut(ideal(noisy, shape, **options), shape).items()},
+        panels.cut(noisy, shape),
+        clean,
+    )
+
+
+def edited(patches, **options):
+    """The model of patches after smoothing, written and read again, and what was done about its edges."""
+    document = panels.document(patches)
+    report = job.run(document, smooth, Smooth(**options))
+    stream = io.BytesIO()
+    write_step(document, stream)
+    model = view(read_step(io.BytesIO(stream.getvalue())))
+    assert report.valid_after.valid and report.valid_after.edge_tolerance <= 1.001e-7
+    return model, report
+
+
+def error(model, patches, clean):
+    return panels.rms(dict(zip(sorted(patches), (s.net for s in model.surfaces), strict=True)), patches, clean)
+
+
+def coupled(report):
+    return sum(t.how == "coupled" for t in report.edit.edges)
+
+
+def holds(model):
+    measures = seams(model)
+    return max(m.gap for m in measures), max(m.angle for m in measures)
+
+
+@pytest.mark.parametrize(("shape", "limits"), [((2, 3), (1.15, 1.05)), ((4, 4), (1.3, 1.15))])
+@pytest.mark.parametrize("level", [2, 3])
+def test_patches_come_close_to_the_unsplit_surface(shape, limits, level):
+    clean, noisy = panels.whole(SPANS, NOISE, patches=shape)
+    patches = panels.cut(noisy, shape)
+    ratios = {}
+    for keep in ("g1", "g2"):
+        model, report = edited(patches, level=level, keep=keep)
+        gap, angle = holds(model)
+        ratios[keep] = error(model, patches, clean) / reference(clean, noisy, shape, keep=keep, level=level)
+        assert coupled(report) == (shape[0] - 1) * shape[1] + shape[0] * (shape[1] - 1)
+        assert gap <= 1e-9 and angle <= 1e-5
+    frozen, _ = edited(patches, level=level, edges="frozen")
+    ratios["frozen"] = error(frozen, patches, clean) / reference(clean, noisy, shape, level=level)
+    print(f"{shape} patches, {SPANS >> level} coarse spans: " + ", ".join(f"{k} {r:.3f}" for k, r in ratios.items()))
+    assert ratios["g1"] <= limits[0] and ratios["g2"] <= limits[1]
+
+
+def other_knots(patches):
+    """Every second patch with knots of its own."""
+    rng = np.random.default_rng(7)
+    return {
+        k: panels.refined(p, *(rng.uniform(low + 1, high - 1, 9) for low, high in p.frame)) if sum(k) % 2 else p
+        for k, p in patches.items()
+    }
+
+
+def other_senses(patches):
+    """Patches whose parameters run all eight ways."""
+    return {k: panels.turned(p, TURNS[(3 * k[0] + 5 * k[1]) % 8]) for k, p in patches.items()}
+
+
+def other_degrees(patches):
+    """Every second patch of degree 4 in both directions."""
+    return {
+        k: replace(p, net=panels.elevated(panels.elevated(p.net, 0), 1)) if sum(k) % 2 else p
+        for k, p in patches.items()
+    }
+
+
+@pytest.mark.parametrize(
+    ("change", "level"), [(other_senses, 2), (other_senses, 3), (other_degrees, 2), (other_knots, 2)]
+)
+def test_patches_that_differ_come_close_as_well(change, level):
+    shape = (2, 3)
+    clean, noisy = panels.whole(SPANS, NOISE, patches=shape)
+    patches = change(panels.cut(noisy, shape))
+    ratios = {}
+    for keep in ("g1", "g2"):
+        options = {"keep": keep} | ({"scale": "16"} if change is other_knots else {"level": level})
+        model, report = edited(patches, **options)
+        ratios[keep] = error(model, patches, clean) / reference(clean, noisy, shape, **options)
+        gap, angle = holds(model)
+        assert coupled(report) == 7
+        assert gap <= 1e-9 and angle <= 1e-5
+        least = min(net.u.count for net in (s.net for s in model.surfaces))
+        assert all(t.freedom >= min(least, SPANS // 2**level + 3) for t in report.edit.edges if t.how == "coupled")
+    print(f"{change.__name__}, level {level}: " + ", ".join(f"{k} {r:.3f}" for k, r in ratios.items()))
+    assert ratios["g1"] <= 1.15 and ratios["g2"] <= 1.05
+
+
+def skewed(noise, skew):
+    """Two patches S and T (quartic along the seam) with T(0, v) = S(0, v), T_u = −(1 + skew v) S_u; u, v in 0…1."""
+    rng = np.random.default_rng(5)
+    breaks = np.linspace(0, 1, SPANS + 1)
+    u, v = KnotVector.clamped(breaks, 3), KnotVector.clamped(breaks, 3)
+    quartic = KnotVector.from_multiplicities(v.breaks, v.multiplicities + 1, 4)
+    x, y = np.meshgrid(u.greville(), v.greville(), indexing="ij")
+    s = np.stack([-panels.SIZE * x, panels.SIZE * y, panels.truth(-panels.SIZE * x, panels.SIZE * y)], axis=-1)
+    s = s + noise * rng.standard_normal(s.shape)
+    at = quartic.greville()
+    first = -(s[1] - s[0]) * u.degree / u.breaks[1]
+    trace = panels.interpolated(quartic, at, panels.values(v, at) @ s[0])
+    slope = panels.interpolated(quartic, at, (1 + skew * at)[:, None] * (panels.values(v, at) @ first))
+    x, y = np.meshgrid(u.greville(), at, indexing="ij")
+    way = panels.SIZE * x * (1 + skew * y)
+    t = np.stack([way, panels.SIZE * y, panels.truth(way, panels.SIZE * y)], axis=-1)
+    t = t + noise * rng.standard_normal(t.shape)
+    t[0], t[1] = trace, trace + slope * u.breaks[1] / u.degree
+    return Net(u, v, s), Net(u, quartic, t)
+
+
+def test_a_joint_of_varying_ratio():
+    grid = np.stack(np.meshgrid(np.linspace(0, 1, 60), np.linspace(0, 1, 60), indexing="ij"), -1).reshape(-1, 2)
+    figures = {}
+    for skew in (0.5, 0.0):
+        clean, noisy = skewed(0.0, skew), skewed(NOISE, skew)
+        for edges in ("coupled", "frozen"):
+            document = panels.pair(*noisy)
+            report = job.run(document, smooth, Smooth(level=2, edges=edges))
+            model = view(document)
+            apart = [s.net.evaluate(grid) - c.evaluate(grid) for s, c in zip(model.surfaces, clean, strict=True)]
+            figures[skew, edges] = np.sqrt(np.mean(np.concatenate(apart) ** 2))
+            gap, angle = holds(model)
+            assert gap <= 1e-9 and angle <= 1e-5
+            if edges == "coupled":
+                (seam,) = [t for t in report.edit.edges if t.how == "coupled"]
+                print(f"ratio 1 + {skew} v: {seam.freedom} degrees of freedom on the seam")
+                assert seam.freedom >= SPANS // 4 + 3
+    print(", ".join(f"ratio 1 + {skew} v {edges}: {v:.4f} mm" for (skew, edges), v in figures.items()))
+    assert figures[0.5, "coupled"] < figures[0.5, "frozen"]
+
+
+def torn(patches, sewn):
+    """Patches of which one is a little too high and another tilted, as a document; or as faces of their own."""
+    moved = {}
+    for k, patch in patches.items():
+        poles = patch.net.poles.copy()
+        if k == (0, 1):
+            poles[..., 2] += 4e-3
+        if k == (1, 0):
+            poles[1, :, 2] += 6e-3
+        moved[k] = replace(patch, net=Net(patch.net.u, patch.net.v, poles))
+    return panels.document(moved, sewn)
+
+
+@pytest.mark.parametrize("sewn", [True, False])
+def test_defects_are_carried_or_mended(sewn):
+    _, noisy = panels.whole(24, 0.05, patches=(2, 2))
+    patches = panels.cut(noisy, (2, 2))
+    before = seams(view(torn(patches, sewn)))
+    gap, angle = max(m.gap for m in before), max(m.angle for m in before)
+    assert gap > 3e-3 and 0.05 < angle < 1
+    for options in ({}, {"close_gaps": True}, {"fit_g1": 1.0}, {"close_gaps": True, "fit_g1": 1.0}):
+        document = torn(patches, sewn)
+        report = job.run(document, smooth, Smooth(level=1, **options))
+        assert coupled(report) == (4 if sewn else 8)
+        now = seams(view(document))
+        wider, steeper = (0.1, 0.1) if options else (0.01, 0.01)
+        assert all(a.gap <= (1 + wider) * b.gap + 1e-4 for b, a in zip(before, now, strict=True))
+        assert all(a.angle <= 1.05 * b.angle + steeper for b, a in zip(before, now, strict=True))
+        inner = [np.median([getattr(m, name) for m in now]) for name in ("mean_gap", "mean_angle")]
+        print(f"sewn {sewn}, {options}: mean gap {inner[0]:.1e} mm, mean angle {inner[1]:.1e}°")
