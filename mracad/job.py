@@ -165,10 +165,10 @@ def compare(document: Document, options: Compare, original: Original | None = No
     UsageError
         When there is neither.
     """
-    from mracad.occ.read import read_step
+    from mracad.occ.files import read
 
     if options.reference:
-        reference = read_step(options.reference)
+        reference = read(options.reference, options.reference_unit)
     elif original:
         reference = original()
     else:

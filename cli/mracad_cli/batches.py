@@ -42,7 +42,8 @@ def run_batch(
     keep_going: bool,
     retry: int,
     input_unit: str | None,
-    schema: str,
+    format: str | None,
+    schema: str | None,
     overwrite: bool,
     if_changed: bool,
     record: bool,
@@ -53,12 +54,14 @@ def run_batch(
     as_json: bool,
 ) -> int:
     """Take many files through a recipe; see :mod:`mracad_cli.commands.batch` for the parameters."""
-    settings = Settings(input_unit, schema.upper(), overwrite, if_changed, record, retry, fail_fast=not keep_going)
+    settings = Settings(
+        input_unit, (schema or "").upper(), overwrite, if_changed, record, retry, fail_fast=not keep_going
+    )
     limits = Limits(duration(time_limit, "time-limit"), size(memory_limit) if memory_limit else 0)
     for path in filter(None, (report, junit, depfile)):
         check_target(Path(path), overwrite=True)
     words = [word for given in sources for word in (sys.stdin.read().splitlines() if given == "-" else [given]) if word]
-    items = find(words, Path(folder))
+    items = find(words, Path(folder), format or "")
     steps = recipe.steps(items[0].source)
     if dry_run:
         for line in [*plan(steps), *(f"{item.source} -> {Path(folder, item.output)}" for item in items)]:

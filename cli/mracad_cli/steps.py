@@ -80,7 +80,6 @@ def run_steps(
         from mracad import job
 
         def original() -> Document:
-            text.seek(0)
             return read(text, input_unit)
 
         results = job.play(document, steps, original=original, progress=progress, apply=not dry_run)

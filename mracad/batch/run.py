@@ -16,10 +16,10 @@ from mracad.batch.cluster import lost
 from mracad.batch.manifest import UNFINISHED, Manifest, digest
 from mracad.batch.work import Product, Work, do
 from mracad.errors import Code, FileError, MracadError, UsageError
+from mracad.formats import FORMATS, READABLE, by_ending
 from mracad.output import put
 from mracad.recipe import Recipe, record_of
 
-ENDINGS = frozenset({".step", ".stp", ".p21"})
 AHEAD = 2
 """Files given to the executor for each of its workers: enough that none waits, few enough to hold in memory."""
 
@@ -31,10 +31,11 @@ Status = Literal["done", "unchanged", "failed", "not tried"]
 
 @dataclass(frozen=True)
 class Item:
-    """One file of a batch, and its output relative to the output folder."""
+    """One file of a batch, its output relative to the output folder, and the format of that."""
 
     source: str
     output: str
+    format: str = "step"
 
 
 @dataclass(frozen=True)
@@ -45,6 +46,7 @@ class Settings:
     ----------
     input_unit : str or None
     schema : str
+        Of STEP files; by default AP242 for a file in AP242, else AP214.
     overwrite : bool
         Replace files in the output folder that no batch has made.
     if_changed : bool
@@ -58,7 +60,7 @@ class Settings:
     """
 
     input_unit: str | None = None
-    schema: str = "AP214"
+    schema: str = ""
     overwrite: bool = False
     if_changed: bool = False
     record: bool = False
@@ -108,16 +110,16 @@ class Workers(Protocol):
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None: ...
 
 
-def find(words: Iterable[str], folder: Path) -> list[Item]:
-    """The files of a batch from paths, folders (all STEP files below them) and patterns.
+def find(words: Iterable[str], folder: Path, format: str = "") -> list[Item]:
+    """The files of a batch from paths, folders (all models below them) and patterns.
 
-    Outputs have the names of their inputs; those of a folder keep their place below it.  What lies in the output
-    folder is not taken for an input.
+    Outputs have the names of their inputs, with the ending of ``format`` where that is given; those of a folder keep
+    their place below it.  What lies in the output folder is not taken for an input.
 
     Raises
     ------
     FileError
-        When a folder or pattern holds no STEP file.
+        When a folder or pattern holds no model.
     UsageError
         When two inputs would be written to the same output.
     """
@@ -127,6 +129,8 @@ def find(words: Iterable[str], folder: Path) -> list[Item]:
         for source, output in _expanded(word):
             if Path(source).resolve().is_relative_to(own):
                 continue
+            if format:
+                output = str(Path(output).with_suffix(FORMATS[format].endings[0]))
             if found.get(output, source) != source:
                 raise UsageError(
                     f"'{found[output]}' and '{source}' would both be written to '{folder / output}'",
@@ -134,21 +138,26 @@ def find(words: Iterable[str], folder: Path) -> list[Item]:
                 )
             found[output] = source
     if not found:
-        raise FileError("there is nothing to do: no STEP files", "give files, folders or patterns")
-    return [Item(source, output) for output, source in found.items()]
+        raise FileError("there is nothing to do: no models", "give files, folders or patterns")
+    return [Item(source, output, format or _format(output)) for output, source in found.items()]
+
+
+def _format(output: str) -> str:
+    """What a file is written as: what it was read from, as far as its name tells."""
+    return by_ending(output).name if Path(output).suffix.lower() in READABLE else "step"
 
 
 def _expanded(word: str) -> list[tuple[str, str]]:
     """The files that a word on the command line means, each with its output."""
     if Path(word).is_dir():
-        files = sorted(path for path in Path(word).rglob("*") if path.suffix.lower() in ENDINGS)
+        files = sorted(path for path in Path(word).rglob("*") if path.suffix.lower() in READABLE)
         pairs = [(str(path), str(path.relative_to(word))) for path in files]
     elif glob.has_magic(word) and not Path(word).exists():
         pairs = [(path, Path(path).name) for path in sorted(glob.glob(word, recursive=True))]
     else:
         return [(word, Path(word).name)]
     if not pairs:
-        raise FileError(f"no STEP files in '{word}'", f"they end in {', '.join(sorted(ENDINGS))}")
+        raise FileError(f"no models in '{word}'", f"they end in {', '.join(sorted(READABLE))}")
     return pairs
 
 
@@ -221,7 +230,14 @@ class _Batch:
         except MracadError as error:
             return _failed(item, error)
         work = Work(
-            Path(item.source).name, data, steps, self.settings.input_unit, self.settings.schema, files, self._epoch
+            Path(item.source).name,
+            data,
+            steps,
+            self.settings.input_unit,
+            item.format,
+            self.settings.schema,
+            files,
+            self._epoch,
         )
         key = self._key(work)
         if self.manifest.done(item.output, key):
@@ -259,7 +275,9 @@ class _Batch:
         """A hash of everything that the output depends on."""
         files = {Path(name).name: digest(data) for name, data in work.files.items()}
         parts = [work.name, digest(work.data), record_of(work.steps), files]
-        return digest(json.dumps([*parts, work.input_unit, work.schema, work.epoch], sort_keys=True).encode())
+        return digest(
+            json.dumps([*parts, work.input_unit, work.format, work.schema, work.epoch], sort_keys=True).encode()
+        )
 
     def _written(self, task: _Task, product: Product) -> Outcome:
         output = task.item.output

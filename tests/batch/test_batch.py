@@ -145,7 +145,7 @@ def test_inputs_are_files_folders_patterns_and_lists(tmp_path):
     ]  # fmt: skip
     assert len(find([f"{folder}/part*.step", str(folder / "part000.step")], out)) == 3
     assert find([str(folder)], folder / "sub")[-1].output == "part002.step"
-    with pytest.raises(FileError, match="no STEP files in"):
+    with pytest.raises(FileError, match="no models in"):
         find([f"{folder}/*.stp"], out)
     (tmp_path / "part000.step").write_text("other")
     with pytest.raises(UsageError, match="would both be written"):

@@ -7,9 +7,8 @@ from mracad.audit.continuity import seams
 from mracad.edit.smooth import smooth
 from mracad.occ.apply import apply
 from mracad.occ.check import check
-from mracad.occ.read import read_step
+from mracad.occ.step import read_step, write_step
 from mracad.occ.view import view
-from mracad.occ.write import write_step
 from mracad.options import Smooth
 from mracad.wavelet.ladder import ladder_for_scale
 from mracad.wavelet.project import projection

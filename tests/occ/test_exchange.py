@@ -143,7 +143,7 @@ def test_nothing_is_printed(wavy, tmp_path, capfd):
     document = occ.read_step(wavy)
     occ.check(document, distances=True)
     occ.write_step(document, tmp_path / "out.step")
-    occ.write_stl(document, tmp_path / "out.stl")
+    occ.write(document, tmp_path / "out.stl")
     with pytest.raises(FileError):
         occ.read_step(shapes.save(shapes.compound(), tmp_path / "none.step"))
     captured = capfd.readouterr()

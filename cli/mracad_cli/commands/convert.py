@@ -1,4 +1,4 @@
-"""Write a STEP file again in another schema, or as a mesh (STL)."""
+"""Write a model in another format: STEP, IGES, BREP, BinBREP, or as a mesh (STL, 3MF, OBJ, PLY, glTF)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Say what is in a STEP file: units, products, faces, scales, seams, validity."""
+"""Say what is in a model: units, products, faces, scales, seams, validity."""
 
 from __future__ import annotations
 
