@@ -126,6 +126,13 @@ class Selection(Options, frozen=True, kw_only=True, forbid_unknown_fields=True):
             "cq:'>Z'; !SEL excludes. Default: all NURBS faces."
         ),
     ] = ()
+    instance: Annotated[
+        str | None,
+        Meta(
+            description="Edit one instance of a part that stands in several places, as plate/bolt#2 (see info --all); "
+            "it becomes a part of its own. Default: a part is edited, wherever it stands."
+        ),
+    ] = None
     hold: Annotated[
         tuple[str, ...],
         Meta(description="Faces and edges (edge#4) that must not move; same selectors as --faces."),

@@ -15,7 +15,7 @@ from mracad.options import Length, dashed, plain_types
 
 Command = Callable[..., Any]
 
-SHORT = {"faces": "SEL", "hold": "SEL", "max_angle": "DEG", "kink": "DEG", "fit_g1": "DEG"}
+SHORT = {"faces": "SEL", "instance": "PATH", "hold": "SEL", "max_angle": "DEG", "kink": "DEG", "fit_g1": "DEG"}
 """Placeholders in the help."""
 
 

@@ -97,6 +97,8 @@ class Document:
         ``"AP203"``, ``"AP214"``, ``"AP242"``, ``"IGES"``, ``"BREP"``, ``"BinBREP"`` or ``""``.
     conversions : dict
         Surfaces made by ``view(document, convert=…)``, by face index, for ``apply``.
+    origins : dict
+        The label (its key) of each product that ``isolate`` made, and of the one that it was copied from.
     """
 
     xcaf: TDocStd_Document
@@ -104,6 +106,7 @@ class Document:
     units: Units = field(default_factory=Units)
     schema: str = ""
     conversions: dict[int, Conversion] = field(default_factory=dict)
+    origins: dict[str, str] = field(default_factory=dict)
 
     def checked(self) -> Document:
         """The document, if it has faces, all on surfaces; raises FileError."""
