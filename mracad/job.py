@@ -237,6 +237,8 @@ def run(
     held = select(model, options.hold, nurbs, cadquery).faces if options.hold else frozenset()
     if own is not None:
         chosen, held = (frozenset(own[face] for face in faces & own.keys()) for faces in (chosen, held))
+        if options.faces and not chosen:
+            raise UsageError(f"no selected face is in '{options.instance}'", "leave out --faces, or select others")
     convertible = {i for i in chosen - held if model.faces[i].surface is None}
     if convertible:
         model = view(document, convert=convertible)

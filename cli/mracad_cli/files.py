@@ -15,6 +15,7 @@ from mracad.formats import FORMATS, by_ending
 
 if TYPE_CHECKING:
     from mracad.occ.document import Document
+    from mracad.occ.files import Lost
     from mracad.occ.load import Text
 
 
@@ -85,6 +86,7 @@ class Outputs:
         self.paths, self.schema = paths, (schema or "").upper()
         self.overwrite, self.if_changed = overwrite or if_changed, if_changed
         self.chord, self.angle, self.ascii_stl = chord, angle, ascii_stl
+        self.lost: dict[str, tuple[Lost, ...]] = {}
         self._sizes: list[str] = []
         if len(set(paths)) < len(paths):
             raise UsageError("the same output is named twice", "give each -o once")
@@ -96,18 +98,17 @@ class Outputs:
         """Refuse a report that could not be written."""
         check_target(Path(path), self.overwrite)
 
-    def write(self, document: Document, title: str) -> dict[str, bytes]:
-        """Write the document to every output; none is replaced unless all could be made.  Returns what was written."""
+    def write(self, document: Document, title: str) -> None:
+        """Write the document to every output; none is replaced unless all could be made."""
         from mracad.occ.files import write
         from mracad.output import beside, holds
 
         meshed = any(format.kind == "mesh" for format in self.formats.values())
         chord = self._chord(document) if meshed else None
         made: dict[str, bytes] = {}
-        missing: tuple[int, ...] = ()
         for path, format in self.formats.items():
             stream = io.BytesIO()
-            missing += write(
+            lost = write(
                 document,
                 stream,
                 format.name,
@@ -118,6 +119,7 @@ class Outputs:
                 options_text=title,
             )
             made[path] = stream.getvalue()
+            self.lost[self._name(path)] = lost
         with contextlib.ExitStack() as stack:
             for path, data in made.items():
                 if path != "-" and not (self.if_changed and holds(Path(path), data)):
@@ -125,10 +127,10 @@ class Outputs:
         if "-" in made:
             sys.stdout.buffer.write(made["-"])
             sys.stdout.buffer.flush()
-        for face in sorted(set(missing)):
-            warn(f"{document.name}: #{face + 1} cannot be meshed: the mesh has a hole there")
+        for name, lost in self.lost.items():
+            if lost:
+                print(f"warning: {name} lacks {', '.join(map(str, lost))}", file=sys.stderr)
         self._sizes = [f"{self._name(path)}, {_size(len(data))}" for path, data in made.items()]
-        return made
 
     def _chord(self, document: Document) -> float:
         """The chord in millimetres; it may be a share of the diagonal."""
@@ -158,11 +160,6 @@ class Outputs:
     @staticmethod
     def _name(path: str) -> str:
         return "standard output" if path == "-" else Path(path).name
-
-
-def warn(line: str) -> None:
-    """Say something that the user should know beside the result."""
-    print(f"warning: {line}", file=sys.stderr)
 
 
 def _size(count: int) -> str:

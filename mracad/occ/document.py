@@ -95,8 +95,12 @@ class Document:
     units : Units
     schema : str
         ``"AP203"``, ``"AP214"``, ``"AP242"``, ``"IGES"``, ``"BREP"``, ``"BinBREP"`` or ``""``.
+    annotations : dict
+        The names of the dimensions, tolerances, datums and notes that the file states, by these words.
     conversions : dict
         Surfaces made by ``view(document, convert=…)``, by face index, for ``apply``.
+    moved : set of str
+        The labels (their keys) of the parts that an edit has changed.
     origins : dict
         The label (its key) of each product that ``isolate`` made, and of the one that it was copied from.
     """
@@ -105,7 +109,9 @@ class Document:
     name: str
     units: Units = field(default_factory=Units)
     schema: str = ""
+    annotations: dict[str, tuple[str, ...]] = field(default_factory=dict)
     conversions: dict[int, Conversion] = field(default_factory=dict)
+    moved: set[str] = field(default_factory=set)
     origins: dict[str, str] = field(default_factory=dict)
 
     def checked(self) -> Document:
@@ -163,6 +169,10 @@ class Document:
     def faces(self) -> list[TopoDS_Face]:
         """All faces, in their part's frame, in the order of ``Model.faces``."""
         return [TopoDS.Face_s(part.faces.FindKey(i)) for part in self.parts for i in range(1, part.faces.Extent() + 1)]
+
+    def part_of(self, face: int) -> Part:
+        """The part that a face belongs to."""
+        return next(part for part in reversed(self.parts) if part.first <= face)
 
     @cached_property
     def edges(self) -> list[TopoDS_Edge]:

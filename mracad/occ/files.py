@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
 
@@ -11,6 +12,31 @@ from mracad.formats import FORMATS, by_content, by_ending
 from mracad.occ.document import Document
 from mracad.occ.load import load
 from mracad.output import put
+
+
+@dataclass(frozen=True)
+class Lost:
+    """What a written file lacks.
+
+    Attributes
+    ----------
+    what : str
+        ``"faces"``, which the kernel could not mesh; ``"dimensions"``, ``"tolerances"``, ``"datums"`` or ``"notes"``.
+    stated, written : int
+        How many there were, and are.
+    names : tuple of str
+        Of the faces that are missing; of all such annotations, since the kernel does not keep their names.
+    """
+
+    what: str
+    stated: int
+    written: int
+    names: tuple[str, ...]
+
+    def __str__(self) -> str:
+        names = list(dict.fromkeys(name for name in self.names if name))
+        shown = ", ".join(names[:3]) + (" …" if len(names) > 3 else "")
+        return f"{self.stated - self.written} of {self.stated} {self.what}" + (f" ({shown})" if shown else "")
 
 
 def read(source: str | os.PathLike | BinaryIO, input_unit: str | None = None) -> Document:
@@ -54,7 +80,7 @@ def write(
     angle: float | None = None,
     ascii: bool = False,
     options_text: str = "",
-) -> tuple[int, ...]:
+) -> tuple[Lost, ...]:
     """Write a document, whole or not at all; the same bytes every time.
 
     Parameters
@@ -74,8 +100,8 @@ def write(
 
     Returns
     -------
-    tuple of int
-        Faces that the kernel could not mesh: a mesh has holes there.
+    tuple of Lost
+        What could not be written: faces of a mesh, annotations of an exact model.
 
     Raises
     ------
@@ -90,7 +116,7 @@ def write(
     if format not in FORMATS:
         raise UsageError(f"unknown format '{format}'", "use one of " + ", ".join(FORMATS))
     name = Path(target).name if named else document.name  # type: ignore[arg-type]
-    missing: tuple[int, ...] = ()
+    lost: tuple[Lost, ...] = ()
     if format == "step":
         from mracad.occ.step import step
 
@@ -109,5 +135,14 @@ def write(
 
         seen, missing = scene(document, chord, angle)
         data = write_mesh(seen, format, ascii)
+        if missing:
+            count, names = len(document.faces), tuple(f"#{face + 1}" for face in missing)
+            lost = (Lost("faces", count, count - len(missing), names),)
+    if FORMATS[format].kind == "exact" and document.annotations:
+        from mracad.occ.part21 import pmi
+
+        kept = pmi(data) if format == "step" else {}
+        counts = {what: (names, len(kept.get(what, ()))) for what, names in document.annotations.items()}
+        lost = tuple(Lost(what, len(ns), count, ns) for what, (ns, count) in counts.items() if count < len(ns))
     put(data, target)
-    return missing
+    return lost

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from OCP.IFSelect import IFSelect_RetDone
+from OCP.IGESBasic import IGESBasic_Name
 from OCP.IGESCAFControl import IGESCAFControl_Reader, IGESCAFControl_Writer
 from OCP.IGESControl import IGESControl_Controller
 from OCP.IGESData import IGESData_IGESEntity, IGESData_IGESModel, IGESData_IGESWriter
@@ -24,7 +25,6 @@ from mracad.occ.settings import all_digits, exchange, moment, quiet
 from mracad.occ.units import UNITS, Units, named
 
 _FLAGS = {1: "in", 2: "mm", 4: "ft", 5: "mi", 6: "m", 7: "km", 8: "mil", 9: "um", 10: "cm", 11: "uin"}
-_PROPERTY = 406  # the type of entity that holds a name
 _MODES = ("Name", "Color", "Layer")
 
 
@@ -114,18 +114,26 @@ def _refuse_torn(text: bytes, name: str) -> None:
 
 
 def _names_in_order(model: IGESData_IGESModel) -> None:
-    """Put the names in the order of what they name: the kernel adds them by address, another order in each process."""
-    entities = [model.Value(i) for i in range(1, model.NbEntities() + 1)]
-    owner: dict[IGESData_IGESEntity, int] = {}
-    for number, entity in enumerate(entities):
+    """Let names come in the order of what they name: the kernel adds them by address, another order in each process."""
+    owners: dict[IGESBasic_Name, list[IGESData_IGESEntity]] = {}
+    names = []
+    for number in range(1, model.NbEntities() + 1):
+        entity = model.Value(number)
+        if isinstance(entity, IGESBasic_Name):
+            names.append(entity)
         properties = entity.Properties()
         while properties.More():
-            owner.setdefault(properties.Value(), number)
+            if isinstance(properties.Value(), IGESBasic_Name):
+                owners.setdefault(properties.Value(), []).append(entity)
             properties.Next()
-    names = {entity for entity in entities if entity in owner and entity.TypeNumber() == _PROPERTY}
-    model.ClearEntities()
-    for entity in [e for e in entities if e not in names] + sorted(names, key=owner.__getitem__):
-        model.AddEntity(entity)
+    groups = [(name.Value(), owned) for name, owned in owners.items()]
+    for name, owned in owners.items():
+        for entity in owned:
+            entity.RemoveProperty(name)
+    for name, (text, owned) in zip([name for name in names if name in owners], groups, strict=True):
+        name.Init(1, text)
+        for entity in owned:
+            entity.AddProperty(name)
 
 
 def _head(model: IGESData_IGESModel, name: str, options_text: str) -> None:

@@ -20,7 +20,8 @@ from mracad.errors import FileError, UsageError
 from mracad.formats import by_content
 from mracad.occ.document import Document, empty, no_faces, set_unit
 from mracad.occ.load import load
-from mracad.occ.part21 import UNNAMED, tidy
+from mracad.occ.part21 import UNNAMED, pmi, tidy
+from mracad.occ.properties import restated
 from mracad.occ.settings import all_digits, exchange, moment, quiet
 from mracad.occ.units import UNITS, of_file
 from mracad.output import put
@@ -70,7 +71,7 @@ def read_step(source: str | os.PathLike | BinaryIO, input_unit: str | None = Non
         set_unit(xcaf, 1.0)
     if not done:
         raise no_faces(name)
-    return Document(xcaf, name, units, _schema(text)).checked()
+    return Document(xcaf, name, units, _schema(text), pmi(text)).checked()
 
 
 def _schema(text: bytes) -> str:
@@ -120,7 +121,7 @@ def step(document: Document, name: str, schema: str = "", options_text: str = ""
         "write.stepcaf.subshapes.name": "On",
     }
     stream = io.BytesIO()
-    with quiet(), exchange(settings):
+    with quiet(), exchange(settings), restated(document):
         writer = STEPCAFControl_Writer()
         for mode in _WRITE_MODES:
             getattr(writer, f"Set{mode}Mode")(True)

@@ -18,7 +18,7 @@ from mracad.occ.topology import box, compound, matrix
 Array = np.ndarray
 _CHORD = 2e-4  # of the diagonal
 _ANGLE = 12.0  # degrees
-_WELD = 2e-7  # of the diagonal: about the resolution of 32-bit numbers
+_WELD = 2e-7  # of a part's diagonal: about the resolution of 32-bit numbers
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,8 +83,8 @@ def triangles(document: Document, chord: float | None = None, angle: float | Non
                 owners.append((index, number, len(three)))
                 count += len(nodes)
             if own:
-                welded, leader = _weld(np.concatenate(own), _WELD * diagonal)
-                points.append(welded)
+                points.append(np.concatenate(own))
+                leader = _weld(points[-1])
                 for k in range(len(corners)):
                     if owners[k][1] == number:
                         corners[k] = leader[corners[k] - first] + first
@@ -97,14 +97,18 @@ def triangles(document: Document, chord: float | None = None, angle: float | Non
     return Triangles(np.concatenate(points), three[whole_ones], faces[whole_ones], parts[whole_ones], tuple(missing))
 
 
-def _weld(points: Array, reach: float) -> tuple[Array, Array]:
-    """The points, and for each the first of those that coincide with it."""
-    from scipy.sparse import coo_array
+def _weld(points: Array) -> Array:
+    """For each point the first of those that coincide with it.
+
+    The kernel evaluates both sides of a closing edge, and rounds them differently.
+    """
+    from scipy.sparse import coo_array  # a few tenths of a second that reading and writing STEP can do without
     from scipy.sparse.csgraph import connected_components
     from scipy.spatial import cKDTree
 
+    reach = _WELD * float(np.linalg.norm(np.ptp(points, axis=0)))
     pairs = cKDTree(points).query_pairs(reach, output_type="ndarray")
     links = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(points), len(points)))
     groups = connected_components(links, directed=False)[1]
     _, first = np.unique(groups, return_index=True)
-    return points, first[groups]
+    return first[groups]
