@@ -10,6 +10,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from mracad import guard
 from mracad.errors import FileError, UsageError
 from mracad.formats import FORMATS, by_ending
 
@@ -30,7 +31,9 @@ def read(source: str | Text, input_unit: str | None) -> Document:
     """Read a model, or standard input for ``-``."""
     from mracad.occ.files import read as read_file
 
-    return read_file(load(source) if isinstance(source, str) else source, input_unit)
+    text = load(source) if isinstance(source, str) else source
+    guard.doing("reading", text.name)
+    return read_file(text, input_unit)
 
 
 def check_reports(*paths: str | None, overwrite: bool) -> None:
