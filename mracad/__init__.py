@@ -24,10 +24,8 @@ if TYPE_CHECKING:
     from mracad.model import Displacement, Model
     from mracad.occ.apply import apply
     from mracad.occ.check import check
-    from mracad.occ.mesh import write_stl
-    from mracad.occ.read import read_step as read
+    from mracad.occ.files import read, write
     from mracad.occ.view import view as snapshot
-    from mracad.occ.write import write_step as write
     from mracad.options import Smooth
 
 __version__ = "0.1.0"
@@ -40,18 +38,17 @@ _HOMES = {
     "apply": "occ.apply",
     "check": "occ.check",
     "deviations": "audit.deviation",
-    "read": "occ.read:read_step",
+    "read": "occ.files",
     "run": "job",
     "seams": "audit.continuity",
     "smooth": "edit.smooth",
     "snapshot": "occ.view:view",
-    "write": "occ.write:write_step",
-    "write_stl": "occ.mesh",
+    "write": "occ.files",
 }
 
 __all__ = [
     "Displacement", "Model", "MracadError", "Smooth", "apply", "check", "deviations", "read", "run", "seams", "smooth",
-    "snapshot", "write", "write_stl",
+    "snapshot", "write",
 ]  # fmt: skip
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
+import mmap
 import os
 import pickle
 import re
@@ -19,6 +20,7 @@ from mracad.errors import Code, MracadError, UsageError
 Result = TypeVar("Result")
 
 _GRACE = 1.0  # seconds for a child to put its files in order once its time is over
+_ENDING = 10.0  # seconds more for one whose files are already taking their places
 _SIZES = {"": 1, "k": 1e3, "m": 1e6, "g": 1e9, "ki": 2**10, "mi": 2**20, "gi": 2**30}
 _DEATH_SIGNAL = 1  # PR_SET_PDEATHSIG
 
@@ -29,6 +31,50 @@ def size(text: str) -> int:
     if not match or not float(match[1]):
         raise UsageError(f"memory-limit: {text!r} is not an amount of memory", "write it as 500MB or 2GB")
     return int(float(match[1]) * _SIZES[match[2]])
+
+
+class _Note:
+    """A few words from a child to its parent, which remain when the child is lost."""
+
+    def __init__(self) -> None:
+        self._memory = mmap.mmap(-1, mmap.PAGESIZE)
+        self.stage = self.subject = ""
+
+    def write(self, stage: str, subject: str, ending: bool = False) -> None:
+        self.stage, self.subject = stage, subject
+        text = f"{stage} {subject!r}".encode(errors="replace")[: mmap.PAGESIZE - 2] if subject else stage.encode()
+        self._memory[: len(text) + 2] = bytes([ending or self.ending]) + text + b"\0"
+
+    @property
+    def ending(self) -> bool:
+        return bool(self._memory[0])
+
+    def __str__(self) -> str:
+        text = self._memory[1:].partition(b"\0")[0].decode(errors="replace")
+        return f" while {text}" if text else ""
+
+
+_note: _Note | None = None  # of this process, when it is a child
+
+
+def doing(stage: str = "", subject: str = "") -> None:
+    """Note what this process is at, for the message should it crash or come to a limit.
+
+    Parameters
+    ----------
+    stage : str
+        As ``"reading"``; by default what it was.
+    subject : str
+        The name of the model; by default what it was.
+    """
+    if _note:
+        _note.write(stage or _note.stage, subject or _note.subject)
+
+
+def ending() -> None:
+    """Say that the outputs are taking their places now: the time limit does not cut that off."""
+    if _note:
+        _note.write(_note.stage, _note.subject, ending=True)
 
 
 def run(work: Callable[[], Result], seconds: float | None = None, memory: int | None = None) -> Result:
@@ -54,14 +100,17 @@ def run(work: Callable[[], Result], seconds: float | None = None, memory: int | 
     sys.stdout.flush()
     sys.stderr.flush()
     reader, writer = os.pipe()
+    note = _Note()
     child = os.fork()
     if not child:
+        global _note
+        _note = note
         os.close(reader)
         _child(work, writer, memory)
     os.close(writer)
     try:
         with _passing_on(child):
-            data, finished = _received(reader, seconds)
+            data, finished = _received(reader, seconds, note)
     except BaseException:
         _end(child)
         raise
@@ -69,7 +118,7 @@ def run(work: Callable[[], Result], seconds: float | None = None, memory: int | 
         os.close(reader)
     if not finished:
         _end(child)
-        raise MracadError(f"time limit of {seconds:g} s exceeded", "give more with --time-limit", Code.LIMIT)
+        raise MracadError(f"time limit of {seconds:g} s exceeded{note}", "give more with --time-limit", Code.LIMIT)
     _, status, usage = os.wait4(child, 0)
     if data:
         good, value = pickle.loads(data)
@@ -80,7 +129,9 @@ def run(work: Callable[[], Result], seconds: float | None = None, memory: int | 
         raise _out_of_memory(memory)
     number = os.WTERMSIG(status) if os.WIFSIGNALED(status) else 0
     what = signal.Signals(number).name if number else f"exit code {os.WEXITSTATUS(status)}"
-    raise MracadError(f"the CAD kernel crashed ({what})", "the model may be damaged: see mracad check", Code.INTERNAL)
+    raise MracadError(
+        f"the CAD kernel crashed ({what}){note}", "the model may be damaged: see mracad check", Code.INTERNAL
+    )
 
 
 _OUT_OF_MEMORY = ("failed to map segment", "error return without exception set", "bad_alloc")
@@ -121,6 +172,8 @@ def _outcome(work: Callable[[], Any], memory: int | None) -> tuple[bool, Any]:
     resource.setrlimit(resource.RLIMIT_DATA, (memory, hard))
     try:
         return True, work()
+    except (MracadError, KeyboardInterrupt, SystemExit) as error:
+        return False, error
     except BaseException as error:
         resource.setrlimit(resource.RLIMIT_DATA, (hard, hard))  # room to say so
         return False, _out_of_memory(memory) if _starved(error) else error
@@ -142,14 +195,18 @@ def _terminated(*_: object) -> None:
     raise SystemExit(128 + signal.SIGTERM)
 
 
-def _received(reader: int, seconds: float | None) -> tuple[bytes, bool]:
+def _received(reader: int, seconds: float | None, note: _Note) -> tuple[bytes, bool]:
     """All that the child sends, and whether it ended in time."""
+    late = False
     end = None if seconds is None else time.monotonic() + seconds
     pieces: list[bytes] = []
     while True:
         rest = None if end is None else max(end - time.monotonic(), 0.0)
         if not select.select([reader], [], [], rest)[0]:
-            return b"", False
+            if late or not note.ending:
+                return b"", False
+            late, end = True, time.monotonic() + _ENDING
+            continue
         piece = os.read(reader, 1 << 20)
         if not piece:
             return b"".join(pieces), True

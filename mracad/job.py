@@ -165,10 +165,10 @@ def compare(document: Document, options: Compare, original: Original | None = No
     UsageError
         When there is neither.
     """
-    from mracad.occ.read import read_step
+    from mracad.occ.files import read
 
     if options.reference:
-        reference = read_step(options.reference)
+        reference = read(options.reference, options.reference_unit)
     elif original:
         reference = original()
     else:
@@ -214,6 +214,7 @@ def run(
     from mracad.occ.apply import apply as put
     from mracad.occ.apply import restore
     from mracad.occ.check import check
+    from mracad.occ.instance import isolate
     from mracad.occ.select import select_cq
     from mracad.occ.view import view
 
@@ -222,14 +223,22 @@ def run(
 
     start = time.perf_counter()
     stage("looking at faces")(0, 1)
+    own = isolate(document, options.instance) if options.instance else None
     model = view(document)
 
     def cadquery(expression: str) -> set[int]:
         return select_cq(document, expression)
 
     nurbs = [face.index for face in model.faces if face.kind in NURBS]
+    if own is not None:
+        copies = {own[face] for face in own if own[face] != face}
+        nurbs = [face for face in nurbs if face not in copies]
     chosen = select(model, options.faces, nurbs, cadquery).faces if options.faces else frozenset(nurbs)
     held = select(model, options.hold, nurbs, cadquery).faces if options.hold else frozenset()
+    if own is not None:
+        chosen, held = (frozenset(own[face] for face in faces & own.keys()) for faces in (chosen, held))
+        if options.faces and not chosen:
+            raise UsageError(f"no selected face is in '{options.instance}'", "leave out --faces, or select others")
     convertible = {i for i in chosen - held if model.faces[i].surface is None}
     if convertible:
         model = view(document, convert=convertible)

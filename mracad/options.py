@@ -126,6 +126,13 @@ class Selection(Options, frozen=True, kw_only=True, forbid_unknown_fields=True):
             "cq:'>Z'; !SEL excludes. Default: all NURBS faces."
         ),
     ] = ()
+    instance: Annotated[
+        str | None,
+        Meta(
+            description="Edit one instance of a part that stands in several places, as plate/bolt#2 (see info --all); "
+            "it becomes a part of its own. Default: a part is edited, wherever it stands."
+        ),
+    ] = None
     hold: Annotated[
         tuple[str, ...],
         Meta(description="Faces and edges (edge#4) that must not move; same selectors as --faces."),
@@ -175,7 +182,7 @@ class Selection(Options, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
 
 class Smooth(Selection, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Remove detail finer than a scale from the NURBS faces of a STEP file."""
+    """Remove detail finer than a scale from the NURBS faces of a model."""
 
     function: ClassVar[str] = "mracad.edit.smooth:smooth"
     quiet: ClassVar[str] = "already smooth there"
@@ -243,6 +250,10 @@ class Compare(Options, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
     reference: Annotated[
         str | None, Meta(description="File to compare with; by default the model as it came into the recipe.")
+    ] = None
+    reference_unit: Annotated[
+        str | None,
+        Meta(description="Length unit of the numbers in the reference, where it names a wrong one: mm, m, in …"),
     ] = None
     max_deviation: Annotated[Length, Meta(description="How far any face or outline may lie from its partner.")] = (
         "1e-6mm"

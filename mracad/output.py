@@ -5,11 +5,15 @@ from __future__ import annotations
 import contextlib
 import os
 import tempfile
+import time
 from collections.abc import Iterator
 from pathlib import Path
-from typing import BinaryIO
+from typing import IO, BinaryIO
 
+from mracad import guard
 from mracad.errors import FileError
+
+_ABANDONED = 60.0  # seconds: an unlocked temporary file of that age has no writer any more
 
 
 @contextlib.contextmanager
@@ -17,7 +21,8 @@ def beside(target: str | os.PathLike, prefix: str = ".mracad-") -> Iterator[Path
     """A temporary path in the target's folder, which takes the target's place when the block ends well.
 
     Nothing is left behind when it does not, unless the process is killed: then a file whose name begins with
-    ``prefix``.
+    ``prefix``.  It was locked while its writer lived; the next one to write into the folder, a minute later or more,
+    removes it.
 
     Raises
     ------
@@ -28,15 +33,18 @@ def beside(target: str | os.PathLike, prefix: str = ".mracad-") -> Iterator[Path
     try:
         if path.is_dir():
             raise IsADirectoryError("it is a folder")
+        _remove_abandoned(path.parent, prefix)
         handle, name = tempfile.mkstemp(prefix=prefix, suffix=path.suffix, dir=path.parent)
-        os.close(handle)
     except OSError as error:
         raise _unwritable(path, error) from error
     temporary = Path(name)
     try:
-        yield temporary
-        with temporary.open("rb+") as written:
-            os.fsync(written.fileno())
+        with os.fdopen(handle, "rb+") as held:
+            with contextlib.suppress(OSError):
+                _lock(held)
+            yield temporary
+            os.fsync(held.fileno())
+        guard.ending()
         temporary.chmod(_mode(path))
         temporary.replace(path)
     except FileError:
@@ -66,6 +74,25 @@ def holds(path: Path, data: bytes) -> bool:
         return path.stat().st_size == len(data) and path.read_bytes() == data
     except OSError:
         return False
+
+
+def _remove_abandoned(folder: Path, prefix: str) -> None:
+    """Remove the temporary files that killed writers left."""
+    for left in folder.glob(f"{prefix}*"):
+        with contextlib.suppress(OSError):
+            if time.time() - left.stat().st_mtime > _ABANDONED:
+                with left.open("rb") as file:
+                    _lock(file)
+                    left.unlink()
+
+
+def _lock(file: IO[bytes]) -> None:
+    """Lock a file; raises OSError where another process holds it, or this system has no locks."""
+    try:
+        import fcntl
+    except ImportError as error:
+        raise OSError("no locks on this system") from error
+    fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 
 def _mode(path: Path) -> int:

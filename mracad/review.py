@@ -15,6 +15,7 @@ from mracad.audit.continuity import key, seams, summary
 from mracad.audit.crossing import crossings
 from mracad.audit.verdict import Finding, Layer, Verdict
 from mracad.errors import Code, MracadError
+from mracad.formats import by_content
 
 if TYPE_CHECKING:
     from mracad.audit.continuity import SeamMeasure, SeamSummary
@@ -114,7 +115,9 @@ def check(
     from mracad.occ.view import view
 
     model = view(document)
-    file = None if text is None else stated(text, name)
+    is_step = text is not None and by_content(text, name).name == "step"
+    file = stated(text, name) if text is not None and is_step else None
+    why = "not written yet" if text is None else "only STEP files are looked at as parsed"
     measures = seams(model, every=True)
     flipped = layers.turned(file.uses) if file else set()
     known = flipped if file and file.faces == len(model.faces) else set()
@@ -124,8 +127,8 @@ def check(
     open_faces = {edge.sides[0].face for edge in model.edges if edge.free}
     totals = summary(measures, frozenset(key(m) for m in measures if m.angle < limits.kink))
     found = [
-        _file(file, document) if file else Layer("file", "skipped", "not written yet"),
-        _load(len(model.faces), file.faces, unseen) if file else Layer("load", "skipped", "not written yet"),
+        _file(file, document) if file else Layer("file", "skipped", why),
+        _load(len(model.faces), file.faces, unseen) if file else Layer("load", "skipped", why),
         brep,
         layers.shells(model, validity, known | layers.turned(looks(document))),
         layers.seams(measures, limits.kink, limits.gap, limits.angle, _seam_text(totals)),

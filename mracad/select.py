@@ -72,7 +72,7 @@ def _faces(model: Model, text: str, cadquery: CadQuery | None) -> set[int]:
         return _where(model, lambda face: face.kind == kind or (kind == "nurbs" and face.kind in NURBS))
     if text.startswith(("colour:", "color:")):
         colour = text.split(":", 1)[1].lower()
-        return _where(model, lambda face: face.colour.lower() == colour)
+        return _where(model, lambda face: colour in {face.colour, face.colour[:7]})
     if text.startswith("near:"):
         return {_nearest(model, text)}
     if text.startswith("cq:"):

@@ -47,8 +47,8 @@ from OCP.TopoDS import TopoDS_Edge, TopoDS_Face, TopoDS_Shape, TopoDS_Shell, Top
 from OCP.XCAFDoc import XCAFDoc_ColorSurf, XCAFDoc_DocumentTool
 
 from mracad.occ.document import Document
+from mracad.occ.step import write_step
 from mracad.occ.units import Units, metres
-from mracad.occ.write import write_step
 
 TOL = 1e-7
 FINE = 16  # bits after the point of what the kernel computed: 2e-5 mm

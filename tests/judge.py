@@ -10,8 +10,8 @@ from pathlib import Path
 from mracad.audit.continuity import SeamMeasure, seams
 from mracad.model import Model
 from mracad.occ.check import Validity, check
-from mracad.occ.read import read_step
 from mracad.occ.settings import exchange, quiet
+from mracad.occ.step import read_step
 from mracad.occ.view import view
 
 

@@ -49,7 +49,7 @@ def _modules() -> set[str]:
 @click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 120})
 @click.version_option(mracad.__version__, prog_name="mracad")
 def group() -> None:
-    """Multiresolution editing for CAD models: B-spline wavelets on STEP files."""
+    """Multiresolution editing for CAD models: B-spline wavelets on STEP and IGES files."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -42,7 +42,8 @@ def run_batch(
     keep_going: bool,
     retry: int,
     input_unit: str | None,
-    schema: str,
+    format: str | None,
+    schema: str | None,
     overwrite: bool,
     if_changed: bool,
     record: bool,
@@ -54,12 +55,14 @@ def run_batch(
 ) -> int:
     """Take many files through a recipe; see :mod:`mracad_cli.commands.batch` for the parameters."""
     recipe.steps("model.step")  # what is wrong in it is said before anything is read
-    settings = Settings(input_unit, schema.upper(), overwrite, if_changed, record, retry, fail_fast=not keep_going)
+    settings = Settings(
+        input_unit, (schema or "").upper(), overwrite, if_changed, record, retry, fail_fast=not keep_going
+    )
     limits = Limits(duration(time_limit, "time-limit"), size(memory_limit) if memory_limit else 0)
     for path in filter(None, (report, junit, depfile)):
         check_target(Path(path), overwrite=True)
     words = [word for given in sources for word in (_listed() if given == "-" else [given])]
-    items = find(words, Path(folder))
+    items = find(words, Path(folder), format or "")
     if dry_run:
         listed = (f"{item.source} -> {Path(folder, item.output)}" for item in items)
         for line in [*plan(recipe.steps(items[0].source)), *listed]:

@@ -10,35 +10,30 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from mracad import guard
 from mracad.errors import FileError, UsageError
+from mracad.formats import FORMATS, by_ending
 
 if TYPE_CHECKING:
     from mracad.occ.document import Document
-
-STEP, STL = frozenset({".step", ".stp", ".p21"}), frozenset({".stl"})
-
-
-class Text(io.BytesIO):
-    """The bytes of an input, with its name."""
-
-    name = "stdin"
+    from mracad.occ.files import Lost
+    from mracad.occ.load import Text
 
 
 def load(source: str) -> Text:
     """The bytes of a file, or of standard input for ``-``."""
-    from mracad.occ.read import load as load_file
+    from mracad.occ.load import load as load_file
 
-    text, name = load_file(sys.stdin.buffer if source == "-" else source)
-    stream = Text(text)
-    stream.name = name
-    return stream
+    return load_file(sys.stdin.buffer if source == "-" else source)
 
 
 def read(source: str | Text, input_unit: str | None) -> Document:
-    """Read a STEP file, or standard input for ``-``."""
-    from mracad.occ.read import read_step
+    """Read a model, or standard input for ``-``."""
+    from mracad.occ.files import read as read_file
 
-    return read_step(load(source) if source == "-" else source, input_unit)
+    text = load(source) if isinstance(source, str) else source
+    guard.doing("reading", text.name)
+    return read_file(text, input_unit)
 
 
 def check_reports(*paths: str | None, overwrite: bool) -> None:
@@ -85,47 +80,52 @@ class Outputs:
         *,
         overwrite: bool,
         if_changed: bool,
-        schema: str,
+        format: str,
+        schema: str | None,
         chord: str,
         angle: float,
         ascii_stl: bool,
         needed: bool = True,
     ) -> None:
-        self.paths, self.schema = paths, schema.upper()
+        self.paths, self.schema = paths, (schema or "").upper()
         self.overwrite, self.if_changed = overwrite or if_changed, if_changed
         self.chord, self.angle, self.ascii_stl = chord, angle, ascii_stl
+        self.lost: dict[str, tuple[Lost, ...]] = {}
         self._sizes: list[str] = []
         if needed and not paths:
             raise UsageError("no output is named", "name a file with -o OUT.step, or - for standard output")
         if len(set(paths)) < len(paths):
             raise UsageError("the same output is named twice", "give each -o once")
-        for path in paths:
-            if path != "-":
-                self._check(Path(path))
+        self.formats = {path: FORMATS[format] if path == "-" else by_ending(path) for path in paths}
+        for path in self.files():
+            check_target(Path(path), self.overwrite)
 
     def check_report(self, path: str) -> None:
         """Refuse a report that could not be written."""
         check_target(Path(path), self.overwrite)
 
-    def _check(self, path: Path) -> None:
-        if path.suffix.lower() not in STEP | STL:
-            raise FileError(f"cannot write {path}: unknown ending {path.suffix!r}", "end it in .step, .stp or .stl")
-        check_target(path, self.overwrite)
-
     def write(self, document: Document, title: str) -> None:
         """Write the document to every output; none is replaced unless all could be made."""
-        from mracad.occ.mesh import write_stl
-        from mracad.occ.write import write_step
+        from mracad.occ.files import write
         from mracad.output import beside, holds
 
+        meshed = any(format.kind == "mesh" for format in self.formats.values())
+        chord = self._chord(document) if meshed else None
         made: dict[str, bytes] = {}
-        for path in self.paths:
+        for path, format in self.formats.items():
             stream = io.BytesIO()
-            if path == "-" or Path(path).suffix.lower() in STEP:
-                write_step(document, stream, schema=self.schema, options_text=title)
-            else:
-                write_stl(document, stream, ascii=self.ascii_stl, chord=self._chord(document), angle=self.angle)
+            lost = write(
+                document,
+                stream,
+                format.name,
+                schema=self.schema,
+                chord=chord,
+                angle=self.angle,
+                ascii=self.ascii_stl,
+                options_text=title,
+            )
             made[path] = stream.getvalue()
+            self.lost[self._name(path)] = lost
         with contextlib.ExitStack() as stack:
             for path, data in made.items():
                 if path != "-" and not (self.if_changed and holds(Path(path), data)):
@@ -133,6 +133,9 @@ class Outputs:
         if "-" in made:
             sys.stdout.buffer.write(made["-"])
             sys.stdout.buffer.flush()
+        for name, lost in self.lost.items():
+            if lost:
+                print(f"warning: {name} lacks {', '.join(map(str, lost))}", file=sys.stderr)
         self._sizes = [f"{self._name(path)}, {_size(len(data))}" for path, data in made.items()]
 
     def _chord(self, document: Document) -> float:

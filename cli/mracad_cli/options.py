@@ -10,11 +10,12 @@ import click
 from msgspec import Meta, Struct, structs
 
 from mracad.errors import UsageError
+from mracad.formats import FORMATS
 from mracad.options import Length, dashed, plain_types
 
 Command = Callable[..., Any]
 
-SHORT = {"faces": "SEL", "hold": "SEL", "max_angle": "DEG", "kink": "DEG", "fit_g1": "DEG"}
+SHORT = {"faces": "SEL", "instance": "PATH", "hold": "SEL", "max_angle": "DEG", "kink": "DEG", "fit_g1": "DEG"}
 """Placeholders in the help."""
 
 
@@ -72,26 +73,32 @@ outputs = click.option(
     metavar="OUT",
     multiple=True,
     type=click.Path(allow_dash=True),
-    help="File to write; its ending says the format (.step .stp .stl); repeatable; - for STEP on standard output.",
+    help="File to write; its ending says the format (" + " ".join(f.endings[0] for f in FORMATS.values()) + "); "
+    "repeatable; - for standard output.",
 )
 input_unit = click.option(
     "--input-unit",
     metavar="UNIT",
-    help="Length unit of the numbers in IN, where the file names a wrong one: mm, m, in …",
+    help="Length unit of the file's numbers, where it names a wrong one: mm, m, in …",
+)
+format = click.option(
+    "--format",
+    type=click.Choice(list(FORMATS)),
+    default="step",
+    show_default=True,
+    help="Format of what goes to standard output.",
 )
 schema = click.option(
     "--schema",
     type=click.Choice(["AP203", "AP214", "AP242"], case_sensitive=False),
-    default="AP214",
-    show_default=True,
-    help="STEP schema to write.",
+    help="STEP schema to write.  [default: AP242 for a file in AP242, else AP214]",
 )
 chord = click.option(
     "--chord",
     metavar="LENGTH",
     default="0.02%",
     show_default=True,
-    help="STL: largest distance of triangles from the surface.",
+    help="Meshes: largest distance of triangles from the surface.",
 )
 angle = click.option(
     "--angle",
@@ -99,7 +106,7 @@ angle = click.option(
     default=12.0,
     show_default=True,
     metavar="DEG",
-    help="STL: largest turn along a triangle's edge.",
+    help="Meshes: largest turn along a triangle's edge.",
 )
 ascii_stl = click.option("--ascii", "ascii_stl", is_flag=True, help="STL: write text instead of binary.")
 overwrite = click.option("--overwrite", is_flag=True, help="Replace an existing output.")
@@ -121,7 +128,7 @@ limiting = apply(
     ),
 )
 reading = apply(source, input_unit)
-writing = apply(outputs, schema, chord, angle, ascii_stl, overwrite, if_changed)
+writing = apply(outputs, format, schema, chord, angle, ascii_stl, overwrite, if_changed)
 printing = apply(as_json, limiting, debug)
 reports = apply(
     click.option("--junit", metavar="F.xml", type=click.Path(), help="Write the verdict as JUnit, a case a layer."),

@@ -7,6 +7,8 @@ import time
 from types import TracebackType
 from typing import Any
 
+from mracad import guard
+
 PATIENCE = 1.0
 """Seconds before a bar appears."""
 
@@ -36,6 +38,7 @@ class Progress:
             self._bar.stop()
 
     def __call__(self, stage: str, done: int, total: int) -> None:
+        guard.doing(stage)
         if not sys.stderr.isatty() or (time.monotonic() - self._start < PATIENCE and not self._rate):
             return
         if self._bar is None:

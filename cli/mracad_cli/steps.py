@@ -80,7 +80,6 @@ def run_steps(
         from mracad import job
 
         def original() -> Document:
-            text.seek(0)
             return read(text, input_unit)
 
         results = job.play(document, steps, original=original, progress=progress, apply=not dry_run)
@@ -98,12 +97,12 @@ def run_steps(
     parts = [render.result(result) for result in results]
     for part, step in zip(parts, steps, strict=False):
         part["options"] = structs.asdict(step.options)
-    names = targets.names() if written else []
+    ends = {"written": targets.names() if written else [], "lost": render.plain(targets.lost)}
     if recipe:
         named = [{"step": s.id, "use": s.use, **part} for s, part in zip(steps, parts, strict=False)]
-        body: dict[str, Any] = {"file": document.name, "steps": named, "written": names}
+        body: dict[str, Any] = {"file": document.name, "steps": named, **ends}
     else:
-        body = {**parts[0], "written": names}
+        body = {**parts[0], **ends}
     if report:
         write_text(Path(report), json.dumps(body, indent=1, ensure_ascii=False) + "\n")
     end = f"wrote {targets.sizes()}" if written else f"{'dry run, ' if dry_run else ''}nothing written"

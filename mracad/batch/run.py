@@ -17,10 +17,10 @@ from mracad.batch.cluster import lost
 from mracad.batch.manifest import UNFINISHED, Manifest, digest
 from mracad.batch.work import Product, Work, do
 from mracad.errors import Code, FileError, MracadError, UsageError
+from mracad.formats import FORMATS, READABLE, by_ending
 from mracad.output import holds, put
 from mracad.recipe import Recipe, record_of
 
-ENDINGS = frozenset({".step", ".stp", ".p21"})
 AHEAD = 2
 """Files given to the executor for each of its workers: enough that none waits, few enough to hold in memory."""
 
@@ -32,10 +32,11 @@ Status = Literal["done", "unchanged", "failed", "not tried"]
 
 @dataclass(frozen=True)
 class Item:
-    """One file of a batch, and its output relative to the output folder."""
+    """One file of a batch, its output relative to the output folder, and the format of that."""
 
     source: str
     output: str
+    format: str = "step"
 
 
 @dataclass(frozen=True)
@@ -46,6 +47,7 @@ class Settings:
     ----------
     input_unit : str or None
     schema : str
+        Of STEP files; by default AP242 for a file in AP242, else AP214.
     overwrite : bool
         Replace files in the output folder that no batch has made.
     if_changed : bool
@@ -59,7 +61,7 @@ class Settings:
     """
 
     input_unit: str | None = None
-    schema: str = "AP214"
+    schema: str = ""
     overwrite: bool = False
     if_changed: bool = False
     record: bool = False
@@ -109,17 +111,17 @@ class Workers(Protocol):
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None: ...
 
 
-def find(words: Iterable[str], folder: Path) -> list[Item]:
-    """The files of a batch from paths, folders (all STEP files below them) and patterns.
+def find(words: Iterable[str], folder: Path, format: str = "") -> list[Item]:
+    """The files of a batch from paths, folders (all models below them) and patterns.
 
-    Outputs have the names of their inputs; those of a folder keep their place below it, those of a pattern their
-    place below the folder before its first wildcard.  Hidden files are left out, and so is the output folder where
-    it lies below.
+    Outputs have the names of their inputs, with the ending of ``format`` where that is given; those of a folder keep
+    their place below it, those of a pattern their place below the folder before its first wildcard.  Hidden files are
+    left out, and so is the output folder where it lies below.
 
     Raises
     ------
     FileError
-        When there is no file, or a folder or pattern holds no STEP file.
+        When there is no file, or a folder or pattern holds no model.
     UsageError
         When two inputs would be written to the same output, or one to itself.
     """
@@ -127,6 +129,8 @@ def find(words: Iterable[str], folder: Path) -> list[Item]:
     own = folder.resolve()
     for word in words:
         for source, output in _expanded(word, own):
+            if format:
+                output = str(Path(output).with_suffix(FORMATS[format].endings[0]))
             other = found.setdefault(output, source)
             if Path(other).resolve() != Path(source).resolve():
                 raise UsageError(
@@ -137,14 +141,19 @@ def find(words: Iterable[str], folder: Path) -> list[Item]:
                 raise UsageError(f"'{source}' would be replaced by its own output", "choose another folder with -O")
     if not found:
         raise FileError("there is nothing to do: no files are named", "give files, folders or patterns")
-    return [Item(source, output) for output, source in found.items()]
+    return [Item(source, output, format or _format(output)) for output, source in found.items()]
+
+
+def _format(output: str) -> str:
+    """What a file is written as: what it was read from, as far as its name tells."""
+    return by_ending(output).name if Path(output).suffix.lower() in READABLE else "step"
 
 
 def _expanded(word: str, own: Path) -> list[tuple[str, str]]:
     """The files that a word on the command line means, but those in the output folder, each with its output."""
     base = Path(word)
     if base.is_dir():
-        files = [path for path in base.rglob("*") if path.suffix.lower() in ENDINGS]
+        files = [path for path in base.rglob("*") if path.suffix.lower() in READABLE]
     elif glob.has_magic(word) and not base.exists():
         base = Path(*itertools.takewhile(lambda part: not glob.has_magic(part), base.parts))
         files = [Path(path) for path in glob.glob(word, recursive=True)]
@@ -159,7 +168,7 @@ def _expanded(word: str, own: Path) -> list[tuple[str, str]]:
         and not path.is_dir()
     ]
     if not pairs:
-        raise FileError(f"no STEP files in '{word}'", f"they end in {', '.join(sorted(ENDINGS))}")
+        raise FileError(f"no models in '{word}'", f"they end in {', '.join(sorted(READABLE))}")
     return pairs
 
 
@@ -232,7 +241,14 @@ class _Batch:
         except MracadError as error:
             return _failed(item, error)
         work = Work(
-            Path(item.source).name, data, steps, self.settings.input_unit, self.settings.schema, files, self._epoch
+            Path(item.source).name,
+            data,
+            steps,
+            self.settings.input_unit,
+            item.format,
+            self.settings.schema,
+            files,
+            self._epoch,
         )
         key = self._key(work)
         if self.manifest.done(item.output, key):
@@ -280,7 +296,9 @@ class _Batch:
         """A hash of everything that the output depends on."""
         files = {Path(name).name: digest(data) for name, data in work.files.items()}
         parts = [work.name, digest(work.data), record_of(work.steps), files]
-        return digest(json.dumps([*parts, work.input_unit, work.schema, work.epoch], sort_keys=True).encode())
+        return digest(
+            json.dumps([*parts, work.input_unit, work.format, work.schema, work.epoch], sort_keys=True).encode()
+        )
 
     def _written(self, task: _Task, product: Product) -> Outcome:
         output = task.item.output

@@ -33,7 +33,8 @@ class Work:
         Its content.
     steps : tuple of Step
     input_unit : str or None
-    schema : str
+    format, schema : str
+        Of the output; see ``mracad.occ.files.write``.
     files : mapping
         The content of the files that the steps name.
     epoch : str or None
@@ -46,7 +47,8 @@ class Work:
     data: bytes = field(repr=False)
     steps: tuple[Step, ...]
     input_unit: str | None = None
-    schema: str = "AP214"
+    format: str = "step"
+    schema: str = ""
     files: Mapping[str, bytes] = field(default_factory=dict, repr=False)
     epoch: str | None = None
     versions: Mapping[str, str] = field(default_factory=versions)
@@ -76,7 +78,7 @@ def do(work: Work) -> Product:
         When a step cannot be done or a check fails.
     """
     from mracad.job import Judged, play
-    from mracad.occ import write_step
+    from mracad.occ import write
 
     start = time.perf_counter()
     for name, version in versions().items():
@@ -95,21 +97,16 @@ def do(work: Work) -> Product:
         more = f" (and {len(last.failures) - 1} more)" if len(last.failures) > 1 else ""
         raise MracadError(f"{work.steps[len(results) - 1].id}: {last.failures[0]}{more}", code=Code.FAILED_CHECK)
     written = io.BytesIO()
-    write_step(document, written, schema=work.schema, options_text=title(work.steps))
+    write(document, written, work.format, schema=work.schema, options_text=title(work.steps))
     short = ({"step": step.id, **_short(result)} for step, result in zip(work.steps, results, strict=True))
     return Product(written.getvalue(), tuple(short), time.perf_counter() - start)
 
 
 def _read(work: Work) -> Document:
-    from mracad.occ import read_step
+    from mracad.occ import read
+    from mracad.occ.load import Text
 
-    source = _Named(work.data)
-    source.name = work.name
-    return read_step(source, work.input_unit)
-
-
-class _Named(io.BytesIO):
-    name: str
+    return read(Text(work.data, work.name), work.input_unit)
 
 
 def _here(work: Work, folder: Path) -> list[Step]:

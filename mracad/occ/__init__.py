@@ -3,11 +3,10 @@
 from mracad.occ.apply import apply
 from mracad.occ.check import Failure, Validity, check
 from mracad.occ.document import Document
-from mracad.occ.mesh import write_stl
-from mracad.occ.read import read_step
+from mracad.occ.files import read, write
 from mracad.occ.select import select_cq
+from mracad.occ.step import read_step, write_step
 from mracad.occ.view import view
-from mracad.occ.write import write_step
 
 __all__ = [
     "Document",
@@ -15,9 +14,10 @@ __all__ = [
     "Validity",
     "apply",
     "check",
+    "read",
     "read_step",
     "select_cq",
     "view",
+    "write",
     "write_step",
-    "write_stl",
 ]

@@ -9,17 +9,15 @@ from OCP.Geom import Geom_BezierSurface, Geom_BSplineSurface
 from OCP.GeomConvert import GeomConvert
 from OCP.gp import gp_Pnt
 from OCP.TColStd import TColStd_Array1OfInteger, TColStd_Array1OfReal
-from OCP.TDF import TDF_ChildIterator
 from OCP.TopAbs import TopAbs_FORWARD
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS
-from OCP.XCAFDoc import XCAFDoc_Area, XCAFDoc_Centroid, XCAFDoc_Volume
 
 from mracad.bspline.net import Net
 from mracad.errors import MracadError
 from mracad.model import Displacement, Model, Offset, Surface
 from mracad.occ.convert import lay
-from mracad.occ.document import Document
+from mracad.occ.document import Document, label_key
 from mracad.occ.follow import follow
 from mracad.occ.geometry import basis, nets, spline
 from mracad.occ.settings import quiet
@@ -34,8 +32,7 @@ def apply(document: Document, model: Model, displacement: Displacement) -> None:
 
     Knots are inserted exactly; then only those control points move whose offset is not zero, all others keep every
     bit.  Faces that were seen as NURBS by ``view(document, convert=…)`` are put on their new surfaces first.  Edges
-    that move get new 3D curves and vertices.  Triangulations, and the areas, volumes and centroids that the file
-    states, are dropped.
+    that move get new 3D curves and vertices.  Triangulations are dropped.
 
     Parameters
     ----------
@@ -53,6 +50,8 @@ def apply(document: Document, model: Model, displacement: Displacement) -> None:
             _move(handle, offset)
         if displacement.offsets:
             _forget(document)
+            faces = (face for index in displacement.offsets for face in model.surfaces[index].faces)
+            document.moved |= {label_key(document.part_of(face).label) for face in faces}
             follow(document, _moved_edges(model, displacement))
 
 
@@ -144,12 +143,7 @@ def _moved_edges(model: Model, displacement: Displacement) -> list[int]:
 
 
 def _forget(document: Document) -> None:
-    """Drop what is no longer true: triangulations, curves on replaced surfaces, stated areas, volumes, centroids."""
+    """Drop what is no longer true: triangulations, curves on replaced surfaces."""
     for part in document.parts:
         BRepTools.Clean_s(part.shape)
         BRepTools.RemoveUnusedPCurves_s(part.shape)
-    labels = TDF_ChildIterator(document.shape_tool.Label(), True)
-    while labels.More():
-        for property_of in (XCAFDoc_Area, XCAFDoc_Volume, XCAFDoc_Centroid):
-            labels.Value().ForgetAttribute(property_of.GetID_s())
-        labels.Next()

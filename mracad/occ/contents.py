@@ -18,7 +18,7 @@ from OCP.XCAFDoc import (
     XCAFDoc_ShapeTool,
 )
 
-from mracad.occ.document import Document, label_key, label_name, labels
+from mracad.occ.document import Document, colour_text, components, label_key, label_name, labels, referred
 from mracad.occ.topology import matrix
 
 _COLOURS = {
@@ -98,7 +98,7 @@ def contents(document: Document) -> Contents:
     return Contents(
         unit=document.unit,
         products=tuple(label_name(label) for label in products),
-        usages=sum(1 for label in products for _ in _components(label)),
+        usages=sum(1 for label in products for _ in components(label)),
         tree=tuple(tree),
         colours=tuple(sorted(_colours(where.values()))),
         layers=tuple(sorted(on_layers)),
@@ -111,18 +111,13 @@ def contents(document: Document) -> Contents:
     )
 
 
-def _components(label: TDF_Label) -> Iterator[TDF_Label]:
-    """The instances that an assembly is made of; none for a part."""
-    return labels(lambda found: XCAFDoc_ShapeTool.GetComponents_s(label, found, False))
-
-
 def _places(document: Document, products: list[TDF_Label]) -> Iterator[tuple[TDF_Label, str]]:
     """Everything that can be coloured or put on a layer, and words for it."""
     parts = {label_key(part.label): part for part in document.parts}
     for label in products:
         product = label_name(label)
         yield label, product
-        for component in _components(label):
+        for component in components(label):
             yield component, f"{product}/{label_name(component)}"
         part = parts.get(label_key(label))
         for sub in labels(lambda found, label=label: XCAFDoc_ShapeTool.GetSubShapes_s(label, found)):
@@ -138,18 +133,13 @@ def _colours(places: Iterable[tuple[TDF_Label, str]]) -> Iterator[tuple[str, str
     for label, place in places:
         for name, kind in _COLOURS.items():
             if XCAFDoc_ColorTool.GetColor_s(label, kind, colour):
-                opaque = colour.Alpha() > 1 - 1e-3
-                text = Quantity_ColorRGBA.ColorToHex_s(colour).ToCString().lower()
-                yield place, name, text[:7] if opaque else text
+                yield place, name, colour_text(colour)
 
 
 def _grow(label: TDF_Label, above: tuple[str, ...], frame: TopLoc_Location, tree: list[Placed]) -> None:
     """Add a label and what it is made of."""
     frame = frame * XCAFDoc_ShapeTool.GetLocation_s(label)
-    path, product = (*above, label_name(label)), label
-    if XCAFDoc_ShapeTool.IsReference_s(label):
-        product = TDF_Label()
-        XCAFDoc_ShapeTool.GetReferredShape_s(label, product)
+    path, product = (*above, label_name(label)), referred(label)
     tree.append(Placed(path, label_name(product), tuple(matrix(frame)[:3].ravel().tolist())))
-    for component in _components(product):
+    for component in components(product):
         _grow(component, path, frame, tree)

@@ -6,9 +6,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 
+from OCP.BRep import BRep_Tool
 from OCP.Geom import Geom_BSplineSurface
 from OCP.Geom2d import Geom2d_Curve
-from OCP.Quantity import Quantity_Color
+from OCP.Quantity import Quantity_ColorRGBA
+from OCP.TCollection import TCollection_ExtendedString
 from OCP.TDataStd import TDataStd_Name
 from OCP.TDF import TDF_Label, TDF_LabelSequence
 from OCP.TDocStd import TDocStd_Document
@@ -19,7 +21,8 @@ from OCP.TopoDS import TopoDS, TopoDS_Edge, TopoDS_Face, TopoDS_Shape
 from OCP.TopTools import TopTools_IndexedMapOfShape
 from OCP.XCAFDoc import XCAFDoc_ColorTool, XCAFDoc_ColorType, XCAFDoc_DocumentTool, XCAFDoc_ShapeTool
 
-from mracad.occ.units import Units
+from mracad.errors import FileError
+from mracad.occ.units import Units, metres
 
 
 @dataclass(eq=False)
@@ -43,7 +46,7 @@ class Part:
     placements : list of TopLoc_Location
         Where its instances stand.
     colour : str
-        Of the whole part (or its first coloured instance), ``"#rrggbb"`` or ``""``.
+        Of the whole part (or its first coloured instance), ``"#rrggbb"``, ``"#rrggbbaa"`` or ``""``.
     face_names, face_colours : dict
         By position in the part, from 0, where the document says something of the face.
     """
@@ -91,16 +94,34 @@ class Document:
         File name without folder.
     units : Units
     schema : str
-        ``"AP203"``, ``"AP214"``, ``"AP242"`` or ``""``.
+        ``"AP203"``, ``"AP214"``, ``"AP242"``, ``"IGES"``, ``"BREP"``, ``"BinBREP"`` or ``""``.
+    annotations : dict
+        The names of the dimensions, tolerances, datums and notes that the file states, by these words.
     conversions : dict
         Surfaces made by ``view(document, convert=…)``, by face index, for ``apply``.
+    moved : set of str
+        The labels (their keys) of the parts that an edit has changed.
+    origins : dict
+        The label (its key) of each product that ``isolate`` made, and of the one that it was copied from.
     """
 
     xcaf: TDocStd_Document
     name: str
     units: Units = field(default_factory=Units)
     schema: str = ""
+    annotations: dict[str, tuple[str, ...]] = field(default_factory=dict)
     conversions: dict[int, Conversion] = field(default_factory=dict)
+    moved: set[str] = field(default_factory=set)
+    origins: dict[str, str] = field(default_factory=dict)
+
+    def checked(self) -> Document:
+        """The document, if it has faces, all on surfaces; raises FileError."""
+        if not any(part.faces.Extent() for part in self.parts):
+            raise no_faces(self.name)
+        for index, face in enumerate(self.faces):
+            if BRep_Tool.Surface_s(face, TopLoc_Location()) is None:
+                raise FileError(f"'{self.name}': #{index + 1} is a mesh, not a surface", "export surfaces or solids")
+        return self
 
     @property
     def unit(self) -> str:
@@ -149,10 +170,31 @@ class Document:
         """All faces, in their part's frame, in the order of ``Model.faces``."""
         return [TopoDS.Face_s(part.faces.FindKey(i)) for part in self.parts for i in range(1, part.faces.Extent() + 1)]
 
+    def part_of(self, face: int) -> Part:
+        """The part that a face belongs to."""
+        return next(part for part in reversed(self.parts) if part.first <= face)
+
     @cached_property
     def edges(self) -> list[TopoDS_Edge]:
         """All edges of faces, in their part's frame, in the order of ``Model.edges``."""
         return [TopoDS.Edge_s(part.edges.FindKey(i)) for part in self.parts for i in range(1, part.edges.Extent() + 1)]
+
+
+def empty() -> TDocStd_Document:
+    """A document of the kernel without content, in millimetres."""
+    xcaf = TDocStd_Document(TCollection_ExtendedString("BinXCAF"))
+    set_unit(xcaf, 1.0)
+    return xcaf
+
+
+def set_unit(xcaf: TDocStd_Document, mm: float) -> None:
+    """Tell a document of the kernel what its numbers are."""
+    XCAFDoc_DocumentTool.SetLengthUnit_s(xcaf, metres(mm))
+
+
+def no_faces(name: str) -> FileError:
+    """The error for a file in which there is nothing to work with."""
+    return FileError(f"'{name}' holds no faces", "the file needs surfaces or solids, not only curves or meshes")
 
 
 def label_key(label: TDF_Label) -> str:
@@ -174,12 +216,18 @@ def label_name(label: TDF_Label) -> str:
 
 
 def label_colour(label: TDF_Label) -> str:
-    """The surface (or general) colour on a label as ``"#rrggbb"``, or ``""``."""
-    colour = Quantity_Color()
+    """The surface (or general) colour on a label as :func:`colour_text` has it, or ``""``."""
+    colour = Quantity_ColorRGBA()
     for kind in (XCAFDoc_ColorType.XCAFDoc_ColorSurf, XCAFDoc_ColorType.XCAFDoc_ColorGen):
         if XCAFDoc_ColorTool.GetColor_s(label, kind, colour):
-            return Quantity_Color.ColorToHex_s(colour).ToCString().lower()
+            return colour_text(colour)
     return ""
+
+
+def colour_text(colour: Quantity_ColorRGBA) -> str:
+    """``"#rrggbb"``, or ``"#rrggbbaa"`` where it is transparent."""
+    text = Quantity_ColorRGBA.ColorToHex_s(colour).ToCString().lower()
+    return text[:7] if colour.Alpha() > 1 - 1e-3 else text
 
 
 def labels(fill) -> Iterator[TDF_Label]:
@@ -188,6 +236,20 @@ def labels(fill) -> Iterator[TDF_Label]:
     fill(sequence)
     for i in range(1, sequence.Length() + 1):
         yield sequence.Value(i)
+
+
+def referred(label: TDF_Label) -> TDF_Label:
+    """The product that an instance is one of; a product itself."""
+    if not XCAFDoc_ShapeTool.IsReference_s(label):
+        return label
+    product = TDF_Label()
+    XCAFDoc_ShapeTool.GetReferredShape_s(label, product)
+    return product
+
+
+def components(label: TDF_Label) -> Iterator[TDF_Label]:
+    """The instances that an assembly is made of; none for a part."""
+    return labels(lambda found: XCAFDoc_ShapeTool.GetComponents_s(label, found, False))
 
 
 def _walk(
@@ -200,12 +262,9 @@ def _walk(
     """Follow an assembly down to its parts; note where each stands and the colour its instances give it."""
     frame = frame * XCAFDoc_ShapeTool.GetLocation_s(label)
     colour = colour or label_colour(label)
-    if XCAFDoc_ShapeTool.IsReference_s(label):
-        referred = TDF_Label()
-        XCAFDoc_ShapeTool.GetReferredShape_s(label, referred)
-        label = referred
+    label = referred(label)
     if XCAFDoc_ShapeTool.IsAssembly_s(label):
-        for component in labels(lambda sequence: XCAFDoc_ShapeTool.GetComponents_s(label, sequence, False)):
+        for component in components(label):
             _walk(component, frame, colour, placed, tints)
         return
     key = label_key(label)

@@ -21,7 +21,7 @@ from OCP.IntCurvesFace import IntCurvesFace_ShapeIntersector
 from OCP.ShapeAnalysis import ShapeAnalysis_Surface
 from OCP.TopAbs import TopAbs_FORWARD, TopAbs_IN, TopAbs_REVERSED, TopAbs_SOLID
 from OCP.TopLoc import TopLoc_Location
-from OCP.TopoDS import TopoDS
+from OCP.TopoDS import TopoDS, TopoDS_Shape
 
 from mracad.occ.document import Document, Part
 from mracad.occ.settings import quiet
@@ -54,8 +54,12 @@ class Mass:
 
 def mass(document: Document) -> Mass:
     """Volume, area and centre of everything, placed."""
+    return mass_of(document.shape)
+
+
+def mass_of(shape: TopoDS_Shape) -> Mass:
+    """Volume, area and centre of a shape."""
     with quiet():
-        shape = document.shape
         solid = GProp_GProps()
         surface = GProp_GProps()
         solids = list(inside(shape, TopAbs_SOLID))

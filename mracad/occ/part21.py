@@ -1,4 +1,4 @@
-"""The text of a STEP file as the kernel writes it, made shorter and the same in every process."""
+"""The text of STEP files: as the kernel writes it, made shorter and the same in every process; annotations in it."""
 
 from __future__ import annotations
 
@@ -11,6 +11,27 @@ UNNAMED = b"mracad unnamed product"
 _STYLES = b" = MECHANICAL_DESIGN_GEOMETRIC_PRESENTATION_REPRESENTATION("
 _ENTITY = re.compile(rb"#(\d+) = (?:[^';]|'[^']*')*;\n")
 _REFERENCE = re.compile(rb"'[^']*'|#(\d+)")
+_PMI = {  # each begins with a word, for which the text is searched fast
+    "dimensions": (rb"DIMENSIONAL_(?:SIZE|LOCATION)\w*\s*\(", rb"ANGULAR_(?:SIZE|LOCATION)\w*\s*\("),
+    "tolerances": (rb"_TOLERANCE\s*\((?=\s*')",),
+    "datums": (rb"DATUM\s*\(",),
+    "notes": (rb"ANNOTATION(?:_[A-Z]+)?_OCCURRENCE\s*\(",),
+}
+_ARGUMENTS = re.compile(rb"(?:'(?:[^']|'')*'|[^';()])*")
+_TEXTS = re.compile(rb"'((?:[^']|'')*)'")
+
+
+def pmi(text: bytes) -> dict[str, tuple[str, ...]]:
+    """The names of the dimensions, tolerances, datums and notes in a STEP file; ``""`` where one has none."""
+    found = {}
+    for kind, patterns in _PMI.items():
+        names = []
+        for match in (match for pattern in patterns for match in re.finditer(pattern, text)):
+            texts = [name for name in _TEXTS.findall(_ARGUMENTS.match(text, match.end())[0]) if name]  # type: ignore[index]
+            names.append(texts[-1 if kind == "datums" else 0].decode(errors="replace") if texts else "")
+        if names:
+            found[kind] = tuple(names)
+    return found
 
 
 def tidy(text: bytes) -> bytes:

@@ -1,4 +1,7 @@
-"""The kernel's process-wide state: its printers and its exchange settings, changed only inside a ``with``."""
+"""The kernel's process-wide state: its printers and its exchange settings, changed only inside a ``with``.
+
+And how files are written: with all digits, and the same whenever that is.
+"""
 
 from __future__ import annotations
 
@@ -7,10 +10,13 @@ import os
 import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from datetime import UTC, datetime
 
-from OCP.Interface import Interface_Static
+from OCP.Interface import Interface_FloatWriter, Interface_Static
 from OCP.Message import Message
 from OCP.STEPCAFControl import STEPCAFControl_Controller
+
+from mracad.errors import UsageError
 
 _libc = ctypes.CDLL("ucrtbase" if sys.platform == "win32" else None)
 
@@ -64,3 +70,21 @@ def exchange(values: Mapping[str, str | int]) -> Iterator[None]:
     finally:
         for name, text in old.items():
             Interface_Static.SetCVal_s(name, text)
+
+
+def all_digits(writer: Interface_FloatWriter) -> None:
+    """Let a writer of reals give 17 significant digits and always the point, which STEP and IGES need.
+
+    What is nearest to zero would not fit the kernel's buffer with an exponent of three digits: it is cut to two.
+    """
+    writer.SetFormat("%#.2G")
+    writer.SetFormatForRange("%#.17G", 1e-99, 1e99)
+
+
+def moment() -> datetime:
+    """The time that a file's header states: SOURCE_DATE_EPOCH, else 1970; raises UsageError."""
+    epoch = os.environ.get("SOURCE_DATE_EPOCH", "0")
+    try:
+        return datetime.fromtimestamp(int(epoch), UTC)
+    except (ValueError, OverflowError) as error:
+        raise UsageError(f"SOURCE_DATE_EPOCH is '{epoch}'", "give it whole seconds since 1970, or unset it") from error

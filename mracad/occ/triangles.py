@@ -8,6 +8,7 @@ import numpy as np
 from OCP.BRep import BRep_Tool
 from OCP.BRepMesh import BRepMesh_IncrementalMesh
 from OCP.BRepTools import BRepTools
+from OCP.IMeshTools import IMeshTools_MeshAlgoType, IMeshTools_Parameters
 from OCP.TopAbs import TopAbs_REVERSED
 from OCP.TopLoc import TopLoc_Location
 
@@ -18,7 +19,11 @@ from mracad.occ.topology import box, compound, matrix
 Array = np.ndarray
 _CHORD = 2e-4  # of the diagonal
 _ANGLE = 12.0  # degrees
-_WELD = 2e-7  # of the diagonal: about the resolution of 32-bit numbers
+_ALGORITHMS = (
+    IMeshTools_MeshAlgoType.IMeshTools_MeshAlgoType_Watson,
+    IMeshTools_MeshAlgoType.IMeshTools_MeshAlgoType_Delabella,
+)
+_WELD = 2e-7  # of a part's diagonal: about the resolution of 32-bit numbers
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,40 +60,63 @@ def triangles(document: Document, chord: float | None = None, angle: float | Non
     angle : float, optional
         How far neighbouring triangles may turn along a curve, degrees; by default 12.
     """
+    with quiet():
+        whole = compound(part.shape for part in document.parts)
+        bounds = box(document.shape)
+        settings = IMeshTools_Parameters()
+        settings.Deflection = chord or _CHORD * float(np.linalg.norm(bounds[1] - bounds[0]))
+        settings.Angle = float(np.radians(angle or _ANGLE))
+        best: Triangles | None = None
+        for algorithm in _ALGORITHMS:
+            settings.MeshAlgo = algorithm
+            BRepTools.Clean_s(whole)
+            BRepMesh_IncrementalMesh(whole, settings)
+            found = _collected(document)
+            if best is None or _folds(found) < _folds(best):
+                best = found
+            if not _folds(best):
+                break
+        BRepTools.Clean_s(whole)
+    assert best is not None
+    return best
+
+
+def _folds(mesh: Triangles) -> int:
+    """How many sides of triangles are there more than once in one direction: the kernel's default now and then folds a
+    mesh over itself."""
+    sides = mesh.corners[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    return len(sides) - len(np.unique(sides[:, 0] * len(mesh.points) + sides[:, 1]))
+
+
+def _collected(document: Document) -> Triangles:
+    """The triangles that the kernel keeps with the faces."""
     points: list[Array] = []
     corners: list[Array] = []
     owners: list[tuple[int, int, int]] = []
     missing = []
     count = 0
-    with quiet():
-        whole = compound(part.shape for part in document.parts)
-        BRepTools.Clean_s(whole)
-        bounds = box(document.shape)
-        diagonal = float(np.linalg.norm(bounds[1] - bounds[0]))
-        BRepMesh_IncrementalMesh(whole, chord or _CHORD * diagonal, False, float(np.radians(angle or _ANGLE)), False)
-        for number, part in enumerate(document.parts):
-            first = count
-            own: list[Array] = []
-            for index in range(part.first, part.first + part.faces.Extent()):
-                face, location = document.faces[index], TopLoc_Location()
-                mesh = BRep_Tool.Triangulation_s(face, location)
-                if mesh is None:
-                    missing.append(index)
-                    continue
-                frame = matrix(location)
-                nodes = np.array([mesh.Node(i).Coord() for i in range(1, mesh.NbNodes() + 1)])
-                own.append(nodes @ frame[:3, :3].T + frame[:3, 3])
-                three = np.array([mesh.Triangle(i).Get() for i in range(1, mesh.NbTriangles() + 1)]) - 1 + count
-                corners.append(three[:, ::-1] if face.Orientation() == TopAbs_REVERSED else three)
-                owners.append((index, number, len(three)))
-                count += len(nodes)
-            if own:
-                welded, leader = _weld(np.concatenate(own), _WELD * diagonal)
-                points.append(welded)
-                for k in range(len(corners)):
-                    if owners[k][1] == number:
-                        corners[k] = leader[corners[k] - first] + first
-        BRepTools.Clean_s(whole)
+    for number, part in enumerate(document.parts):
+        first = count
+        own: list[Array] = []
+        for index in range(part.first, part.first + part.faces.Extent()):
+            face, location = document.faces[index], TopLoc_Location()
+            mesh = BRep_Tool.Triangulation_s(face, location)
+            if mesh is None:
+                missing.append(index)
+                continue
+            frame = matrix(location)
+            nodes = np.array([mesh.Node(i).Coord() for i in range(1, mesh.NbNodes() + 1)])
+            own.append(nodes @ frame[:3, :3].T + frame[:3, 3])
+            three = np.array([mesh.Triangle(i).Get() for i in range(1, mesh.NbTriangles() + 1)]) - 1 + count
+            corners.append(three[:, ::-1] if face.Orientation() == TopAbs_REVERSED else three)
+            owners.append((index, number, len(three)))
+            count += len(nodes)
+        if own:
+            points.append(np.concatenate(own))
+            leader = _weld(points[-1])
+            for k in range(len(corners)):
+                if owners[k][1] == number:
+                    corners[k] = leader[corners[k] - first] + first
     if not corners:
         return Triangles(np.empty((0, 3)), np.empty((0, 3), int), np.empty(0, int), np.empty(0, int), tuple(missing))
     three = np.concatenate(corners)
@@ -97,14 +125,18 @@ def triangles(document: Document, chord: float | None = None, angle: float | Non
     return Triangles(np.concatenate(points), three[whole_ones], faces[whole_ones], parts[whole_ones], tuple(missing))
 
 
-def _weld(points: Array, reach: float) -> tuple[Array, Array]:
-    """The points, and for each the first of those that coincide with it."""
-    from scipy.sparse import coo_array
+def _weld(points: Array) -> Array:
+    """For each point the first of those that coincide with it.
+
+    The kernel evaluates both sides of a closing edge, and rounds them differently.
+    """
+    from scipy.sparse import coo_array  # a few tenths of a second that reading and writing STEP can do without
     from scipy.sparse.csgraph import connected_components
     from scipy.spatial import cKDTree
 
+    reach = _WELD * float(np.linalg.norm(np.ptp(points, axis=0)))
     pairs = cKDTree(points).query_pairs(reach, output_type="ndarray")
     links = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(points), len(points)))
     groups = connected_components(links, directed=False)[1]
     _, first = np.unique(groups, return_index=True)
-    return points, first[groups]
+    return first[groups]

@@ -1,4 +1,4 @@
-"""Length units of STEP files.
+"""Length units of files.
 
 The kernel works in millimetres: it multiplies every length that it reads by the file's unit and divides by it on
 writing.  With x = fl(a f) in memory, fl(fl(x / f) f) = x for every a and f in double precision (where the quotients are

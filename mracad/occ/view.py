@@ -93,12 +93,12 @@ def view(document: Document, convert: Iterable[int] = ()) -> Model:
     for face in sorted(chosen):
         if not 0 <= face < len(document.faces):
             raise UsageError(f"there is no face #{face + 1}", f"the faces are #1 to #{len(document.faces)}")
-    with quiet():
+    with quiet(), np.errstate(invalid="ignore", over="ignore"):
         found = _walk(document, chosen)
         kinds = [_KINDS.get(type(surface).__name__, "other") for surface in found.grounds]
         control = nets(list(found.surfaces))
         boxes = [box(face) for face in found.faces]
-        _refuse_absurd(document.name, boxes, zip(found.surfaces.values(), control, strict=True))
+        _refuse_absurd(document.name, _stored(boxes, zip(found.surfaces.values(), control, strict=True)))
         trims = _trims(found)
         faces = tuple(
             Face(
@@ -115,23 +115,40 @@ def view(document: Document, convert: Iterable[int] = ()) -> Model:
             for index, (net, members) in enumerate(zip(control, found.surfaces.values(), strict=True))
         )
         edges = tuple(_edges(document, found))
+        diagonal = _diagonal(document, boxes)
+        _refuse_absurd(document.name, _seen(edges, found, diagonal))
     products = tuple(part.product for part in document.parts)
-    diagonal = _diagonal(document, boxes)
     return Model(document.name, surfaces, faces, edges, diagonal, document.unit, document.schema, products)
 
 
-def _refuse_absurd(name: str, boxes: list[Array], surfaces: Iterable[tuple[list[int], Net]]) -> None:
-    """Raise FileError where numbers are infinite, undefined or astronomic: nothing made of them means anything."""
-    values = [(index, box) for index, box in enumerate(boxes)]
-    for members, net in surfaces:
-        values.append((members[0], net.poles))
-        if net.weights is not None:
-            values.append((members[0], net.weights))
-    for face, numbers in values:
-        if not (np.abs(numbers) < _ABSURD).all():
+def _refuse_absurd(name: str, numbers: Iterable[tuple[int, Array | float]]) -> None:
+    """Raise FileError where numbers of a face are infinite, undefined or astronomic: nothing comes of them."""
+    for face, values in numbers:
+        if not (np.abs(values) < _ABSURD).all():
             raise FileError(
                 f"'{name}' is damaged: #{face + 1} has coordinates or weights beyond {_ABSURD:.0e}", "export it again"
             )
+
+
+def _stored(boxes: list[Array], surfaces: Iterable[tuple[list[int], Net]]) -> Iterator[tuple[int, Array]]:
+    """What the file says of each face."""
+    yield from enumerate(boxes)
+    for members, net in surfaces:
+        yield members[0], net.poles
+        if net.weights is not None:
+            yield members[0], net.weights
+
+
+def _seen(edges: tuple[Edge, ...], found: _Found, diagonal: float) -> Iterator[tuple[int, Array | float]]:
+    """What was evaluated of each face, and where it stands."""
+    yield 0, diagonal
+    yield from enumerate(found.frames)
+    for edge in edges:
+        for side in edge.sides:
+            yield side.face, edge.points
+            for values in (side.uv, side.points, side.normals):
+                if values is not None:
+                    yield side.face, values
 
 
 def _walk(document: Document, chosen: frozenset[int]) -> _Found:

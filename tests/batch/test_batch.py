@@ -155,7 +155,7 @@ def test_inputs_are_files_folders_patterns_and_lists(tmp_path):
     assert [item.output for item in find([f"{tmp_path}/*/**/*.STP"], out)] == [os.path.join("in", "sub", "deep.STP")]
     with pytest.raises(UsageError, match="replaced by its own output"):
         find([str(folder / "part000.step")], folder)
-    with pytest.raises(FileError, match="no STEP files in"):
+    with pytest.raises(FileError, match="no models in"):
         find([f"{folder}/*.stp"], out)
     (tmp_path / "part000.step").write_text("other")
     with pytest.raises(UsageError, match="would both be written"):

@@ -77,3 +77,44 @@ def test_one_edit_changes_every_instance(mracad, samples, tmp_path):
     assert body["failed"] == ["deviation"]
     assert {face for finding in body["layers"][1]["findings"] for face in finding["faces"]} == {7}
     assert next(p for p in occ.view(occ.read_step(out)).faces if p.index == 6).instances == 4
+
+
+def smoothed(mracad, samples, out, *words):
+    return mracad("smooth", samples / "assembly.step", "--scale", "8mm", "-o", out, *words)
+
+
+def test_one_instance_is_edited_alone(mracad, samples, tmp_path):
+    out = tmp_path / "out.step"
+    assert smoothed(mracad, samples, out, "--instance", "front pair/pad left").code == 0
+    old, new = occ.read(samples / "assembly.step"), occ.read(out)
+    before, after = contents(old), contents(new)
+    assert after.tree == before.tree and after.layers == before.layers
+    assert {(what, colour) for _, what, colour in after.colours} == {
+        (what, colour) for _, what, colour in before.colours
+    }
+    pads = [part for part in new.parts if part.product == "pad"]
+    assert sorted(len(part.placements) for part in pads) == [1, 3]
+    nets = {len(part.placements): occ.view(new).surfaces[i].net.poles for i, part in enumerate(pads)}
+    assert np.array_equal(nets[3], occ.view(old).surfaces[0].net.poles)
+    assert np.abs(nets[1] - nets[3]).max() > 1e-3
+    assert all(set(part.face_colours.values()) == {"#ff0000"} for part in pads)
+
+
+def test_faces_of_an_instance_have_the_numbers_of_its_part(mracad, samples, tmp_path):
+    words = ("--instance", "front pair/pad left", "--dry-run", "--json", "--faces")
+    out = tmp_path / "out.step"
+    edited = json.loads(smoothed(mracad, samples, out, *words, "#7").out)
+    assert edited["counts"]["edited"] == 1 and edited["counts"].get("unselected", 0) == 1
+    assert json.loads(smoothed(mracad, samples, out, *words, "!#7").out)["counts"].get("edited", 0) == 0
+    steps = "smooth --scale 8mm --instance 'front pair/pad left' ! smooth --scale 9mm --faces #7 --instance"
+    again = mracad("pipeline", f"{steps} 'front pair/pad left'", samples / "assembly.step", "-o", out)
+    assert again.code == 0 and len([p for p in occ.read(out).parts if p.product == "pad"]) == 2
+
+
+@pytest.mark.parametrize(
+    ("path", "says"), [("pad left", "2 instances"), ("nothing", "no instance"), ("front pair", "no instance")]
+)
+def test_an_instance_that_is_not_one(mracad, samples, tmp_path, path, says):
+    result = smoothed(mracad, samples, tmp_path / "out.step", "--instance", path)
+    assert result.code == 2 and says in result.err and "front pair/pad left" in result.err
+    assert "  fixture/front pair/pad left" in mracad("info", samples / "assembly.step", "--all").out

@@ -9,7 +9,7 @@ from mracad.bspline.gram import gram
 from mracad.edit import smooth as module
 from mracad.edit.smooth import smooth
 from mracad.model import Model
-from mracad.occ.read import read_step
+from mracad.occ.step import read_step
 from mracad.occ.view import view
 from mracad.options import Smooth
 

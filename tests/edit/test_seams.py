@@ -11,9 +11,8 @@ from mracad.audit.continuity import seams
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.net import Net
 from mracad.edit.smooth import smooth
-from mracad.occ.read import read_step
+from mracad.occ.step import read_step, write_step
 from mracad.occ.view import view
-from mracad.occ.write import write_step
 from mracad.options import Smooth
 from mracad.wavelet.ladder import arc_lengths, ladder_for_scale, rungs_by_level
 from mracad.wavelet.project import projection

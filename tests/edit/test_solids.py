@@ -8,13 +8,11 @@ from OCP.BRepBuilderAPI import BRepBuilderAPI_NurbsConvert
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS
 
-from mracad import job
+from mracad import job, occ
 from mracad.edit.smooth import smooth
 from mracad.model import Displacement, Offset
 from mracad.occ.apply import apply
 from mracad.occ.check import check
-from mracad.occ.mesh import write_stl
-from mracad.occ.read import read_step
 from mracad.occ.view import view
 from mracad.options import Smooth
 from samples import make
@@ -45,7 +43,7 @@ def rounded_box():
 
 
 def sample(name):
-    return lambda folder: read_step(folder / f"{name}.step")
+    return lambda folder: occ.read_step(folder / f"{name}.step")
 
 
 @pytest.mark.parametrize(
@@ -69,5 +67,5 @@ def test_solids_stay_solid_and_smooth(samples, tmp_path, source, scale, moving):
         assert after.gap <= max(before.gap, 1e-4)
         if before.smooth or before.edge not in moved:
             assert after.angle <= before.angle + 0.01
-    write_stl(document, tmp_path / "out.stl")
+    occ.write(document, tmp_path / "out.stl")
     assert is_watertight(corners(tmp_path / "out.stl"))

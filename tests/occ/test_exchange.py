@@ -114,7 +114,7 @@ def test_bad_inputs_say_what_is_wrong(wavy, tmp_path):
         "missing.step": (None, "no such file"),
         "empty.step": (b"", "empty"),
         "cut.step": (text[: len(text) // 2], "truncated"),
-        "notes.step": (b"dear diary", "not a STEP file"),
+        "notes.step": (b"dear diary", "none of STEP"),
         "nothing.step": (shapes.save(lines, tmp_path / "x.step").read_bytes(), "no faces"),
         "garbled.step": (text.replace(b"B_SPLINE_SURFACE_WITH_KNOTS", b"B_SPLINE_SURFACE_WITH_NOTHING"), "no faces"),
     }
@@ -143,7 +143,7 @@ def test_nothing_is_printed(wavy, tmp_path, capfd):
     document = occ.read_step(wavy)
     occ.check(document, distances=True)
     occ.write_step(document, tmp_path / "out.step")
-    occ.write_stl(document, tmp_path / "out.stl")
+    occ.write(document, tmp_path / "out.stl")
     with pytest.raises(FileError):
         occ.read_step(shapes.save(shapes.compound(), tmp_path / "none.step"))
     captured = capfd.readouterr()

@@ -1,4 +1,4 @@
-"""STL and CadQuery selectors."""
+"""Meshes of documents, and CadQuery selectors."""
 
 from collections import Counter
 
@@ -8,6 +8,7 @@ from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox, BRepPrimAPI_MakeSphere
 
 from mracad import occ
 from mracad.errors import FileError, UsageError
+from mracad.occ.files import Lost
 from tests.occ import shapes
 
 
@@ -31,7 +32,7 @@ def is_watertight(triangles):
 @pytest.mark.parametrize("unit", ["MM", "M"])
 def test_a_box_is_watertight_and_in_millimetres(tmp_path, unit):
     document = occ.read_step(shapes.save(BRepPrimAPI_MakeBox(1, 2, 3).Shape(), tmp_path / "in.step", unit))
-    assert occ.write_stl(document, tmp_path / "out.stl") == ()
+    assert occ.write(document, tmp_path / "out.stl") == ()
     triangles = corners(tmp_path / "out.stl")
     assert is_watertight(triangles) and len(triangles) == 12
     assert triangles.reshape(-1, 3).max(axis=0) == pytest.approx([1, 2, 3], rel=1e-6)
@@ -41,14 +42,14 @@ def test_finer_settings_give_more_triangles_and_text_says_the_same(tmp_path):
     document = shapes.document(BRepPrimAPI_MakeSphere(5).Shape())
     sizes = []
     for chord, angle in ((0.5, 40), (0.05, 40), (0.05, 5), (None, None)):
-        occ.write_stl(document, tmp_path / "out.stl", chord=chord, angle=angle)
+        occ.write(document, tmp_path / "out.stl", chord=chord, angle=angle)
         sizes.append(len(corners(tmp_path / "out.stl")))
         assert is_watertight(corners(tmp_path / "out.stl"))
     assert sizes[0] < sizes[1] < sizes[2]
     first = (tmp_path / "out.stl").read_bytes()
-    occ.write_stl(document, tmp_path / "out.stl")
+    occ.write(document, tmp_path / "out.stl")
     assert (tmp_path / "out.stl").read_bytes() == first
-    occ.write_stl(document, tmp_path / "text.stl", ascii=True)
+    occ.write(document, tmp_path / "text.stl", ascii=True)
     text = (tmp_path / "text.stl").read_text()
     assert text.startswith("solid mracad\n") and text.count("facet normal") == sizes[3]
 
@@ -56,16 +57,18 @@ def test_finer_settings_give_more_triangles_and_text_says_the_same(tmp_path):
 def test_a_face_that_cannot_be_meshed_is_named(tmp_path):
     box = BRepPrimAPI_MakeBox(1, 2, 3).Shape()
     bare = shapes.document(box).faces[2].EmptyCopied()  # no boundary at all
-    assert occ.write_stl(shapes.document(shapes.compound(box, bare)), tmp_path / "out.stl") == (6,)
+    assert occ.write(shapes.document(shapes.compound(box, bare)), tmp_path / "out.stl") == (
+        Lost("faces", 7, 6, ("#7",)),
+    )
 
 
 def test_bad_settings_and_targets(tmp_path):
     document = shapes.document(BRepPrimAPI_MakeSphere(5).Shape())
     for wrong in ({"chord": 0.0}, {"angle": -1.0}, {"chord": float("nan")}):
         with pytest.raises(UsageError, match="positive"):
-            occ.write_stl(document, tmp_path / "out.stl", **wrong)
+            occ.write(document, tmp_path / "out.stl", **wrong)
     with pytest.raises(FileError, match="cannot write"):
-        occ.write_stl(document, tmp_path / "nowhere" / "out.stl")
+        occ.write(document, tmp_path / "nowhere" / "out.stl")
     assert not list(tmp_path.iterdir())
 
 

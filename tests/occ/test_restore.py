@@ -10,7 +10,7 @@ from mracad.edit.smooth import smooth
 from mracad.model import Displacement, Offset
 from mracad.occ.apply import apply, restore
 from mracad.occ.check import Failure, check
-from mracad.occ.read import read_step
+from mracad.occ.step import read_step
 from mracad.occ.view import view
 from mracad.options import Smooth
 from tests.conftest import SAMPLES

@@ -2,6 +2,7 @@
 
 import ctypes
 import faulthandler
+import fcntl
 import os
 import subprocess
 import sys
@@ -9,7 +10,7 @@ import time
 
 import pytest
 
-from mracad import guard
+from mracad import guard, output
 from mracad.errors import Code, EditError, FileError, MracadError
 from tests.robust import kill, mutate
 
@@ -24,6 +25,27 @@ def test_a_file_with_faults(number):
 
 def test_kills_leave_the_old_file_or_the_new_one():
     assert not kill.kills(10)
+
+
+def test_what_killed_writers_left_is_removed(tmp_path):
+    left, held, young = (tmp_path / f".mracad-{name}" for name in ("left", "held", "young"))
+    for path in (left, held, young):
+        path.write_bytes(b"part of a file")
+    for path in (left, held):
+        os.utime(path, (0, 0))
+    with held.open() as writer:
+        fcntl.flock(writer, fcntl.LOCK_EX)
+        output.put(b"whole", tmp_path / "out.step")
+    assert {path.name for path in tmp_path.iterdir()} == {".mracad-held", ".mracad-young", "out.step"}
+
+
+def test_a_file_that_is_being_written_is_not_taken_for_one_that_was_left(tmp_path):
+    with output.beside(tmp_path / "slow.step") as slow:
+        os.utime(slow, (0, 0))
+        output.put(b"whole", tmp_path / "out.step")
+        assert slow.exists()
+        slow.write_bytes(b"late")
+    assert (tmp_path / "slow.step").read_bytes() == b"late"
 
 
 def crash():
@@ -58,6 +80,25 @@ def test_a_crash_or_an_endless_loop_is_an_error(work, code, says):
     with pytest.raises(MracadError, match=says) as error:
         guard.run(work, 0.3)
     assert error.value.code == code and error.value.hint and time.monotonic() - start < 3
+
+
+def test_a_crash_says_what_it_was_at():
+    def work():
+        guard.doing("reading", "bad.step")
+        guard.doing("editing")
+        crash()
+
+    with pytest.raises(MracadError, match=r"crashed \(SIGSEGV\) while editing 'bad.step'"):
+        guard.run(work)
+
+
+def test_outputs_that_take_their_places_are_not_cut_off(tmp_path):
+    def work():
+        output.put(b"whole", tmp_path / "out.step")
+        time.sleep(0.6)
+        return "done"
+
+    assert guard.run(work, 0.3) == "done"
 
 
 def test_too_much_memory_is_an_error():

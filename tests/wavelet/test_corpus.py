@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from mracad.occ.read import read_step
+from mracad.occ.step import read_step
 from mracad.occ.view import view
 from mracad.wavelet.ladder import arc_lengths, ladder_for_scale, rungs_by_level
 from mracad.wavelet.project import projection

@@ -1,6 +1,6 @@
-"""Take many STEP files through a recipe, each in a worker process within limits; done again, only what changed.
+"""Take many models through a recipe, each in a worker process within limits; done again, only what changed.
 
-IN are files, folders (all STEP files below them) or patterns; - reads a list from standard input. A file that crashes
+IN are files, folders (all models below them) or patterns; - reads a list from standard input. A file that crashes
 its worker, hangs or takes too much memory fails alone. Exit code 1 when any file failed; run again to go on.
 """
 
@@ -10,6 +10,7 @@ from typing import Any
 
 import click
 
+from mracad.formats import FORMATS
 from mracad_cli import options
 
 
@@ -41,6 +42,11 @@ from mracad_cli import options
         help="Try a file again after a crash or a limit.",
     ),
     options.input_unit,
+    click.option(
+        "--format",
+        type=click.Choice(list(FORMATS)),
+        help="Format of the outputs, and their ending.  [default: that of each input]",
+    ),
     options.schema,
     options.overwrite,
     options.if_changed,

@@ -1,4 +1,4 @@
-"""Check a STEP file layer by layer; exit code 1 when something asked for does not hold.
+"""Check a model layer by layer; exit code 1 when something asked for does not hold.
 
 The file as parsed, the shapes that the kernel loads from it, its own check of them, closed shells, seams, faces that
 cross, tolerances, walls, the mesh. Valid is yes, no or unknown, never a guess.

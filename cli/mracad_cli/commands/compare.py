@@ -1,4 +1,4 @@
-"""Compare a STEP file with a reference; exit code 1, with the reasons, when something differs beyond its limit.
+"""Compare a model with a reference; exit code 1, with the reasons, when something differs beyond its limit.
 
 Faces are matched whatever their numbers. A face's deviation is measured both ways by exact projection; where it only
 became longer or shorter, its outline has moved. Lengths are compared in millimetres whatever the files' units.
@@ -19,6 +19,7 @@ from mracad_cli.progress import Progress
 @options.apply(
     click.argument("reference", metavar="REF", type=click.Path(allow_dash=True)),
     click.argument("source", metavar="NEW", type=click.Path(allow_dash=True)),
+    options.input_unit,
     options.of(Compare, without="reference"),
     options.reports,
     options.printing,
@@ -26,6 +27,7 @@ from mracad_cli.progress import Progress
 def command(
     reference: str,
     source: str,
+    input_unit: str | None,
     junit: str | None,
     sarif: str | None,
     overwrite: bool,
@@ -42,7 +44,7 @@ def command(
 
     with Progress() as progress:
         progress("reading", 0, 1)
-        old, new = read(reference, None), read(source, None)
+        old, new = read(reference, limits.reference_unit), read(source, input_unit)
         progress("comparing", 0, 1)
         judged = job.compare(new, limits, lambda: old)
     return emit(judged.verdict, judged.failed, command="compare", as_json=as_json, junit=junit, sarif=sarif)

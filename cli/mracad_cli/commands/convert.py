@@ -1,4 +1,4 @@
-"""Write a STEP file again in another schema, or as a mesh (STL)."""
+"""Write a model in another format: STEP, IGES, BREP, BinBREP, or as a mesh (STL, 3MF, OBJ, PLY, glTF)."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ def command(source: str, input_unit: str | None, as_json: bool, outputs: tuple[s
     import time
 
     from mracad_cli.files import Outputs, read
+    from mracad_cli.render import plain
 
     start = time.perf_counter()
     targets = Outputs(outputs, **formats)
@@ -26,7 +27,8 @@ def command(source: str, input_unit: str | None, as_json: bool, outputs: tuple[s
         progress("writing", 0, 1)
         targets.write(document, "convert")
     if as_json:
-        targets.say(json.dumps({"file": document.name, "written": targets.names()}, ensure_ascii=False))
+        body = {"file": document.name, "written": targets.names(), "lost": plain(targets.lost)}
+        targets.say(json.dumps(body, ensure_ascii=False))
     else:
         targets.say(f"{document.name}: wrote {targets.sizes()}, {time.perf_counter() - start:.1f} s")
     return 0

@@ -1,4 +1,4 @@
-"""Say what is in a STEP file: units, products, faces, scales, seams, validity."""
+"""Say what is in a model: units, products, faces, scales, seams, validity."""
 
 from __future__ import annotations
 
@@ -29,7 +29,12 @@ if TYPE_CHECKING:
         show_default=True,
         help="Continuity that smoothing would keep; it decides which poles are free.",
     ),
-    click.option("--all", "everything", is_flag=True, help="List the faces that are not NURBS and every seam too."),
+    click.option(
+        "--all",
+        "everything",
+        is_flag=True,
+        help="List the instances, the faces that are not NURBS and every seam, too.",
+    ),
     options.printing,
 )
 def command(source: str, input_unit: str | None, scale: str, keep: Any, everything: bool, as_json: bool) -> int:
@@ -38,6 +43,7 @@ def command(source: str, input_unit: str | None, scale: str, keep: Any, everythi
     from mracad.audit.continuity import seams, summary
     from mracad.edit.smooth import smooth
     from mracad.occ.check import check
+    from mracad.occ.instance import instances
     from mracad.occ.view import view
     from mracad.options import Smooth, length
     from mracad_cli.files import read
@@ -61,6 +67,7 @@ def command(source: str, input_unit: str | None, scale: str, keep: Any, everythi
             "unit": model.unit,
             "schema": model.schema,
             "products": list(model.products),
+            "instances": list(instances(document)),
             "diagonal": model.diagonal,
             "scale": width,
             "faces": [{**_facts(model, f), **_judged(o)} for f, o in zip(model.faces, outcomes, strict=True)],
@@ -73,6 +80,8 @@ def command(source: str, input_unit: str | None, scale: str, keep: Any, everythi
     print(f"{model.name}: {model.schema or 'unknown schema'}, unit {model.unit}, diagonal {render.mm(model.diagonal)}")
     if model.products:
         print(f"products: {len(model.products)}: {', '.join(name or '(no name)' for name in model.products)}")
+    if everything:
+        print(*(f"  {path}" for path in instances(document)), sep="\n")
     print(f"faces: {len(model.faces)}: " + ", ".join(f"{n} {kind}" for kind, n in kinds.most_common()))
     print(render.seam_line(summary(measures)))
     print(f"valid: {render.verdict(valid.valid)}" + "".join(f"\n  {failure}" for failure in valid.failures[:10]))

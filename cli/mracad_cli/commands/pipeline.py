@@ -1,4 +1,4 @@
-"""Take a STEP file through steps given in one argument: 'smooth --scale 5mm ! check'."""
+"""Take a model through steps given in one argument: 'smooth --scale 5mm ! check'."""
 
 from __future__ import annotations
 

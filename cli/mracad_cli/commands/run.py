@@ -1,4 +1,4 @@
-"""Take a STEP file through the steps of a recipe (TOML): one read, one write."""
+"""Take a model through the steps of a recipe (TOML): one read, one write."""
 
 from __future__ import annotations
 

@@ -1,0 +1,83 @@
+"""File formats by name, ending and first bytes; ``mracad.occ`` and ``mracad.mesh`` read and write them."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import PurePath
+from typing import Literal
+
+from mracad.errors import FileError
+
+Kind = Literal["exact", "mesh"]
+
+
+@dataclass(frozen=True)
+class Format:
+    """A file format.
+
+    Attributes
+    ----------
+    name : str
+        As ``--format`` takes it.
+    endings : tuple of str
+        In small letters, with the dot; the first is the usual one.
+    kind : {"exact", "mesh"}
+        Exact formats are read and written, meshes only written.
+    """
+
+    name: str
+    endings: tuple[str, ...]
+    kind: Kind
+
+
+FORMATS = {
+    format.name: format
+    for format in (
+        Format("step", (".step", ".stp", ".p21"), "exact"),
+        Format("iges", (".iges", ".igs"), "exact"),
+        Format("brep", (".brep", ".brp"), "exact"),
+        Format("binbrep", (".bbrep", ".binbrep"), "exact"),
+        Format("stl", (".stl",), "mesh"),
+        Format("3mf", (".3mf",), "mesh"),
+        Format("obj", (".obj",), "mesh"),
+        Format("ply", (".ply",), "mesh"),
+        Format("gltf", (".gltf",), "mesh"),
+        Format("glb", (".glb",), "mesh"),
+    )
+}
+
+READABLE = frozenset(ending for format in FORMATS.values() if format.kind == "exact" for ending in format.endings)
+"""Endings of the files that can be read."""
+
+
+def by_ending(path: str | os.PathLike[str]) -> Format:
+    """The format that the ending of a file name means; raises FileError."""
+    ending = PurePath(path).suffix.lower()
+    for format in FORMATS.values():
+        if ending in format.endings:
+            return format
+    known = " ".join(format.endings[0] for format in FORMATS.values())
+    raise FileError(f"cannot write {path}: unknown ending {ending!r}", f"end it in one of {known}")
+
+
+def by_content(data: bytes, name: str) -> Format:
+    """The format of a file that was read, whatever it is called.
+
+    Raises
+    ------
+    FileError
+        When it is empty, or none that can be read.
+    """
+    if not data.strip():
+        raise FileError(f"'{name}' is empty", "export it again")
+    start = data[:4096]
+    if b"ISO-10303-21" in start:
+        return FORMATS["step"]
+    if start.lstrip().startswith((b"CASCADE Topology V", b"DBRep_DrawableShape")):
+        return FORMATS["brep"]
+    if start.lstrip().startswith(b"Open CASCADE Topology V"):
+        return FORMATS["binbrep"]
+    if start[72:73] == b"S" and start[73:80].strip().isdigit():
+        return FORMATS["iges"]
+    raise FileError(f"'{name}' is none of STEP, IGES, BREP and BinBREP", "export it as one of them")

@@ -1,0 +1,15 @@
+"""Triangle meshes out, one module a format; numpy alone."""
+
+from mracad.mesh import gltf, obj, ply, stl, threemf
+from mracad.mesh.scene import Body, Node, Scene
+
+__all__ = ["Body", "Node", "Scene", "write"]
+
+
+def write(scene: Scene, format: str, ascii: bool = False) -> bytes:
+    """A scene in a mesh format of ``mracad.formats``; ``ascii`` is for STL."""
+    if format == "stl":
+        return stl.write(scene, ascii)
+    if format in ("gltf", "glb"):
+        return gltf.write(scene, binary=format == "glb")
+    return {"3mf": threemf, "obj": obj, "ply": ply}[format].write(scene)

@@ -1,0 +1,114 @@
+"""3MF: objects, components and colours, in mm; the triangles of a face are a named triangle set.
+
+Core specification 1.3 with the triangle sets extension of 2021/07, https://github.com/3MFConsortium.
+"""
+
+from __future__ import annotations
+
+import io
+import re
+import zipfile
+from collections.abc import Iterator
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+
+from mracad import __version__
+from mracad.mesh.scene import Body, Node, Scene, rgba
+
+_TYPES = (
+    '<?xml version="1.0" encoding="UTF-8"?>\n'
+    '<Types xmlns="http://schemas.openxmlformats.org/package/2006/content-types">\n'
+    ' <Default Extension="rels" ContentType="application/vnd.openxmlformats-package.relationships+xml"/>\n'
+    ' <Default Extension="model" ContentType="application/vnd.ms-package.3dmanufacturing-3dmodel+xml"/>\n'
+    "</Types>\n"
+)
+_RELATIONS = (
+    '<?xml version="1.0" encoding="UTF-8"?>\n'
+    '<Relationships xmlns="http://schemas.openxmlformats.org/package/2006/relationships">\n'
+    ' <Relationship Target="/3D/3dmodel.model" Id="rel0" '
+    'Type="http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"/>\n'
+    "</Relationships>\n"
+)
+_HEAD = (
+    '<?xml version="1.0" encoding="UTF-8"?>\n'
+    '<model unit="millimeter" xml:lang="en-US" '
+    'xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02" '
+    'xmlns:t="http://schemas.microsoft.com/3dmanufacturing/trianglesets/2021/07">'
+)
+_FORBIDDEN = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]")
+_COLOURS = 1  # the number of the resource that holds them
+
+
+def write(scene: Scene) -> bytes:
+    """A scene as 3MF: the same bytes every time."""
+    packed = io.BytesIO()
+    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
+        for path, text in (
+            ("[Content_Types].xml", _TYPES), ("_rels/.rels", _RELATIONS), ("3D/3dmodel.model", _model(scene)),
+        ):  # fmt: skip
+            entry = zipfile.ZipInfo(path)  # dated 1980
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            archive.writestr(entry, text.encode())
+    return packed.getvalue()
+
+
+def _model(scene: Scene) -> str:
+    colours = list(dict.fromkeys(colour for body in scene.bodies for colour in body.colours if colour))
+    lines = [_HEAD, f' <metadata name="Application">mracad {__version__}</metadata>', " <resources>"]
+    if colours:
+        lines.append(f'  <basematerials id="{_COLOURS}">')
+        for colour in colours:
+            display = "#" + bytes(rgba(colour)).hex().upper()
+            lines.append(f'   <base name="{colour}" displaycolor="{display}"/>')
+        lines.append("  </basematerials>")
+    place = {colour: number for number, colour in enumerate(colours)}
+    for number, body in enumerate(scene.bodies):
+        lines += _object(_COLOURS + 1 + number, body, place)
+    groups: list[str] = []
+    items = [_reference("item", node, scene, groups) for node in scene.roots]
+    lines += [*groups, " </resources>", " <build>", *(f"  {item}" for item in items), " </build>", "</model>", ""]
+    return "\n".join(lines)
+
+
+def _object(number: int, body: Body, place: dict[str, int]) -> Iterator[str]:
+    """A body as a mesh."""
+    ends = np.sort(np.concatenate([body.corners[:, [i, (i + 1) % 3]] for i in range(3)]), axis=1)
+    closed = (np.unique(ends, axis=0, return_counts=True)[1] == 2).all()
+    kind = "model" if closed else "surface"
+    yield f'  <object id="{number}" type="{kind}" name={_quoted(body.name or "part")}>'
+    yield "   <mesh>\n    <vertices>"
+    for x, y, z in body.points.tolist():
+        yield f'     <vertex x="{x!r}" y="{y!r}" z="{z!r}"/>'
+    yield "    </vertices>\n    <triangles>"
+    corners = body.corners.tolist()
+    for face, triangles in body.groups():
+        colour = body.colours[face]
+        coloured = f' pid="{_COLOURS}" p1="{place[colour]}"' if colour else ""
+        for a, b, c in corners[triangles]:
+            yield f'     <triangle v1="{a}" v2="{b}" v3="{c}"{coloured}/>'
+    yield "    </triangles>\n    <t:trianglesets>"
+    for face, triangles in body.groups():
+        label = body.labels[face]
+        yield f'     <t:triangleset name={_quoted(label)} identifier="face{label.partition(" ")[0][1:]}">'
+        yield f'      <t:refrange startindex="{triangles.start}" endindex="{triangles.stop - 1}"/>'
+        yield "     </t:triangleset>"
+    yield "    </t:trianglesets>\n   </mesh>\n  </object>"
+
+
+def _reference(tag: str, node: Node, scene: Scene, groups: list[str]) -> str:
+    """An element that places the content of a node; an object that holds components is added to ``groups``."""
+    if node.body is not None:
+        number = _COLOURS + 1 + node.body
+    else:
+        parts = [_reference("component", child, scene, groups) for child in node.children]
+        number = _COLOURS + 1 + len(scene.bodies) + len(groups)
+        head = f'  <object id="{number}" type="model" name={_quoted(node.name or "assembly")}>'
+        parts = ["   <components>", *(f"    {part}" for part in parts), "   </components>"]
+        groups.append("\n".join([head, *parts, "  </object>"]))
+    frame = " ".join(map(repr, node.frame[:3].T.ravel().tolist()))
+    return f'<{tag} objectid="{number}" transform="{frame}"/>'
+
+
+def _quoted(name: str) -> str:
+    return quoteattr(_FORBIDDEN.sub("", name))

@@ -1,0 +1,148 @@
+"""Documents in and out, in every format: one function each way."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import BinaryIO
+
+from mracad.errors import UsageError
+from mracad.formats import FORMATS, by_content, by_ending
+from mracad.occ.document import Document
+from mracad.occ.load import load
+from mracad.output import put
+
+
+@dataclass(frozen=True)
+class Lost:
+    """What a written file lacks.
+
+    Attributes
+    ----------
+    what : str
+        ``"faces"``, which the kernel could not mesh; ``"dimensions"``, ``"tolerances"``, ``"datums"`` or ``"notes"``.
+    stated, written : int
+        How many there were, and are.
+    names : tuple of str
+        Of the faces that are missing; of all such annotations, since the kernel does not keep their names.
+    """
+
+    what: str
+    stated: int
+    written: int
+    names: tuple[str, ...]
+
+    def __str__(self) -> str:
+        names = list(dict.fromkeys(name for name in self.names if name))
+        shown = ", ".join(names[:3]) + (" …" if len(names) > 3 else "")
+        return f"{self.stated - self.written} of {self.stated} {self.what}" + (f" ({shown})" if shown else "")
+
+
+def read(source: str | os.PathLike | BinaryIO, input_unit: str | None = None) -> Document:
+    """Read a STEP, IGES, BREP or BinBREP file, which it is by its content.
+
+    Parameters
+    ----------
+    source : path or binary stream
+    input_unit : str, optional
+        The length unit that the file's numbers are in, whatever it says itself; also that of the output.
+
+    Raises
+    ------
+    FileError
+        For a file that is missing, unreadable, damaged, in another format, or without faces.
+    UsageError
+        For an unknown unit.
+    """
+    file = load(source)
+    format = by_content(file.getvalue(), file.name).name
+    if format == "step":
+        from mracad.occ.step import read_step
+
+        return read_step(file, input_unit)
+    if format == "iges":
+        from mracad.occ.iges import read_iges
+
+        return read_iges(file, input_unit)
+    from mracad.occ.brep import read_brep
+
+    return read_brep(file, input_unit)
+
+
+def write(
+    document: Document,
+    target: str | os.PathLike | BinaryIO,
+    format: str = "",
+    *,
+    schema: str = "",
+    chord: float | None = None,
+    angle: float | None = None,
+    ascii: bool = False,
+    options_text: str = "",
+) -> tuple[Lost, ...]:
+    """Write a document, whole or not at all; the same bytes every time.
+
+    Parameters
+    ----------
+    document : Document
+    target : path or binary stream
+    format : str
+        A key of ``mracad.formats.FORMATS``; by default what the ending of the path means, STEP for a stream.
+    schema : str
+        STEP: see ``write_step``.
+    chord, angle : float, optional
+        Meshes: see ``scene``.
+    ascii : bool
+        STL: text rather than binary.
+    options_text : str
+        What was done, for the header of STEP and IGES files.
+
+    Returns
+    -------
+    tuple of Lost
+        What could not be written: faces of a mesh, annotations of an exact model.
+
+    Raises
+    ------
+    FileError
+        When the document cannot be expressed in that format, or the target cannot be written.
+    UsageError
+        For an unknown format or schema, or settings that make no sense.
+    """
+    named = isinstance(target, str | os.PathLike)
+    if not format:
+        format = by_ending(target).name if named else "step"  # type: ignore[arg-type]
+    if format not in FORMATS:
+        raise UsageError(f"unknown format '{format}'", "use one of " + ", ".join(FORMATS))
+    name = Path(target).name if named else document.name  # type: ignore[arg-type]
+    lost: tuple[Lost, ...] = ()
+    if format == "step":
+        from mracad.occ.step import step
+
+        data = step(document, name, schema, options_text)
+    elif format == "iges":
+        from mracad.occ.iges import iges
+
+        data = iges(document, name, options_text)
+    elif format in ("brep", "binbrep"):
+        from mracad.occ.brep import brep
+
+        data = brep(document, binary=format == "binbrep")
+    else:
+        from mracad.mesh import write as write_mesh
+        from mracad.occ.scene import scene
+
+        seen, missing = scene(document, chord, angle)
+        data = write_mesh(seen, format, ascii)
+        if missing:
+            count, names = len(document.faces), tuple(f"#{face + 1}" for face in missing)
+            lost = (Lost("faces", count, count - len(missing), names),)
+    if FORMATS[format].kind == "exact" and document.annotations:
+        from mracad.occ.part21 import pmi
+
+        kept = pmi(data) if format == "step" else {}
+        counts = {what: (names, len(kept.get(what, ()))) for what, names in document.annotations.items()}
+        lost = tuple(Lost(what, len(ns), count, ns) for what, (ns, count) in counts.items() if count < len(ns))
+    put(data, target)
+    return lost

@@ -1,0 +1,159 @@
+"""IGES in and out: bodies and surfaces with their names, colours and levels; the kernel flattens assemblies."""
+
+from __future__ import annotations
+
+import io
+import os
+import tempfile
+from collections import Counter
+from pathlib import Path
+from typing import BinaryIO
+
+from OCP.IFSelect import IFSelect_RetDone
+from OCP.IGESBasic import IGESBasic_Name
+from OCP.IGESCAFControl import IGESCAFControl_Reader, IGESCAFControl_Writer
+from OCP.IGESControl import IGESControl_Controller
+from OCP.IGESData import IGESData_IGESEntity, IGESData_IGESModel, IGESData_IGESWriter
+from OCP.IGESSelect import IGESSelect_WorkLibrary
+from OCP.TCollection import TCollection_HAsciiString
+
+from mracad import __version__
+from mracad.errors import FileError
+from mracad.occ.document import Document, empty, no_faces
+from mracad.occ.load import load
+from mracad.occ.settings import all_digits, exchange, moment, quiet
+from mracad.occ.units import UNITS, Units, named
+
+_FLAGS = {1: "in", 2: "mm", 4: "ft", 5: "mi", 6: "m", 7: "km", 8: "mil", 9: "um", 10: "cm", 11: "uin"}
+_MODES = ("Name", "Color", "Layer")
+
+
+def read_iges(source: str | os.PathLike | BinaryIO, input_unit: str | None = None) -> Document:
+    """Read an IGES file.
+
+    Parameters
+    ----------
+    source : path or binary stream
+    input_unit : str, optional
+        The length unit that the file's numbers are in, whatever it says itself; also that of the output.
+
+    Raises
+    ------
+    FileError
+        For a file that is missing, unreadable, or without faces.
+    UsageError
+        For an unknown unit.
+    """
+    file = load(source)
+    _refuse_torn(file.getvalue(), file.name)
+    unit = None if input_unit is None else named(input_unit)
+    IGESControl_Controller.Init_s()
+    xcaf = empty()
+    with quiet(), exchange({}), tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, "model.igs")  # the kernel reads no IGES from a stream
+        path.write_bytes(file.getvalue())
+        reader = IGESCAFControl_Reader()
+        for mode in _MODES:
+            getattr(reader, f"Set{mode}Mode")(True)
+        if reader.ReadFile(str(path)) != IFSelect_RetDone:
+            raise FileError(f"'{file.name}' cannot be parsed as IGES", "the file is damaged: export it again")
+        model = reader.IGESModel()
+        section = model.GlobalSection()
+        if unit:
+            section.SetUnitFlag(next(flag for flag, key in _FLAGS.items() if key == unit))
+            model.SetGlobalSection(section)
+        unit = _FLAGS.get(section.UnitFlag())
+        if not reader.Transfer(xcaf):
+            raise no_faces(file.name)
+    return Document(xcaf, file.name, Units(unit, UNITS[unit][0]) if unit else Units(), "IGES").checked()
+
+
+def iges(document: Document, name: str, options_text: str = "") -> bytes:
+    """A document as IGES 5.3 in its own unit, solids as such.
+
+    Parameters
+    ----------
+    document : Document
+    name : str
+        Of the file, for its header.
+    options_text : str
+        What was done, for the header.
+
+    Raises
+    ------
+    FileError
+        When the kernel cannot express it.
+    """
+    IGESControl_Controller.Init_s()
+    stream = io.BytesIO()
+    with quiet(), exchange({"write.iges.brep.mode": 1, "write.iges.unit": UNITS[document.unit][1]}):
+        writer = IGESCAFControl_Writer()
+        for mode in _MODES:
+            getattr(writer, f"Set{mode}Mode")(True)
+        if not writer.Transfer(document.xcaf):
+            raise FileError(f"the kernel cannot express '{document.name}' as IGES", "check its geometry")
+        writer.ComputeModel()
+        model = writer.Model()
+        _names_in_order(model)
+        _head(model, name, options_text)
+        printer = IGESData_IGESWriter(model)
+        all_digits(printer.FloatWriter())
+        printer.SendModel(IGESSelect_WorkLibrary.DefineProtocol_s())
+        printer.Print(stream)
+    return stream.getvalue()
+
+
+def _refuse_torn(text: bytes, name: str) -> None:
+    """Raise FileError where the sections of a file do not have the lines that its last line states."""
+    lines = text.splitlines()
+    counts = Counter(line[72:73] for line in lines)
+    last = next((line for line in reversed(lines) if line.strip()), b"")
+    stated = {last[i : i + 1]: last[i + 1 : i + 8].strip() for i in range(0, 32, 8)}
+    if last[72:73] != b"T" or any(b"%d" % counts[key] != count.lstrip(b"0") for key, count in stated.items()):
+        raise FileError(f"'{name}' is truncated: it lacks lines", "copy or export it again")
+
+
+def _names_in_order(model: IGESData_IGESModel) -> None:
+    """Let names come in the order of what they name: the kernel adds them by address, another order in each process."""
+    owners: dict[IGESBasic_Name, list[IGESData_IGESEntity]] = {}
+    names = []
+    for number in range(1, model.NbEntities() + 1):
+        entity = model.Value(number)
+        if isinstance(entity, IGESBasic_Name):
+            names.append(entity)
+        properties = entity.Properties()
+        while properties.More():
+            if isinstance(properties.Value(), IGESBasic_Name):
+                owners.setdefault(properties.Value(), []).append(entity)
+            properties.Next()
+    groups = [(name.Value(), owned) for name, owned in owners.items()]
+    for name, owned in owners.items():
+        for entity in owned:
+            entity.RemoveProperty(name)
+    for name, (text, owned) in zip([name for name in names if name in owners], groups, strict=True):
+        name.Init(1, text)
+        for entity in owned:
+            entity.AddProperty(name)
+
+
+def _head(model: IGESData_IGESModel, name: str, options_text: str) -> None:
+    """Fill the start and global sections: nothing in them depends on where, when or how often it is written."""
+    section = model.GlobalSection()
+    date = TCollection_HAsciiString(moment().strftime("%Y%m%d.%H%M%S"))
+    section.SetDate(date)
+    section.SetLastChangeDate(date)
+    maker = TCollection_HAsciiString(f"mracad {__version__}")
+    section.SetSystemId(maker)
+    section.SetInterfaceVersion(maker)
+    section.SetSendName(TCollection_HAsciiString(_ascii(Path(name).stem)))
+    section.SetFileName(TCollection_HAsciiString(_ascii(name)))
+    section.SetAuthorName(TCollection_HAsciiString(""))
+    model.SetGlobalSection(section)
+    model.ClearStartSection()
+    text = _ascii(options_text)
+    for start in range(0, len(text), 72):
+        model.AddStartLine(text[start : start + 72])
+
+
+def _ascii(text: str) -> str:
+    return text.encode("ascii", errors="replace").decode()

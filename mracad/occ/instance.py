@@ -1,0 +1,164 @@
+"""One instance of a shared part made a part of its own, so that an edit of it leaves the others."""
+
+from __future__ import annotations
+
+import difflib
+from collections import Counter
+from collections.abc import Iterator
+
+from OCP.BRepBuilderAPI import BRepBuilderAPI_Copy
+from OCP.TDataStd import TDataStd_Name, TDataStd_NamedData, TDataStd_TreeNode
+from OCP.TDF import TDF_Attribute, TDF_AttributeIterator, TDF_Label, TDF_LabelSequence, TDF_RelocationTable
+from OCP.TopLoc import TopLoc_Location
+from OCP.XCAFDoc import (
+    XCAFDoc,
+    XCAFDoc_Area,
+    XCAFDoc_Centroid,
+    XCAFDoc_DocumentTool,
+    XCAFDoc_ShapeTool,
+    XCAFDoc_Volume,
+)
+
+from mracad.errors import UsageError
+from mracad.occ.document import Document, components, label_key, label_name, labels, referred
+
+_VALUES = (TDataStd_Name, TDataStd_NamedData, XCAFDoc_Area, XCAFDoc_Volume, XCAFDoc_Centroid)
+
+
+def instances(document: Document) -> dict[str, list[TDF_Label]]:
+    """The parts where they stand, and the labels from the top down to each.
+
+    A path is made of the names of the instances (of their products, where those have none) with slashes between; the
+    second among neighbours of the same name has ``#2`` behind it.
+    """
+    return dict(_below(document.shape_tool.GetFreeShapes, "", []))
+
+
+def isolate(document: Document, path: str) -> dict[int, int]:
+    """Make one instance a part of its own, with all that was said of the part.
+
+    What lies above it in the assembly is copied, too, where that is used elsewhere.
+
+    Parameters
+    ----------
+    document : Document
+        Changed in place, unless the part has no other instance; a copy's faces come after all others.
+    path : str
+        Of the instance, or the end of that.
+
+    Returns
+    -------
+    dict of int
+        The faces of the instance, by their own numbers and by those of the part that they were copied from.
+
+    Raises
+    ------
+    UsageError
+        When no instance has that path, or several.
+    """
+    every = instances(document)
+    fitting = [name for name in every if name == path or name.endswith(f"/{path}")]
+    if len(fitting) != 1:
+        near = fitting or difflib.get_close_matches(path, every, n=3, cutoff=0.3) or list(every)[:3]
+        what = f"'{path}' names {len(fitting)} instances" if fitting else f"there is no instance '{path}'"
+        raise UsageError(f"{document.name}: {what}", f"use one of {', '.join(near[:6])}; see mracad info --all")
+    _, *chain = every[fitting[0]]
+    if not chain:
+        return _faces(document, every[fitting[0]][0])
+    for number, component in enumerate(chain):
+        product = referred(component)
+        if len(list(labels(lambda found, product=product: XCAFDoc_ShapeTool.GetUsers_s(product, found, False)))) > 1:
+            order = list(components(product))
+            copy = _copied(document, product)
+            document.origins[label_key(copy)] = document.origins.get(label_key(product), label_key(product))
+            _point(component, copy)
+            if number + 1 < len(chain):
+                below = [label_key(label) for label in order].index(label_key(chain[number + 1]))
+                chain[number + 1] = list(components(copy))[below]
+    document.shape_tool.UpdateAssemblies()
+    for cached in ("parts", "faces", "edges"):
+        document.__dict__.pop(cached, None)
+    return _faces(document, referred(chain[-1]))
+
+
+def _below(fill, path: str, above: list[TDF_Label]) -> Iterator[tuple[str, list[TDF_Label]]]:
+    seen: Counter[str] = Counter()
+    for label in labels(fill):
+        product = referred(label)
+        name = label_name(label) or label_name(product)
+        seen[name] += 1
+        place = f"{path}{name}" + (f"#{seen[name]}" if seen[name] > 1 else "")
+        if XCAFDoc_ShapeTool.IsAssembly_s(product):
+            inside = lambda found, product=product: XCAFDoc_ShapeTool.GetComponents_s(product, found, False)  # noqa: E731
+            yield from _below(inside, f"{place}/", [*above, label])
+        else:
+            yield place, [*above, label]
+
+
+def _faces(document: Document, product: TDF_Label) -> dict[int, int]:
+    """The faces of a part, by their own numbers and those of the part that it was copied from."""
+    parts = {label_key(part.label): part for part in document.parts}
+    key = label_key(product)
+    part, origin = parts[key], parts.get(document.origins.get(key, key))
+    count = range(part.faces.Extent())
+    copied = {origin.first + i: part.first + i for i in count} if origin else {}
+    return copied | {part.first + i: part.first + i for i in count}
+
+
+def _copied(document: Document, product: TDF_Label) -> TDF_Label:
+    """A part with a geometry of its own, or an assembly of the same products."""
+    tool = document.shape_tool
+    if XCAFDoc_ShapeTool.IsAssembly_s(product):
+        copy = tool.NewShape()
+        for component in list(components(product)):
+            # a location of its own: the writer tells instances apart by shape and location
+            location = TopLoc_Location(XCAFDoc_ShapeTool.GetLocation_s(component).Transformation())
+            twin = tool.AddComponent(copy, referred(component), location)
+            _say(document, component, twin)
+    else:
+        copier = BRepBuilderAPI_Copy(XCAFDoc_ShapeTool.GetShape_s(product), True, False)
+        copy = tool.AddShape(copier.Shape(), False)
+        for sub in list(labels(lambda found: XCAFDoc_ShapeTool.GetSubShapes_s(product, found))):
+            twin = tool.AddSubShape(copy, copier.ModifiedShape(XCAFDoc_ShapeTool.GetShape_s(sub)))
+            if not twin.IsNull():
+                _say(document, sub, twin)
+    _say(document, product, copy)
+    return copy
+
+
+def _say(document: Document, old: TDF_Label, new: TDF_Label) -> None:
+    """Say of a label what is said of another: name, properties, colours, material, layers."""
+    link = XCAFDoc.ShapeRefGUID_s()
+    for kind in _VALUES:
+        new.ForgetAttribute(kind.GetID_s())
+    for attribute in _attributes(old):
+        if isinstance(attribute, _VALUES):
+            copy = attribute.NewEmpty()
+            new.AddAttribute(copy)
+            attribute.Paste(copy, TDF_RelocationTable())
+        elif isinstance(attribute, TDataStd_TreeNode) and attribute.HasFather() and not link.IsSame(attribute.ID()):
+            attribute.Father().Append(TDataStd_TreeNode.Set_s(new, attribute.ID()))  # a colour or material
+    layers = TDF_LabelSequence()
+    tool = XCAFDoc_DocumentTool.LayerTool_s(document.xcaf.Main())
+    tool.GetLayers(old, layers)
+    for i in range(1, layers.Length() + 1):
+        tool.SetLayer(new, layers.Value(i), False)
+
+
+def _point(component: TDF_Label, product: TDF_Label) -> None:
+    """Make a component an instance of another product."""
+    link = XCAFDoc.ShapeRefGUID_s()
+    node = next(
+        node for node in _attributes(component) if isinstance(node, TDataStd_TreeNode) and link.IsSame(node.ID())
+    )
+    node.Remove()
+    TDataStd_TreeNode.Set_s(product, link).Append(node)
+
+
+def _attributes(label: TDF_Label) -> list[TDF_Attribute]:
+    found = []
+    attributes = TDF_AttributeIterator(label)
+    while attributes.More():
+        found.append(attributes.Value())
+        attributes.Next()
+    return found

@@ -1,0 +1,40 @@
+"""The bytes of an input, with its name."""
+
+from __future__ import annotations
+
+import io
+import os
+from pathlib import Path
+from typing import BinaryIO
+
+from mracad.errors import FileError
+
+
+class Text(io.BytesIO):
+    """The content of a file.
+
+    Attributes
+    ----------
+    name : str
+        Of the file, without folder.
+    """
+
+    def __init__(self, data: bytes, name: str) -> None:
+        super().__init__(data)
+        self.name = name
+
+
+def load(source: str | os.PathLike | BinaryIO) -> Text:
+    """Read a file or stream as a whole; raises FileError where that is not possible."""
+    if isinstance(source, Text):
+        return source
+    if not isinstance(source, str | os.PathLike):
+        return Text(source.read(), Path(str(getattr(source, "name", "stdin"))).name.strip("<>"))
+    path = Path(source)
+    try:
+        # the kernel takes no name that is not Unicode
+        return Text(path.read_bytes(), path.name.encode(errors="replace").decode())
+    except OSError as error:
+        reason = {IsADirectoryError: "it is a folder", FileNotFoundError: "there is no such file"}
+        why = reason.get(type(error), error.strerror or str(error))
+        raise FileError(f"cannot read '{path}': {why}", "give the path of a model") from error

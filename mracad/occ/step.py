@@ -1,0 +1,152 @@
+"""STEP in and out: every digit kept, the same bytes every time."""
+
+from __future__ import annotations
+
+import io
+import os
+import re
+from pathlib import Path
+from typing import BinaryIO
+
+from OCP.APIHeaderSection import APIHeaderSection_MakeHeader
+from OCP.IFSelect import IFSelect_RetDone
+from OCP.STEPCAFControl import STEPCAFControl_Reader, STEPCAFControl_Writer
+from OCP.STEPControl import STEPControl_AsIs
+from OCP.StepData import StepData_StepModel, StepData_StepWriter
+from OCP.TCollection import TCollection_HAsciiString
+
+from mracad import __version__
+from mracad.errors import FileError, UsageError
+from mracad.formats import by_content
+from mracad.occ.document import Document, empty, no_faces, set_unit
+from mracad.occ.load import load
+from mracad.occ.part21 import UNNAMED, pmi, tidy
+from mracad.occ.properties import restated
+from mracad.occ.settings import all_digits, exchange, moment, quiet
+from mracad.occ.units import UNITS, of_file
+from mracad.output import put
+
+_READ_MODES = ("Name", "Color", "Layer", "GDT", "Mat", "Props", "View", "SHUO", "Meta", "ProductMeta")
+_READ_SETTINGS = {"read.stepcaf.subshapes.name": "On"}
+_WRITE_MODES = ("Name", "Color", "Layer", "DimTol", "Material", "Props", "SHUO")
+_SCHEMAS = {"AP203": "AP203", "AP214": "AP214IS", "AP242": "AP242DIS"}
+
+
+def read_step(source: str | os.PathLike | BinaryIO, input_unit: str | None = None) -> Document:
+    """Read a STEP file with its names, colours, layers, tolerances and properties.
+
+    Parameters
+    ----------
+    source : path or binary stream
+    input_unit : str, optional
+        The length unit that the file's numbers are in, whatever it says itself; also that of the output.
+
+    Returns
+    -------
+    Document
+
+    Raises
+    ------
+    FileError
+        For a file that is missing, unreadable, truncated, not STEP, or without geometry.
+    UsageError
+        For an unknown unit.
+    """
+    file = load(source)
+    text, name = file.getvalue(), file.name
+    if by_content(text, name).name != "step":
+        raise FileError(f"'{name}' is not a STEP file", "it must begin with ISO-10303-21: export it as STEP")
+    if b"END-ISO-10303-21" not in text[-4096:]:
+        raise FileError(f"'{name}' is truncated: its end is missing", "copy or export it again")
+    reader = STEPCAFControl_Reader()
+    for mode in _READ_MODES:
+        getattr(reader, f"Set{mode}Mode")(True)
+    xcaf = empty()
+    with quiet(), exchange(_READ_SETTINGS):
+        if reader.ReadStream(name, io.BytesIO(text)) != IFSelect_RetDone:
+            raise FileError(f"'{name}' cannot be parsed as STEP", "the file is damaged: export it again")
+        units = of_file(reader.Reader().StepModel(), text, input_unit)
+        set_unit(xcaf, units.kernel_mm)
+        done = reader.Transfer(xcaf)
+        set_unit(xcaf, 1.0)
+    if not done:
+        raise no_faces(name)
+    return Document(xcaf, name, units, _schema(text), pmi(text)).checked()
+
+
+def _schema(text: bytes) -> str:
+    """Which application protocol the header names."""
+    match = re.search(rb"FILE_SCHEMA\s*\(\s*\(\s*'([^']*)'", text[:65536])
+    schema = match[1].upper() if match else b""
+    known = {b"AP242": "AP242", b"AUTOMOTIVE_DESIGN": "AP214", b"CONFIG_CONTROL_DESIGN": "AP203", b"AP203": "AP203"}
+    return next((name for start, name in known.items() if schema.startswith(start)), "")
+
+
+def write_step(
+    document: Document, target: str | os.PathLike | BinaryIO, schema: str = "", options_text: str = ""
+) -> None:
+    """Write a document as STEP, in the file's own length unit.
+
+    Parameters
+    ----------
+    document : Document
+    target : path or binary stream
+        A path is replaced only once the whole file is written.
+    schema : str
+        ``"AP203"``, ``"AP214"`` or ``"AP242"``.  By default AP242 for a document that was, otherwise AP214: written
+        as AP203, which the kernel takes to hold one body per product, a document of several loses its structure.
+    options_text : str
+        What was done, for the header.
+
+    Raises
+    ------
+    FileError
+        When the target cannot be written.
+    UsageError
+        For an unknown schema, or a SOURCE_DATE_EPOCH that is no number.
+    """
+    name = Path(target).name if isinstance(target, str | os.PathLike) else document.name
+    put(step(document, name, schema, options_text), target)
+
+
+def step(document: Document, name: str, schema: str = "", options_text: str = "") -> bytes:
+    """The whole STEP file; ``name`` is that in its header, the rest as for :func:`write_step`."""
+    schema = schema or ("AP242" if document.schema == "AP242" else "AP214")
+    if schema not in _SCHEMAS:
+        raise UsageError(f"unknown STEP schema '{schema}'", "use one of " + ", ".join(_SCHEMAS))
+    settings = {
+        "write.step.schema": _SCHEMAS[schema],
+        "write.step.unit": UNITS[document.unit][1],
+        "write.step.product.name": UNNAMED.decode(),
+        "write.stepcaf.subshapes.name": "On",
+    }
+    stream = io.BytesIO()
+    with quiet(), exchange(settings), restated(document):
+        writer = STEPCAFControl_Writer()
+        for mode in _WRITE_MODES:
+            getattr(writer, f"Set{mode}Mode")(True)
+        model = writer.Writer().Model()
+        model.SetWriteLengthUnit(document.units.mm)
+        if not writer.Transfer(document.xcaf, STEPControl_AsIs):
+            raise FileError(f"the kernel cannot express '{document.name}' as STEP", "check its geometry")
+        _head(model, name, options_text)
+        printer = StepData_StepWriter(model)
+        all_digits(printer.FloatWriter())
+        printer.SendModel(writer.Writer().WS().Protocol())
+        printer.Print(stream)
+    return tidy(stream.getvalue())
+
+
+def _head(model: StepData_StepModel, name: str, options_text: str) -> None:
+    """Fill the header: nothing in it depends on where, when or how often it is written."""
+    header = APIHeaderSection_MakeHeader(model)
+    header.SetName(TCollection_HAsciiString(_ascii(name)))
+    header.SetTimeStamp(TCollection_HAsciiString(moment().strftime("%Y-%m-%dT%H:%M:%S")))
+    header.SetOriginatingSystem(TCollection_HAsciiString(f"mracad {__version__}"))
+    header.SetPreprocessorVersion(TCollection_HAsciiString(f"mracad {__version__}"))
+    header.SetDescriptionValue(1, TCollection_HAsciiString(_ascii(options_text)))
+
+
+def _ascii(text: str) -> str:
+    """A text as STEP encodes it: what is not plain ASCII as ``\\X2\\…\\X0\\``."""
+    return re.sub(r"[^\x20-\x7e]+", lambda run: "\\X2\\" + run[0].encode("utf-16-be").hex().upper() + "\\X0\\", text)
