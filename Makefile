@@ -2,6 +2,7 @@
 #
 #   make demo    set everything up and smooth a sample
 #   make test    set everything up and run the tests
+#   make test-long  and refine the largest real models as well
 #   make regress compare every sample with the reference figures in samples/figures.json
 #   make fuzz    feed the commands 2 000 damaged files and kill 200 writers (half an hour)
 #
@@ -18,7 +19,7 @@ export SOURCE_DATE_EPOCH ?= 0
 
 SAMPLES := $(wildcard samples/*.step)
 
-.PHONY: demo test regress fuzz lint bench bench-batch docs samples smooth wheel clean
+.PHONY: demo test test-long regress fuzz lint bench bench-batch docs samples smooth wheel clean
 
 demo: $(VENV)/ready
 	@mkdir -p build
@@ -28,6 +29,9 @@ demo: $(VENV)/ready
 
 test: $(VENV)/dev
 	$(BIN)/python -m pytest -n 2
+
+test-long: $(VENV)/dev
+	$(BIN)/python -m pytest -n 2 --long
 
 regress: $(VENV)/ready
 	$(BIN)/python samples/regress.py samples/*.step

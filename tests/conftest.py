@@ -13,6 +13,14 @@ SAMPLES = Path(__file__).parents[1] / "samples"
 CORPUS = Path(os.environ["MRACAD_CORPUS"]) if os.environ.get("MRACAD_CORPUS") else None
 
 
+LONG = 10**6
+"""Real models of more bytes than this are refined only where ``--long`` asks for it."""
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--long", action="store_true", help="refine the largest real models as well")
+
+
 class Outcome(NamedTuple):
     """Exit code, standard output and standard error of a command."""
 
@@ -29,6 +37,14 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     reason = "MRACAD_CORPUS does not name a folder of STEP models"
     values = files or [pytest.param(None, marks=pytest.mark.skip(reason=reason))]
     metafunc.parametrize("corpus_file", values, ids=[f.stem for f in files] or ["none"])
+
+
+@pytest.fixture
+def refined_file(corpus_file: Path, pytestconfig: pytest.Config) -> Path:
+    """A real model that is refined."""
+    if corpus_file.stat().st_size > LONG and not pytestconfig.getoption("--long"):
+        pytest.skip("more than 1 MB: pytest --long refines it")
+    return corpus_file
 
 
 @pytest.fixture

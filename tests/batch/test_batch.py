@@ -216,6 +216,6 @@ def test_workers_end_with_a_killed_batch_and_an_interrupted_one_says_so(tmp_path
             time.sleep(0.05)
         time.sleep(0.5)
         process.send_signal(number)
-        _, err = process.communicate(timeout=10)
-        assert len(workers) == 2 and not psutil.wait_procs(workers, timeout=5)[1]
+        _, err = process.communicate(timeout=40)
+        assert len(workers) == 2 and not psutil.wait_procs(workers, timeout=20)[1]
     assert process.returncode == 130 and "interrupted after 0 of 4 files; run it again" in err

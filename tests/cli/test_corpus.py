@@ -41,13 +41,13 @@ def test_smooth_at_two_percent(corpus_file, mracad, tmp_path):
     assert_as_good(judge(out), judge(kernel_copy(corpus_file, tmp_path / "kernel.step")))
 
 
-def test_refinement_changes_every_file_with_detail(corpus_file, mracad, tmp_path):
+def test_refinement_changes_every_file_with_detail(corpus_file, refined_file, mracad, tmp_path):
     out, report = tmp_path / "out.step", tmp_path / "report.json"
-    result = mracad("smooth", corpus_file, "--scale", "2%", "--refine", "-o", out, "--report", report)
+    result = mracad("smooth", refined_file, "--scale", "2%", "--refine", "-o", out, "--report", report)
     assert result.code == 0, result.err
     body = json.loads(report.read_text())
     assert any(f["status"] == "edited" for f in body["faces"]) or not any(f["detail"] > 1e-7 for f in body["faces"])
     for seam in body["seams"]["each"]:
         assert seam["after"]["gap"] <= seam["gap"] + 1e-7
         assert not seam["smooth"] or seam["after"]["angle"] <= seam["angle"] + 1e-4
-    assert_as_good(judge(out), judge(kernel_copy(corpus_file, tmp_path / "kernel.step")), angles=False)
+    assert_as_good(judge(out), judge(kernel_copy(refined_file, tmp_path / "kernel.step")), angles=False)
