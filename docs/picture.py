@@ -36,12 +36,16 @@ def zebra(axes: plt.Axes, model: mracad.Model) -> None:
 
 
 def main(target: str) -> None:
-    """Smooth the panel with seams frozen and draw both."""
+    """Smooth the panel with its seams frozen and with its seams moving, and draw all three."""
     document = mracad.read(SAMPLE)
     before = mracad.snapshot(document)
-    after = mracad.smooth(before, mracad.Smooth(scale="25mm")).displacement.applied(before)
-    figure, panels = plt.subplots(1, 2, figsize=(12, 4.2))
-    for axes, model, title in zip(panels, (before, after), ("as it came", "smoothed at 25 mm"), strict=True):
+    frozen, coupled = (
+        mracad.smooth(before, mracad.Smooth(scale="25mm", edges=edges)).displacement.applied(before)
+        for edges in ("frozen", "coupled")
+    )
+    figure, panels = plt.subplots(1, 3, figsize=(18, 4.8))
+    titles = ("as it came", "smoothed at 25 mm, seams frozen", "smoothed at 25 mm, seams moving")
+    for axes, model, title in zip(panels, (before, frozen, coupled), titles, strict=True):
         zebra(axes, model)
         axes.set_title(title)
     figure.tight_layout()
