@@ -10,6 +10,7 @@ from collections.abc import Sequence
 import click
 
 import mracad
+from mracad import guard
 from mracad.errors import Code, MracadError
 from mracad_cli import commands, options
 from mracad_cli.steps import edit_command, edits
@@ -96,7 +97,14 @@ def _limited(arguments: list[str], guarded: bool) -> int:
     """Run a command; in a child process when it has a limit, or when a crash must not be the end of this one."""
 
     def work() -> int:
-        result = group.main(arguments, prog_name="mracad", standalone_mode=False)
+        try:
+            result = group.main(arguments, prog_name="mracad", standalone_mode=False)
+        except Exception as error:
+            if "--debug" in arguments or not type(error).__module__.startswith("OCP"):
+                raise
+            what = f"{type(error).__name__}: {error}"
+            hint = "the model may be damaged: see mracad check, or export it again"
+            raise MracadError(f"the CAD kernel failed{guard.now()} ({what})", hint) from error
         sys.stdout.flush()
         return result if isinstance(result, int) else 0
 
@@ -106,8 +114,6 @@ def _limited(arguments: list[str], guarded: bool) -> int:
     working = bool(arguments) and arguments[0] in group.list_commands(click.Context(group))
     if seconds is None and memory is None and not (guarded and working and "--debug" not in arguments):
         return work()
-    from mracad import guard
-
     return guard.run(work, seconds, memory)
 
 
