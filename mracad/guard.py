@@ -71,6 +71,11 @@ def doing(stage: str = "", subject: str = "") -> None:
         _note.write(stage or _note.stage, subject or _note.subject)
 
 
+def now() -> str:
+    """What this process is at, as ``" while reading 'part.step'"``; ``""`` where that is not known."""
+    return str(_note or "")
+
+
 def ending() -> None:
     """Say that the outputs are taking their places now: the time limit does not cut that off."""
     if _note:

@@ -110,7 +110,7 @@ def check(
     """
     from mracad.occ.check import check as kernel_check
     from mracad.occ.check import looks
-    from mracad.occ.stated import stated
+    from mracad.occ.stated import stated, unloaded
     from mracad.occ.triangles import triangles
     from mracad.occ.view import view
 
@@ -120,15 +120,20 @@ def check(
     why = "not written yet" if text is None else "only STEP files are looked at as parsed"
     measures = seams(model, every=True)
     flipped = layers.turned(file.uses) if file else set()
-    known = flipped if file and file.faces == len(model.faces) else set()
+    told = _told(file, document) if file else {}
+    known = {told[face] for face in flipped if face in told}
+    senses = file.senses if file else ()
+    inward = {face for place, face in told.items() if senses[place] == model.faces[face].reversed} - known
     unseen = "" if known or not flipped else f"; {len(flipped)} faces of the file were turned round"
-    brep = _limited("brep", lambda: layers.brep(kernel_check(document)), limits)
+    brep = _limited("brep", lambda: layers.brep(kernel_check(document), inward), limits)
     validity = kernel_check(document, faces=None if brep.status in ("pass", "fail") else ())
     open_faces = {edge.sides[0].face for edge in model.edges if edge.free}
     totals = summary(measures, frozenset(key(m) for m in measures if m.angle < limits.kink))
     found = [
         _file(file, document) if file else Layer("file", "skipped", why),
-        _load(len(model.faces), file.faces, unseen) if file else Layer("load", "skipped", why),
+        _load(len(model.faces), file.faces, unseen, lambda: unloaded(text or b"", name))
+        if file
+        else Layer("load", "skipped", why),
         brep,
         layers.shells(model, validity, known | layers.turned(looks(document))),
         layers.seams(measures, limits.kink, limits.gap, limits.angle, _seam_text(totals)),
@@ -138,6 +143,21 @@ def check(
         _limited("mesh", lambda: layers.mesh(triangles(document), open_faces), limits, slow),
     ]
     return Verdict(name, tuple(found), _valid(found, validity.solids))
+
+
+def _told(file: Stated, document: Document) -> dict[int, int]:
+    """Which face of the document each one in the file is, as far as its vertices tell."""
+    from scipy.spatial import cKDTree
+
+    from mracad.occ.check import centres
+
+    old, new = np.array(file.centres) * document.units.mm, np.array(centres(document))
+    near = 1e-6 * diagonal(document)
+    if not len(old):
+        return {}
+    old, new = (np.where(np.isfinite(points), points, 1e30) for points in (old, new))
+    there, back = cKDTree(new).query_ball_point(old, near), cKDTree(old).query_ball_point(new, near)
+    return {i: found[0] for i, found in enumerate(there) if len(found) == 1 and len(back[found[0]]) == 1}
 
 
 def failing(verdict: Verdict, rules: Iterable[str]) -> list[Layer]:
@@ -190,9 +210,12 @@ def _limited(name: str, make: Callable[[], Layer], limits: CheckLimits, slow: Co
         return Layer(name, "skipped", error.message)
 
 
-def _load(faces: int, stated: int, unseen: str) -> Layer:
+def _load(faces: int, stated: int, unseen: str, unloaded: Callable[[], list[str]]) -> Layer:
     text = f"{faces} faces of {stated}{unseen}"
-    lost = (Finding(f"{stated - faces} faces could not be loaded", "lost-faces"),) if faces < stated else ()
+    lost: tuple[Finding, ...] = ()
+    if faces < stated:
+        lost = tuple(Finding(f"face not loaded: {line}", "lost-faces") for line in unloaded())
+        lost = lost or (Finding(f"{stated - faces} faces could not be loaded", "lost-faces"),)
     return Layer("load", "fail" if lost else "pass", text, lost, {"faces": faces, "stated": stated})
 
 

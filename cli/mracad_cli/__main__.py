@@ -11,6 +11,7 @@ from collections.abc import Sequence
 import click
 
 import mracad
+from mracad import guard
 from mracad.errors import Code, MracadError
 from mracad_cli import commands, options
 from mracad_cli.steps import edit_command, edits
@@ -103,6 +104,12 @@ def _limited(arguments: list[str], guarded: bool) -> int:
         except click.ClickException as error:
             command = error.ctx.command_path if isinstance(error, click.UsageError) and error.ctx else "mracad"
             raise MracadError(error.format_message().rstrip("."), f"see {command} --help", Code.USAGE) from error
+        except Exception as error:
+            if "--debug" in arguments or not type(error).__module__.startswith("OCP"):
+                raise
+            what = f"{type(error).__name__}: {error}"
+            hint = "the model may be damaged: see mracad check, or export it again"
+            raise MracadError(f"the CAD kernel failed{guard.now()} ({what})", hint) from error
         sys.stdout.flush()
         return result if isinstance(result, int) else 0
 
@@ -112,8 +119,6 @@ def _limited(arguments: list[str], guarded: bool) -> int:
     working = bool(arguments) and arguments[0] in group.list_commands(click.Context(group))
     if seconds is None and memory is None and not (guarded and working and "--debug" not in arguments):
         return work()
-    from mracad import guard
-
     return guard.run(work, seconds, memory)
 
 

@@ -56,14 +56,17 @@ def turned(uses: Iterable[tuple[int, int, bool]]) -> set[int]:
     return wrong
 
 
-def brep(validity: Validity) -> Layer:
-    """The kernel's own check."""
+def brep(validity: Validity, inward: Iterable[int] = ()) -> Layer:
+    """The kernel's own check, and faces of the file that look against their surface, which it turned on reading."""
     findings = tuple(
         Finding(str(failure), failure.status, () if failure.face is None else (failure.face,))
         for failure in validity.failures
     )
-    text = "nothing wrong" if validity.valid else f"{len(findings)} failures"
-    return Layer("brep", "pass" if validity.valid else "fail", text, findings)
+    findings += tuple(
+        Finding(f"the same_sense of #{face + 1} in the file is wrong", "same-sense", (face,)) for face in sorted(inward)
+    )
+    text = f"{len(findings)} failures" if findings else "nothing wrong"
+    return Layer("brep", "fail" if findings else "pass", text, findings)
 
 
 def shells(model: Model, validity: Validity, inverted: Iterable[int]) -> Layer:

@@ -19,7 +19,6 @@ from OCP.TopoDS import TopoDS_Iterator, TopoDS_Shape
 from OCP.TopTools import TopTools_FormatVersion
 from OCP.XCAFDoc import XCAFDoc_DocumentTool
 
-from mracad.errors import FileError
 from mracad.formats import by_content
 from mracad.occ.document import Document, empty, no_faces
 from mracad.occ.load import load
@@ -49,14 +48,10 @@ def read_brep(source: str | os.PathLike | BinaryIO, input_unit: str | None = Non
     shape = TopoDS_Shape()
     with quiet():
         stream = io.BytesIO(file.getvalue())
-        try:
-            if binary:
-                BinTools.Read_s(shape, stream)
-            else:
-                BRepTools.Read_s(shape, stream, BRep_Builder())
-        except Exception as error:
-            text = f"'{file.name}' cannot be parsed as BREP"
-            raise FileError(text, "the file is damaged: export it again") from error
+        if binary:
+            BinTools.Read_s(shape, stream)
+        else:
+            BRepTools.Read_s(shape, stream, BRep_Builder())
         if shape.IsNull():
             raise no_faces(file.name)
         if unit != "mm":

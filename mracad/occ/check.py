@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -174,3 +175,13 @@ def looks(document: Document) -> Iterator[tuple[int, int, bool]]:
                 if not BRep_Tool.Degenerated_s(edge):
                     along = edge.Orientation() == TopAbs_FORWARD
                     yield part.first_edge + part.edges.FindIndex(edge) - 1, index, along
+
+
+def centres(document: Document) -> list[tuple[float, float, float]]:
+    """The middle of the vertices of each face, in its part's frame, mm."""
+    found = []
+    for face in document.faces:
+        points = [BRep_Tool.Pnt_s(TopoDS.Vertex_s(vertex)).Coord() for vertex in inside(face, TopAbs_VERTEX)]
+        x, y, z = (sum(values) / len(points) for values in zip(*points, strict=True)) if points else (math.inf,) * 3
+        found.append((x, y, z))
+    return found

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
 
-from mracad.errors import UsageError
+from mracad.errors import FileError, UsageError
 from mracad.formats import FORMATS, by_content, by_ending
 from mracad.occ.document import Document
 from mracad.occ.load import load
@@ -57,17 +57,24 @@ def read(source: str | os.PathLike | BinaryIO, input_unit: str | None = None) ->
     """
     file = load(source)
     format = by_content(file.getvalue(), file.name).name
-    if format == "step":
-        from mracad.occ.step import read_step
+    try:
+        if format == "step":
+            from mracad.occ.step import read_step
 
-        return read_step(file, input_unit)
-    if format == "iges":
-        from mracad.occ.iges import read_iges
+            return read_step(file, input_unit)
+        if format == "iges":
+            from mracad.occ.iges import read_iges
 
-        return read_iges(file, input_unit)
-    from mracad.occ.brep import read_brep
+            return read_iges(file, input_unit)
+        from mracad.occ.brep import read_brep
 
-    return read_brep(file, input_unit)
+        return read_brep(file, input_unit)
+    except Exception as error:
+        if not type(error).__module__.startswith("OCP"):
+            raise
+        raise FileError(
+            f"'{file.name}' cannot be read as {format}: {error}", "it is damaged: export it again"
+        ) from error
 
 
 def write(

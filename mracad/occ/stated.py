@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import io
+import math
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 from OCP.IFSelect import IFSelect_RetDone
 from OCP.STEPControl import STEPControl_Reader
@@ -27,6 +30,10 @@ class Stated:
     uses : tuple of (int, int, bool)
         Every use of an edge: a number for the edge, the position of the face among all, and whether the face's
         boundary runs along the edge.
+    centres : tuple of (float, float, float)
+        Of the vertices of each face, in the file's unit.
+    senses : tuple of (bool or None)
+        Whether each face looks as its surface does; None where that is not stated.
     broken : tuple of str
         Entities that could not be understood, at most a hundred: their place in the file and the reason.
     """
@@ -34,6 +41,8 @@ class Stated:
     entities: int
     faces: int
     uses: tuple[tuple[int, int, bool], ...]
+    centres: tuple[tuple[float, float, float], ...]
+    senses: tuple[bool | None, ...]
     broken: tuple[str, ...]
 
 
@@ -61,7 +70,7 @@ def stated(text: bytes, name: str) -> Stated:
             entity = model.Value(i)
             if type(entity).__name__ in _SHELLS:
                 shells.append(entity)
-        faces: dict[object, int] = {}
+        faces: dict[Any, int] = {}
         uses: list[tuple[int, int, bool]] = []
         edges: dict[object, int] = {}
         for shell in shells:
@@ -70,10 +79,45 @@ def stated(text: bytes, name: str) -> Stated:
                 if face not in faces:  # two shells may share one
                     faces[face] = len(faces)
                     uses += [(edges.setdefault(edge, len(edges)), faces[face], along) for edge, along in _uses(face)]
-    return Stated(count, len(faces), tuple(uses), tuple(broken))
+        centres = tuple(_centre(face) for face in faces)
+        senses = tuple(face.SameSense() if hasattr(face, "SameSense") else None for face in faces)
+    return Stated(count, len(faces), tuple(uses), centres, senses, tuple(broken))
 
 
-def _uses(face) -> Iterator[tuple[object, bool]]:
+def _centre(face) -> tuple[float, float, float]:
+    """The middle of the vertices of a face; far away where it has none."""
+    vertices = {vertex for edge, _ in _uses(face) for vertex in (edge.EdgeStart(), edge.EdgeEnd())}
+    points = [vertex.VertexGeometry() for vertex in vertices if hasattr(vertex, "VertexGeometry")]
+    if not points or not all(hasattr(point, "CoordinatesValue") for point in points):
+        return (math.inf,) * 3
+    x, y, z = (sum(point.CoordinatesValue(k) for point in points) / len(points) for k in (1, 2, 3))
+    return x, y, z
+
+
+def unloaded(text: bytes, name: str) -> list[str]:
+    """The faces of a STEP file of which the kernel makes none, and why: ``"#243: Surface has not been created"``."""
+    with quiet(), exchange({}):
+        reader = STEPControl_Reader()
+        reader.ReadStream(name, io.BytesIO(text))
+        reader.TransferRoots()
+        model = reader.StepModel()
+        place = {model.Value(i): i - 1 for i in range(1, model.NbEntities() + 1)}
+        process = reader.WS().TransferReader().TransientProcess()
+        checks = {process.Mapped(i): process.MapItem(i).Check() for i in range(1, process.NbMapped() + 1)}
+    numbers = re.findall(rb"(?:^|;)\s*#(\d+)\s*=", text, re.MULTILINE)
+    found = []
+    for entity, check in checks.items():
+        if any("not mapped" in check.CWarning(k) for k in range(1, check.NbWarnings() + 1)):
+            label = (
+                f"#{numbers[place[entity]].decode()}" if len(numbers) == len(place) else f"entity {place[entity] + 1}"
+            )
+            cause = checks.get(entity.FaceGeometry(), check) if hasattr(entity, "FaceGeometry") else check
+            reason = cause.CFail(1) if cause.NbFails() else "the kernel makes nothing of it"
+            found.append(f"{label}: {reason.strip()}")
+    return found
+
+
+def _uses(face) -> Iterator[tuple[Any, bool]]:
     """The edges of a face, and whether its boundary runs along each."""
     for i in range(1, face.NbBounds() + 1):
         bound = face.BoundsValue(i)

@@ -129,18 +129,17 @@ def test_a_new_edit_is_known_everywhere_by_its_declaration(tmp_path, monkeypatch
 
 
 def test_one_read_and_one_write_for_the_whole_recipe(tmp_path, capsys, monkeypatch):
-    from mracad.occ import read as reading
-    from mracad.occ import write as writing
+    from mracad.occ import files
 
     source = models(tmp_path / "in", 1) / "part000.step"
     calls = []
-    for module, name in ((reading, "read_step"), (writing, "write_step")):
-        real = getattr(module, name)
-        monkeypatch.setattr(module, name, lambda *a, real=real, name=name, **k: (calls.append(name), real(*a, **k))[1])
+    for name in ("read", "write"):
+        real = getattr(files, name)
+        monkeypatch.setattr(files, name, lambda *a, real=real, name=name, **k: (calls.append(name), real(*a, **k))[1])
     two = "smooth --scale 20% ! smooth --level 1 --amount 0.5 ! check --max-angle 90"
     words = ["pipeline", two, str(source), "-o", str(tmp_path / "out.step"), "--record"]
     assert main([*words, "--depfile", str(tmp_path / "out.d")]) == 0
-    assert calls == ["read_step", "write_step"]
+    assert calls == ["read", "write"]
     said = capsys.readouterr().out
     assert (
         said.startswith("smooth: part000.step: 1 NURBS face") and "\nsmooth-2: " in said and "\ncheck: passed" in said

@@ -105,7 +105,9 @@ def test_faces_of_an_instance_have_the_numbers_of_its_part(mracad, samples, tmp_
     out = tmp_path / "out.step"
     edited = json.loads(smoothed(mracad, samples, out, *words, "#7").out)
     assert edited["counts"]["edited"] == 1 and edited["counts"].get("unselected", 0) == 1
-    assert json.loads(smoothed(mracad, samples, out, *words, "!#7").out)["counts"].get("edited", 0) == 0
+    for other in ("!#7", "#1"):
+        none = smoothed(mracad, samples, out, *words[:3], "--faces", other)
+        assert none.code == 2 and "no selected face" in none.err
     steps = "smooth --scale 8mm --instance 'front pair/pad left' ! smooth --scale 9mm --faces #7 --instance"
     again = mracad("pipeline", f"{steps} 'front pair/pad left'", samples / "assembly.step", "-o", out)
     assert again.code == 0 and len([p for p in occ.read(out).parts if p.product == "pad"]) == 2

@@ -181,7 +181,7 @@ def test_streams_are_known_by_their_content(samples, tmp_path):
 
 
 def test_commands_read_every_format(mracad, samples, tmp_path):
-    for ending in ("igs", "bbrep"):
+    for ending in ("igs",):
         model = tmp_path / f"model.{ending}"
         assert mracad("convert", samples / "trimmed.step", "-o", model).code == 0
         assert "faces: 8:" in mracad("info", model).out

@@ -1,4 +1,4 @@
-"""STEP files with faults: ``python -m tests.robust.mutate COUNT [SEED]`` checks as many (see ``make fuzz``).
+"""Models with faults: ``python -m tests.robust.mutate COUNT [SEED]`` checks as many (see ``make fuzz``).
 
 Each is read, viewed, checked and written again in a child process with a time limit.  Either that works, or it ends in
 one line of error; the process neither crashes unseen nor leaves a partial file.
@@ -6,6 +6,7 @@ one line of error; the process neither crashes unseen nor leaves a partial file.
 
 from __future__ import annotations
 
+import io
 import os
 import random
 import re
@@ -14,7 +15,7 @@ import tempfile
 from collections import Counter
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
-from functools import partial
+from functools import cache, partial
 from multiprocessing import get_context
 from pathlib import Path
 
@@ -108,22 +109,39 @@ FAULTS = (
     flip_bytes, drop_lines, swap_lines, wild_numbers, wild_numbers, wild_counts, references_to_nowhere,
     references_elsewhere, references_elsewhere, references_to_themselves, truncate,
 )  # fmt: skip
+OTHERS = {  # faults of the other formats that are read
+    "iges": (flip_bytes, drop_lines, swap_lines, wild_numbers, wild_counts, truncate),
+    "brep": (flip_bytes, drop_lines, swap_lines, truncate),
+    "binbrep": (flip_bytes, truncate),
+}
 SOURCES = ("assembly", "trimmed", "blade", "bottle")
+
+
+@cache
+def _source(name: str, format: str) -> bytes:
+    """A sample in a format."""
+    if format == "step":
+        return (SAMPLES / f"{name}.step").read_bytes()
+    stream = io.BytesIO()
+    occ.write(occ.read(SAMPLES / f"{name}.step"), stream, format)
+    return stream.getvalue()
 
 
 def mutant(number: int, seed: int = 0) -> tuple[str, bytes]:
     """The fault and the text of one file."""
     rng = random.Random(f"{seed}/{number}")
-    fault = many_faces if number % 500 == 499 else rng.choice(FAULTS)
-    text = (SAMPLES / f"{rng.choice(SOURCES)}.step").read_bytes()
-    return fault.__name__, fault(text, rng)
+    format = ("step", "step", "step", "step", *OTHERS)[number % 7]
+    fault = rng.choice(OTHERS.get(format, FAULTS))
+    if number % 500 == 499:
+        format, fault = "step", many_faces
+    return f"{format}, {fault.__name__}", fault(_source(rng.choice(SOURCES), format), rng)
 
 
 def verdict(number: int, seed: int = 0, limit: float = LIMIT) -> tuple[str, int, str]:
     """The fault, the exit code, and what is wrong with how the command took it, or ``""``."""
     fault, text = mutant(number, seed)
     with tempfile.TemporaryDirectory() as folder:
-        source, out = Path(folder, "in.step"), Path(folder, "work", "out.step")
+        source, out = Path(folder, "in.dat"), Path(folder, "work", "out.step")
         out.parent.mkdir()
         source.write_bytes(text)
         words = ["smooth", source, "--scale", "5%", "-o", out, "--time-limit", limit]
@@ -158,7 +176,10 @@ def main(count: int, seed: int) -> int:
     """Check many, print what happened, and return 1 if anything is wrong."""
     codes: Counter[int] = Counter()
     bad = 0
-    occ.view(occ.read_step(SAMPLES / "assembly.step"))  # the children find the kernel loaded
+    occ.view(occ.read(SAMPLES / "assembly.step"))  # the children find the kernel loaded
+    for format in OTHERS:
+        for name in SOURCES:
+            _source(name, format)
     with ProcessPoolExecutor(2, get_context("fork")) as pool:
         for number, (fault, code, wrong) in enumerate(pool.map(partial(verdict, seed=seed), range(count))):
             codes[code] += 1
