@@ -40,7 +40,7 @@ def _option(name: str, help: str, kind: Any, default: Any) -> Callable[[Command]
     flag = f"--{dashed(name)}"
     settings: dict[str, Any] = {"help": help, "metavar": SHORT.get(name), "default": default}
     if kind is bool:
-        return click.option(flag, is_flag=True, help=help, default=default)
+        return click.option(name, flag, is_flag=True, help=help, default=default)
     if kind is Length:
         settings |= {"metavar": "LENGTH"}
     if typing.get_origin(kind) is tuple:
@@ -50,7 +50,7 @@ def _option(name: str, help: str, kind: Any, default: Any) -> Callable[[Command]
         settings |= {"type": click.Choice(typing.get_args(kind))}
     else:
         settings |= {"type": kind if kind in (int, float) else str}
-    return click.option(flag, **settings, show_default=default not in (None, ()))
+    return click.option(name, flag, **settings, show_default=default not in (None, (), ""))
 
 
 def apply(*decorators: Callable[[Command], Command]) -> Callable[[Command], Command]:

@@ -1,0 +1,198 @@
+"""Charts: geodesic normal coordinates around places, and the frames that go with them.
+
+Around a place the coarse surface is the graph of a polynomial c(a, b) over its tangent plane, whatever faces, knots and
+parameters it is made of.  Geodesics of that graph (the exponential map) give coordinates (x, y) in millimetres; log
+and exp are polynomials fitted to a fan of them.  In normal coordinates the differential of the log map is, in the
+frame carried along geodesics by parallel transport, a symmetric matrix (Gauss' lemma), so that its polar
+decomposition gives that frame.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+
+Array = np.ndarray
+
+DEGREE = 6
+"""Of the graph; the maps have one more."""
+
+RAYS, STEPS = 24, 8
+"""The fan of geodesics."""
+
+RIDGE = 1e-9
+"""Keeps fits with few points from swinging."""
+
+BETTER = 3.0
+"""A graph has a higher degree where that makes its residual so many times smaller."""
+
+
+@cache
+def _powers(degree: int) -> tuple[Array, Array]:
+    """Exponents of a and b, by total degree."""
+    pairs = [(total - k, k) for total in range(degree + 1) for k in range(total + 1)]
+    i, j = np.array(pairs).T
+    return i, j
+
+
+def monomials(a: Array, b: Array, degree: int, order: tuple[int, int] = (0, 0)) -> Array:
+    """Monomials ``(…, terms)`` at points, or a derivative of them."""
+    i, j = _powers(degree)
+    tables = []
+    for x, power, r in ((a, i, order[0]), (b, j, order[1])):
+        table = np.ones((degree + 1, *np.shape(x)))
+        for k in range(1, degree + 1):
+            table[k] = table[k - 1] * x
+        factor = np.ones(len(power))
+        for k in range(r):
+            factor = factor * np.maximum(power - k, 0)
+        tables.append(np.moveaxis(table[np.maximum(power - r, 0)], 0, -1) * factor)
+    return np.asarray(tables[0] * tables[1])
+
+
+def fitted(a: Array, b: Array, values: Array, degree: int, mask: Array | None = None) -> Array:
+    """Coefficients ``(m, terms, k)`` of polynomials fitted to ``values (m, q, k)`` at points ``(m, q)``."""
+    rows = monomials(a, b, degree)
+    if mask is not None:
+        rows, values = rows * mask[..., None], values * mask[..., None]
+    terms = rows.shape[-1]
+    ridge = np.broadcast_to(RIDGE * np.eye(terms), (len(rows), terms, terms))
+    q, r = np.linalg.qr(np.concatenate([rows, ridge], axis=1))
+    return np.linalg.solve(r, np.swapaxes(q[:, : rows.shape[1]], 1, 2) @ values)
+
+
+@dataclass(frozen=True, eq=False)
+class Charts:
+    """Normal coordinates around some places; lengths within the polynomials are fractions of the reach.
+
+    Attributes
+    ----------
+    origin : ndarray (m, 3)
+    axes : ndarray (m, 3, 3)
+        Rows: the directions of a and b, and the normal of the plane they span.
+    reach : ndarray (m,)
+        Geodesic radius within which the chart holds, mm.
+    graph : ndarray (m, terms)
+    log, exp : ndarray (m, terms, 2)
+    """
+
+    origin: Array
+    axes: Array
+    reach: Array
+    graph: Array
+    log: Array
+    exp: Array
+
+    def local(self, points: Array, which: Array) -> Array:
+        """a, b and height (mm) of points ``(q, 3)``, each in one of the charts."""
+        return np.einsum("qij,qj->qi", self.axes[which], points - self.origin[which])
+
+    def height(self, local: Array, which: Array) -> Array:
+        """Height of the graph, mm."""
+        reach = self.reach[which]
+        rows = monomials(local[:, 0] / reach, local[:, 1] / reach, DEGREE)
+        return reach * np.einsum("qt,qt->q", rows, self.graph[which])
+
+    def coordinates(self, local: Array, which: Array) -> Array:
+        """Normal coordinates x, y (mm) of points given by a and b."""
+        reach = self.reach[which]
+        rows = monomials(local[:, 0] / reach, local[:, 1] / reach, DEGREE + 1)
+        return reach[:, None] * np.einsum("qt,qtk->qk", rows, self.log[which])
+
+    def places(self, xy: Array, which: Array) -> Array:
+        """a and b (mm) of normal coordinates."""
+        reach = self.reach[which]
+        rows = monomials(xy[:, 0] / reach, xy[:, 1] / reach, DEGREE + 1)
+        return reach[:, None] * np.einsum("qt,qtk->qk", rows, self.exp[which])
+
+    def frames(self, local: Array, which: Array) -> Array:
+        """Frames ``(q, 3, 3)`` carried from the places to points: rows e_x, e_y and the normal."""
+        a, b = (local[:, :2] / self.reach[which][:, None]).T
+        ca, cb = (np.einsum("qt,qt->q", monomials(a, b, DEGREE, o), self.graph[which]) for o in ((1, 0), (0, 1)))
+        f1, f2, n = _tangents(ca, cb)
+        ja, jb = (np.einsum("qt,qtk->qk", monomials(a, b, DEGREE + 1, o), self.log[which]) for o in ((1, 0), (0, 1)))
+        # the differential of (x, y) on the orthonormal tangents f1 and f2
+        one, two = (ja * f[:, :1] + jb * f[:, 1:2] for f in (f1, f2))
+        turn = np.arctan2(one[:, 1] - two[:, 0], one[:, 0] + two[:, 1])
+        cos, sin = np.cos(turn)[:, None], np.sin(turn)[:, None]
+        frame = np.stack([cos * f1 - sin * f2, sin * f1 + cos * f2, n], axis=1)
+        return np.asarray(frame @ self.axes[which])
+
+
+def _tangents(ca: Array, cb: Array) -> tuple[Array, Array, Array]:
+    """Orthonormal tangents of the graph, the first over a, and the normal; in the chart's axes."""
+    one = np.ones_like(ca)
+    n = np.stack([-ca, -cb, one], axis=-1)
+    n /= np.linalg.norm(n, axis=-1, keepdims=True)
+    f1 = np.stack([one, 0 * one, ca], axis=-1)
+    f1 /= np.linalg.norm(f1, axis=-1, keepdims=True)
+    return f1, np.cross(n, f1), n
+
+
+def charts(origin: Array, axes: Array, reach: Array, points: Array, mask: Array, adaptive: bool = False) -> Charts:
+    """Charts around places, from points of the coarse surface around each of them.
+
+    Parameters
+    ----------
+    origin, axes, reach
+        As in :class:`Charts`; x runs along the first axis.
+    points : ndarray (m, q, 3)
+    mask : ndarray of bool (m, q)
+        Which of them count.
+    adaptive : bool
+        Whether a lower degree is taken where a higher one fits hardly better: where the points do not lie all
+        around, so that the polynomial has to bridge a hole.
+    """
+    local = np.einsum("mij,mqj->mqi", axes, points - origin[:, None]) / reach[:, None, None]
+    a, b, c = (local[..., k] for k in range(3))
+    degrees = (1, 2, 4, DEGREE) if adaptive else (DEGREE,)
+    graph = np.zeros((len(origin), len(_powers(DEGREE)[0])))
+    best = np.full(len(origin), np.inf)
+    for degree in degrees:
+        found = fitted(a, b, c[..., None], degree, mask)[..., 0]
+        missed = (np.einsum("mqt,mt->mq", monomials(a, b, degree), found) - c) * mask
+        size = np.sqrt((missed**2).sum(axis=1) / np.maximum(mask.sum(axis=1), 1))
+        better = size < best / BETTER
+        graph[better] = 0.0
+        graph[better, : found.shape[1]] = found[better]
+        best[better] = size[better]
+    x, y, fan_a, fan_b = _fan(graph)
+    flat = [z.reshape(len(origin), -1) for z in (x, y, fan_a, fan_b)]
+    log = fitted(flat[2], flat[3], np.stack(flat[:2], axis=-1), DEGREE + 1)
+    exp = fitted(flat[0], flat[1], np.stack(flat[2:], axis=-1), DEGREE + 1)
+    return Charts(origin, axes, reach, graph, log, exp)
+
+
+def _fan(graph: Array) -> tuple[Array, Array, Array, Array]:
+    """Normal coordinates and places ``(m, rays, steps + 1)`` on a fan of geodesics of unit length, by Runge–Kutta."""
+
+    def slopes(a: Array, b: Array, order: tuple[int, int]) -> Array:
+        return np.einsum("mrt,mt->mr", monomials(a, b, DEGREE, order), graph)
+
+    def rate(state: Array) -> Array:
+        a, b, va, vb = state
+        ca, cb = slopes(a, b, (1, 0)), slopes(a, b, (0, 1))
+        bend = slopes(a, b, (2, 0)) * va**2 + 2 * slopes(a, b, (1, 1)) * va * vb + slopes(a, b, (0, 2)) * vb**2
+        pull = -bend / (1 + ca**2 + cb**2)
+        return np.stack([va, vb, ca * pull, cb * pull])
+
+    angle = 2 * np.pi * np.arange(RAYS) / RAYS
+    start = np.zeros((len(graph), RAYS))
+    f1, f2, _ = _tangents(slopes(start[:, :1], start[:, :1], (1, 0)), slopes(start[:, :1], start[:, :1], (0, 1)))
+    way = np.cos(angle)[:, None] * f1 + np.sin(angle)[:, None] * f2
+    state = np.stack([start, start, way[..., 0], way[..., 1]])
+    track = [state[:2]]
+    h = 1.0 / STEPS
+    for _ in range(STEPS):
+        k1 = rate(state)
+        k2 = rate(state + h / 2 * k1)
+        k3 = rate(state + h / 2 * k2)
+        k4 = rate(state + h * k3)
+        state = state + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+        track.append(state[:2])
+    a, b = np.stack(track, axis=-1)
+    radius = h * np.arange(STEPS + 1)
+    x, y = np.cos(angle)[:, None] * radius, np.sin(angle)[:, None] * radius
+    return np.broadcast_to(x, a.shape), np.broadcast_to(y, a.shape), a, b

@@ -1,0 +1,394 @@
+"""A detail feature: a displacement of compact support, told from what it stands above.
+
+The *table* of a feature holds its displacement in the frames carried from its place (along x, along y, along the
+normal) and its window, on a square grid of geodesic normal coordinates in millimetres: nothing in it depends on the
+parameters, knots or units of where it was found.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from mracad.bspline.interpolate import interpolated
+from mracad.bspline.net import Net
+from mracad.constraint.frozen import separate
+from mracad.errors import EditError, FileError
+from mracad.feature.chart import Charts, charts
+from mracad.feature.ground import STEEP, Feet, Ground, Sheet, axes
+from mracad.feature.place import Window
+
+Array = np.ndarray
+
+FORMAT = "mracad feature 1"
+
+RING = 1.5
+"""What lies between the rim of a feature and so many times its radius tells what it stands above."""
+
+SECTORS = 16
+"""The ring must be there in three quarters of so many directions."""
+
+PLATE = 900
+"""Points of the ring that the thin plate passes through."""
+
+FINEST, COARSEST = 512, 64
+"""Cells of a table across, at most and at least."""
+
+LOST = 0.01
+"""Share of its height that frozen points may take from a feature unless parts may be clipped."""
+
+SPREAD = 48
+"""Samples of a sheet in each direction around a feature."""
+
+
+@dataclass(frozen=True, eq=False)
+class Origin:
+    """Where in a model a feature was found: by surface, its offsets over the surface's own net, and the window.
+
+    Attributes
+    ----------
+    offsets : dict of int to ndarray (nu, nv, 3)
+        In each surface's own frame, mm.
+    feet : Feet
+        Its place.
+    axes : ndarray (3, 3)
+        Its frame there.
+    """
+
+    offsets: dict[int, Array]
+    feet: Feet
+    axes: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Feature:
+    """A feature.
+
+    Attributes
+    ----------
+    radius, reach : float
+        Where its taper begins and where it ends, mm.
+    table : ndarray (n, n, 4)
+        Displacement along x, y and the normal (mm) and window (0 to 1) over ``[-reach, reach]²``.
+    name : str
+    origin : Origin or None
+        None for a feature from a file.
+    """
+
+    radius: float
+    reach: float
+    table: Array
+    name: str = ""
+    origin: Origin | None = field(default=None)
+
+    @property
+    def height(self) -> float:
+        """Its largest displacement, mm."""
+        return float(np.linalg.norm(self.table[..., :3], axis=-1).max())
+
+    @cached_property
+    def _splines(self) -> list[Array]:
+        from scipy.ndimage import spline_filter
+
+        return [spline_filter(self.table[..., k], order=3, mode="constant") for k in range(4)]
+
+    def lookup(self, xy: Array) -> Array:
+        """Displacement and window ``(q, 4)`` at normal coordinates (mm); zero beyond its reach."""
+        from scipy.ndimage import map_coordinates
+
+        cells = len(self.table) - 1
+        at = (xy.T / self.reach + 1) * cells / 2
+        channels = [map_coordinates(s, at, order=3, mode="constant", prefilter=False) for s in self._splines]
+        return np.stack(channels, axis=-1)
+
+
+class _File(msgspec.Struct, forbid_unknown_fields=True):
+    """What a feature file holds; lengths in mm."""
+
+    format: str
+    name: str
+    radius: float
+    reach: float
+    size: int
+    along_x: list[float]
+    along_y: list[float]
+    along_normal: list[float]
+    window: list[float]
+
+
+def save(feature: Feature) -> bytes:
+    """A feature as the bytes of a file (JSON, ``docs/features.md``)."""
+    columns = np.round(feature.table.reshape(-1, 4).T, 9).tolist()
+    content = _File(FORMAT, feature.name, feature.radius, feature.reach, len(feature.table), *columns)
+    return msgspec.json.encode(content) + b"\n"
+
+
+def load(path: str | os.PathLike) -> Feature:
+    """A feature from a file; raises FileError."""
+    file = Path(path)
+    hint = "make one with mracad feature extract"
+    try:
+        content = msgspec.json.decode(file.read_bytes(), type=_File)
+    except OSError as error:
+        raise FileError(f"cannot read '{file}': {error.strerror}", hint) from error
+    except (msgspec.DecodeError, msgspec.ValidationError) as error:
+        raise FileError(f"'{file.name}' is not a feature: {error}", hint) from error
+    columns = [content.along_x, content.along_y, content.along_normal, content.window]
+    if content.format != FORMAT:
+        raise FileError(f"'{file.name}' is not a feature: its format is {content.format!r}, not {FORMAT!r}", hint)
+    if content.size < 4 or any(len(column) != content.size**2 for column in columns):
+        raise FileError(f"'{file.name}' is damaged: its table is not {content.size} × {content.size}", hint)
+    if not (0 < content.radius <= content.reach < np.inf):
+        raise FileError(f"'{file.name}' is damaged: its radius is {content.radius} mm", hint)
+    table = np.array(columns).T.reshape(content.size, content.size, 4)
+    return Feature(content.radius, content.reach, table, content.name)
+
+
+def taper(share: Array) -> Array:
+    """1 down to 0 as ``share`` goes from 0 to 1, with two vanishing derivatives at both ends."""
+    t = np.clip(share, 0.0, 1.0)
+    return np.asarray(1.0 - t**3 * (10.0 - 15.0 * t + 6.0 * t**2))
+
+
+def above_surroundings(ground: Ground, window: Window, width: float, keep: str, label: str, named: str) -> Feature:
+    """The feature under a window, above what a thin plate through its surroundings makes of the place.
+
+    Parameters
+    ----------
+    ground : Ground
+    window : Window
+    width : float
+        Of the taper beyond the window, mm.
+    keep : {"g0", "g1", "g2"}
+        Continuity of edges that do not move.
+    label, named : str
+        The window in messages, and the feature's name.
+    """
+    reach = window.reach(width)
+    chart, level = _surroundings(ground, window, reach, label)
+    offsets: dict[int, Array] = {}
+    windows: dict[int, Array] = {}
+    for index, sheet in ground.sheets.items():
+        net = sheet.net
+        points, normals = _grid(sheet)
+        local = (points - chart.origin[0]) @ chart.axes[0].T
+        hit = np.flatnonzero(
+            (np.linalg.norm(local[:, :2], axis=1) <= reach)
+            & (np.abs(local[:, 2]) <= 1.5 * reach)
+            & (normals @ chart.axes[0][2] > -STEEP)
+        )
+        if not len(hit):
+            continue
+        shares = window.share(sheet, hit, chart.coordinates(local[hit], np.zeros(len(hit), int)), width)
+        weight = taper(shares)
+        hit, weight = hit[shares < 1], weight[shares < 1]
+        if not len(hit):
+            continue
+        values = np.zeros((len(points), 3))
+        values[hit] = (local[hit, 2] - level(local[hit, :2]))[:, None] * (chart.axes[0][2] @ sheet.turn)
+        values = values.reshape(*net.poles.shape)
+        weights = np.ones(net.poles.shape[:2]) if net.weights is None else net.weights
+        if net.weights is not None:
+            first = Net(net.u, net.v, net.weights[..., None]).grid(net.u.greville(), net.v.greville())
+            values = values * np.asarray(first)
+        w = np.zeros(len(points))
+        w[hit] = weight
+        w = w.reshape(net.poles.shape[:2])
+        offsets[index] = interpolated(net.u, net.v, values) / weights[..., None] * w[..., None]
+        windows[index] = w
+    return _made(ground, chart, window, reach, offsets, windows, keep, label, named)
+
+
+def _surroundings(ground: Ground, window: Window, reach: float, label: str) -> tuple[Charts, Any]:
+    """The chart of what lies around a window, and the height of the plate through it at places (q, 2)."""
+    from scipy.interpolate import RBFInterpolator
+
+    feet = window.feet
+    points, near = (x[0] for x in ground.samples(feet, np.array([RING * reach]), SPREAD)[:2])
+    centre = window.point
+    normal = feet.normals[0]
+    for _ in range(3):
+        frame = axes(normal[None], feet.along)[0]
+        local = (points - centre) @ frame.T
+        radius = np.linalg.norm(local[:, :2], axis=1)
+        ring = near & (radius > reach) & (radius <= RING * reach)
+        angle = np.arctan2(local[ring, 1], local[ring, 0])
+        if len(np.unique(np.floor((angle / (2 * np.pi) + 0.5) * SECTORS))) < 0.75 * SECTORS:
+            raise EditError(
+                f"{label}: the feature, {2 * reach:.4g} mm across with its taper, is larger than its face",
+                "use a smaller window or a shorter --taper, or select its neighbours, too",
+            )
+        plane = np.linalg.lstsq(np.c_[local[ring], np.ones(ring.sum())][:, [0, 1, 3]], local[ring, 2], rcond=None)[0]
+        normal = frame.T @ (np.array([-plane[0], -plane[1], 1.0]) / np.sqrt(1 + plane[0] ** 2 + plane[1] ** 2))
+    chart = charts(
+        centre[None], axes(normal[None], feet.along), np.array([RING * reach]), points[None], ring[None], adaptive=True
+    )
+    local = (points[ring] - centre) @ chart.axes[0].T
+    order = np.random.default_rng(0).permutation(len(local))
+    rim = order[np.argsort(np.linalg.norm(local[order, :2], axis=1) > 1.2 * reach, kind="stable")][:PLATE]
+    zero = np.zeros(len(local), int)
+    rest = local[rim, 2] - chart.height(local[rim], zero[: len(rim)])
+    plate = RBFInterpolator(local[rim, :2] / reach, rest / reach, kernel="thin_plate_spline", degree=1)
+
+    def level(ab: Array) -> Array:
+        return chart.height(ab, np.zeros(len(ab), int)) + reach * plate(ab / reach)
+
+    # the chart's origin is the place on the ground, not on the feature; its reach only that of the feature
+    origin = centre + level(np.zeros((1, 2)))[0] * chart.axes[0][2]
+    shrunk = charts(
+        origin[None],
+        chart.axes,
+        np.array([1.05 * reach]),
+        *_graph_points(chart, level, reach, origin),
+    )
+    return shrunk, lambda ab: level(ab) - level(np.zeros((1, 2)))[0]
+
+
+def _graph_points(chart: Charts, level: Any, reach: float, origin: Array) -> tuple[Array, Array]:
+    side = np.linspace(-1.05, 1.05, 25) * reach
+    ab = np.stack(np.meshgrid(side, side, indexing="ij"), axis=-1).reshape(-1, 2)
+    ab = ab[np.linalg.norm(ab, axis=1) <= 1.1 * reach]
+    heights = level(ab) - level(np.zeros((1, 2)))[0]
+    points = origin + np.c_[ab, heights] @ chart.axes[0]
+    return points[None], np.ones((1, len(ab)), bool)
+
+
+def between_levels(
+    ground: Ground, bands: Mapping[int, Array], window: Window, width: float, keep: str, label: str, named: str
+) -> Feature:
+    """The feature that bands of detail (offsets by surface) make under a window; ``ground`` is without them."""
+    reach = window.reach(width)
+    feet = window.feet
+    found, _ = ground.charts(feet, feet.along, np.array([1.05 * reach]))
+    offsets, windows = {}, {}
+    for index, sheet in ground.sheets.items():
+        points, normals = _grid(sheet)
+        apart = np.linalg.norm(points - feet.points[0], axis=1)
+        hit = np.flatnonzero((apart <= 1.02 * reach) & (normals @ feet.normals[0] > STEEP))
+        if not len(hit):
+            continue
+        zero = np.zeros(len(hit), int)
+        shares = window.share(sheet, hit, found.coordinates(found.local(points[hit], zero), zero), width)
+        w = np.zeros(len(points))
+        w[hit] = taper(shares)
+        w = w.reshape(sheet.net.poles.shape[:2])
+        if w.any():
+            windows[index], offsets[index] = w, bands[index] * w[..., None]
+    return _made(ground, found, window, reach, offsets, windows, keep, label, named)
+
+
+def _made(
+    ground: Ground,
+    chart: Charts,
+    window: Window,
+    reach: float,
+    offsets: dict[int, Array],
+    windows: dict[int, Array],
+    keep: str,
+    label: str,
+    named: str,
+) -> Feature:
+    """The feature with its table."""
+    largest = max((float(np.linalg.norm(x, axis=-1).max()) for x in offsets.values()), default=0.0)
+    if not any(w.any() for w in windows.values()):
+        raise EditError(f"{label}: no control point lies under the window", "use a larger one")
+    if largest <= 1e-7:
+        raise EditError(f"{label}: nothing stands out there", "name a window over a feature; see mracad feature list")
+    model = ground.model
+    for index in list(offsets):
+        sheet = ground.sheets[index]
+        surface = model.surfaces[index]
+        faces = [model.faces[i] for i in surface.faces]
+        moving = {t.edge for f in faces for t in f.trims if len({s.face for s in model.edges[t.edge].sides} - ground.chosen) == 0} if model.edges else set()  # noqa: E501
+        moving = {e for e in moving if len(model.edges[e].sides) == 2}
+        free = separate(surface.net, faces, [f.index for f in sheet.faces], keep, moving).free
+        lost = float(np.linalg.norm(offsets[index][~free], axis=-1).max(initial=0.0))
+        if lost > LOST * largest:
+            raise EditError(
+                f"{label}: {lost:.3g} mm of the feature lie on control points of #{sheet.faces[0].index + 1} that "
+                "an edge or a hole holds",
+                "use a smaller window or --keep g0",
+            )
+        offsets[index] = np.where(free[..., None], offsets[index], 0.0)
+    table = _table(ground, chart, reach, offsets, windows)
+    origin = Origin(offsets, window.feet, chart.axes[0])
+    return Feature(reach - (window.width or 0.0), reach, table, named, origin)
+
+
+def _table(
+    ground: Ground, chart: Charts, reach: float, offsets: dict[int, Array], windows: dict[int, Array]
+) -> Array:
+    """Displacements in carried frames and window over the square of normal coordinates."""
+    spans = [
+        np.linalg.norm(np.diff(sheet.net.poles, axis=axis), axis=-1)[windows[i][1:] > 0 if axis == 0 else windows[i][:, 1:] > 0]
+        for i, sheet in ground.sheets.items()
+        if i in windows
+        for axis in (0, 1)
+    ]
+    least = min((float(np.median(s)) for s in spans if len(s)), default=reach)
+    cells = int(np.clip(2 * np.ceil(2 * reach / max(least, 1e-9)), COARSEST, FINEST))
+    side = np.linspace(-reach, reach, cells + 1)
+    xy = np.stack(np.meshgrid(side, side, indexing="ij"), axis=-1).reshape(-1, 2)
+    table = np.zeros((len(xy), 4))
+    disc = np.flatnonzero(np.linalg.norm(xy, axis=1) <= reach * (1 + 1e-9))
+    zero = np.zeros(len(disc), int)
+    ab = chart.places(xy[disc], zero)
+    frames = chart.frames(ab, zero)
+    for index, offset in offsets.items():
+        sheet = ground.sheets[index]
+        uv, found = _under(sheet, chart, ab)
+        channels = np.concatenate([offset @ sheet.turn.T, windows[index][..., None]], axis=-1)
+        values = np.asarray(Net(sheet.net.u, sheet.net.v, channels, sheet.net.weights).evaluate(uv[found]))
+        new = found.copy()
+        new[found] = table[disc[found], 3] == 0
+        values = values[new[found]]
+        table[disc[new], :3] = np.einsum("qij,qj->qi", frames[new], values[:, :3])
+        table[disc[new], 3] = values[:, 3]
+    return table.reshape(cells + 1, cells + 1, 4)
+
+
+def _under(sheet: Sheet, chart: Charts, ab: Array) -> tuple[Array, Array]:
+    """Parameters of the points of a sheet over places of a chart, and which of them exist."""
+    from scipy.spatial import cKDTree
+
+    origin, (x, y, n) = chart.origin[0], chart.axes[0]
+    us, vs = (np.unique(np.concatenate([k.breaks, (k.breaks[1:] + k.breaks[:-1]) / 2])) for k in sheet.knots)
+    uv = np.stack(np.meshgrid(us, vs, indexing="ij"), axis=-1).reshape(-1, 2)
+    spots = (np.asarray(sheet.net.grid(us, vs)).reshape(-1, 3) - origin) @ chart.axes[0].T
+    near = (np.linalg.norm(spots[:, :2], axis=1) <= 1.5 * chart.reach[0]) & (np.abs(spots[:, 2]) < 2 * chart.reach[0])
+    if not near.any():
+        near = np.ones(len(spots), bool)
+    uv = uv[near][cKDTree(spots[near, :2]).query(ab)[1]]
+    low, high = sheet.domain
+    size = high - low
+    for _ in range(8):
+        s, su, sv = sheet.net.evaluate(uv, 1)
+        r = np.stack([(s - origin) @ x - ab[:, 0], (s - origin) @ y - ab[:, 1]], axis=1)
+        a, b, c, d = su @ x, sv @ x, su @ y, sv @ y
+        det = a * d - b * c
+        det = np.where(np.abs(det) > 1e-300, det, 1e-300)
+        step = np.stack([d * r[:, 0] - b * r[:, 1], a * r[:, 1] - c * r[:, 0]], axis=1) / det[:, None]
+        uv = uv - np.clip(step, -0.1 * size, 0.1 * size)
+        if not sheet.periodic.all():
+            uv = np.where(sheet.periodic, uv, np.clip(uv, low - 0.01 * size, high + 0.01 * size))
+        if np.abs(step).max(initial=0.0) < 1e-13 * size.max():
+            break
+    inside = ((uv >= low - 1e-9 * size) & (uv <= high + 1e-9 * size)) | sheet.periodic
+    tight = np.linalg.norm(r, axis=1) < 1e-6 * chart.reach[0]
+    return uv, inside.all(axis=1) & tight & ((s - origin) @ n > -2 * chart.reach[0])
+
+
+def _grid(sheet: Sheet) -> tuple[Array, Array]:
+    """Greville points of a sheet and outward normals there, ``(nu nv, 3)``."""
+    net = sheet.net
+    s, su, sv = net.grid(net.u.greville(), net.v.greville(), 1)
+    normal = sheet.sign * np.cross(su, sv)
+    normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-300)
+    return s.reshape(-1, 3), normal.reshape(-1, 3)
