@@ -10,7 +10,7 @@ decomposition gives that frame.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 
 import numpy as np
 
@@ -98,27 +98,67 @@ class Charts:
     def coordinates(self, local: Array, which: Array) -> Array:
         """Normal coordinates x, y (mm) of points given by a and b."""
         reach = self.reach[which]
-        rows = monomials(local[:, 0] / reach, local[:, 1] / reach, DEGREE + 1)
-        return reach[:, None] * np.einsum("qt,qtk->qk", rows, self.log[which])
+        return reach[:, None] * self._sums(local[:, :2].T / reach, which, self.log)
 
     def places(self, xy: Array, which: Array) -> Array:
         """a and b (mm) of normal coordinates."""
         reach = self.reach[which]
-        rows = monomials(xy[:, 0] / reach, xy[:, 1] / reach, DEGREE + 1)
-        return reach[:, None] * np.einsum("qt,qtk->qk", rows, self.exp[which])
+        return reach[:, None] * self._sums(xy.T / reach, which, self.exp)
 
-    def frames(self, local: Array, which: Array) -> Array:
-        """Frames ``(q, 3, 3)`` carried from the places to points: rows e_x, e_y and the normal."""
-        a, b = (local[:, :2] / self.reach[which][:, None]).T
-        ca, cb = (np.einsum("qt,qt->q", monomials(a, b, DEGREE, o), self.graph[which]) for o in ((1, 0), (0, 1)))
+    @staticmethod
+    def _sums(at: Array, which: Array, coefficients: Array) -> Array:
+        """Polynomials ``(m, terms, k)`` of degree :data:`DEGREE` + 1 at points ``(2, q)``, each in its own chart."""
+        rows = _products(at)
+        found = np.empty((at.shape[1], coefficients.shape[2]))
+        begin = np.flatnonzero(np.diff(which, prepend=-1))
+        for low, high in zip(begin, np.append(begin[1:], len(which)), strict=True):
+            found[low:high] = (coefficients[which[low]].T @ rows[:, low:high]).T
+        return found
+
+    @cached_property
+    def _jets(self) -> Array:
+        """Coefficients ``(m, terms, 8)`` of x, y, their derivatives by a and by b, and the slopes of the graph."""
+        terms = self.log.shape[1]
+        graph = np.pad(self.graph, ((0, 0), (0, terms - self.graph.shape[1])))[..., None]
+        by_a, by_b = _derivations()
+        parts = [self.log, by_a @ self.log, by_b @ self.log, by_a @ graph, by_b @ graph]
+        return np.concatenate(parts, axis=2)
+
+    def jets(self, local: Array, which: Array) -> tuple[Array, Array]:
+        """Normal coordinates ``(q, 2)`` of points and the frames ``(q, 3, 3)`` carried there: e_x, e_y, normal."""
+        reach = self.reach[which]
+        x, y, xa, ya, xb, yb, ca, cb = self._sums(local[:, :2].T / reach, which, self._jets).T
         f1, f2, n = _tangents(ca, cb)
-        ja, jb = (np.einsum("qt,qtk->qk", monomials(a, b, DEGREE + 1, o), self.log[which]) for o in ((1, 0), (0, 1)))
         # the differential of (x, y) on the orthonormal tangents f1 and f2
-        one, two = (ja * f[:, :1] + jb * f[:, 1:2] for f in (f1, f2))
-        turn = np.arctan2(one[:, 1] - two[:, 0], one[:, 0] + two[:, 1])
+        one = xa * f1[:, 0] + xb * f1[:, 1], ya * f1[:, 0] + yb * f1[:, 1]
+        two = xa * f2[:, 0] + xb * f2[:, 1], ya * f2[:, 0] + yb * f2[:, 1]
+        turn = np.arctan2(one[1] - two[0], one[0] + two[1])
         cos, sin = np.cos(turn)[:, None], np.sin(turn)[:, None]
         frame = np.stack([cos * f1 - sin * f2, sin * f1 + cos * f2, n], axis=1)
-        return np.asarray(frame @ self.axes[which])
+        return np.stack([reach * x, reach * y], axis=1), np.matmul(frame, self.axes[which])
+
+
+def _products(at: Array) -> Array:
+    """Monomials ``(terms, q)`` of degree :data:`DEGREE` + 1."""
+    powers = np.ones((2, DEGREE + 2, at.shape[1]))
+    for k in range(1, DEGREE + 2):
+        np.multiply(powers[:, k - 1], at, out=powers[:, k])
+    i, j = _powers(DEGREE + 1)
+    return powers[0, i] * powers[1, j]
+
+
+@cache
+def _derivations() -> tuple[Array, Array]:
+    """Matrices that take the coefficients of a polynomial to those of its derivatives by a and by b."""
+    i, j = _powers(DEGREE + 1)
+    place = {pair: k for k, pair in enumerate(zip(i.tolist(), j.tolist(), strict=True))}
+    by = np.zeros((2, len(i), len(i)))
+    for (p, q), k in place.items():
+        if p:
+            by[0, place[p - 1, q], k] = p
+        if q:
+            by[1, place[p, q - 1], k] = q
+    return by[0], by[1]
 
 
 def _tangents(ca: Array, cb: Array) -> tuple[Array, Array, Array]:
@@ -168,19 +208,21 @@ def charts(origin: Array, axes: Array, reach: Array, points: Array, mask: Array,
 def _fan(graph: Array) -> tuple[Array, Array, Array, Array]:
     """Normal coordinates and places ``(m, rays, steps + 1)`` on a fan of geodesics of unit length, by Runge–Kutta."""
 
-    def slopes(a: Array, b: Array, order: tuple[int, int]) -> Array:
-        return np.einsum("mrt,mt->mr", monomials(a, b, DEGREE, order), graph)
+    by_a, by_b = _derivations()
+    padded = np.pad(graph, ((0, 0), (0, len(by_a) - graph.shape[1])))
+    first = padded @ by_a.T, padded @ by_b.T
+    wanted = np.stack([*first, first[0] @ by_a.T, first[0] @ by_b.T, first[1] @ by_b.T], axis=1)
 
     def rate(state: Array) -> Array:
         a, b, va, vb = state
-        ca, cb = slopes(a, b, (1, 0)), slopes(a, b, (0, 1))
-        bend = slopes(a, b, (2, 0)) * va**2 + 2 * slopes(a, b, (1, 1)) * va * vb + slopes(a, b, (0, 2)) * vb**2
-        pull = -bend / (1 + ca**2 + cb**2)
+        rows = _products(np.stack([a.ravel(), b.ravel()])).reshape(-1, *a.shape)
+        ca, cb, caa, cab, cbb = np.moveaxis(wanted @ np.moveaxis(rows, 0, 1), 1, 0)
+        pull = -(caa * va**2 + 2 * cab * va * vb + cbb * vb**2) / (1 + ca**2 + cb**2)
         return np.stack([va, vb, ca * pull, cb * pull])
 
     angle = 2 * np.pi * np.arange(RAYS) / RAYS
     start = np.zeros((len(graph), RAYS))
-    f1, f2, _ = _tangents(slopes(start[:, :1], start[:, :1], (1, 0)), slopes(start[:, :1], start[:, :1], (0, 1)))
+    f1, f2, _ = _tangents(wanted[:, 0, :1], wanted[:, 1, :1])
     way = np.cos(angle)[:, None] * f1 + np.sin(angle)[:, None] * f2
     state = np.stack([start, start, way[..., 0], way[..., 1]])
     track = [state[:2]]

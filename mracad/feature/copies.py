@@ -37,6 +37,9 @@ MISSED, FACETTED = 3e-4, 1e-2
 FIRST = 4.0
 """Spans under a copy are at first no longer than its reach over this."""
 
+SPARE = 1.5
+"""Spans are not divided that are at most so many times as wide as those that held the feature."""
+
 ROUNDS, PIECES = 5, 6
 """Times that spans are divided, and into how many pieces at most each time."""
 
@@ -137,12 +140,13 @@ class Copies:
         names = ("origin", "axes", "reach", "graph", "log", "exp")
         self.charts = Charts(*(np.concatenate([getattr(c, name) for c, _ in parts]) for name in names))
         self.touched = np.concatenate([t for _, t in parts])
-        self.shifts: dict[int, tuple[Array, Array]] = {}
+        self.shifts: dict[int, Array] = {}
+        self._kept: dict[tuple[int, KnotVector, KnotVector], Array] = {}
 
     @property
     def height(self) -> float:
         """Largest displacement of the least of them, mm."""
-        return float(self.feature.height * self.heights.min())
+        return float(self.feature.height * np.abs(self.heights).min())
 
     def ideal(self, sheet: Sheet, points: Array, normals: Array, without: Array | None = None) -> tuple[Array, Array]:
         """The displacement ``(q, 3)`` at points of a sheet, in the part's frame, and how many copies reach each.
@@ -182,8 +186,8 @@ class Copies:
 
     def _each(self, points: Array, which: Array) -> tuple[Array, Array]:
         """Displacement and window of one copy each at points."""
-        local = self.charts.local(points, which)
-        xy = self.charts.coordinates(local, which) / self.sizes[which][:, None]
+        xy, frames = self.charts.jets(self.charts.local(points, which), which)
+        xy = xy / self.sizes[which][:, None]
         cos, sin = np.cos(self.turns[which]), np.sin(self.turns[which])
         x, y = cos * xy[:, 0] + sin * xy[:, 1], cos * xy[:, 1] - sin * xy[:, 0]
         flip = -1.0 if self.mirror else 1.0
@@ -191,7 +195,7 @@ class Copies:
         t, s = found[:, 0], flip * found[:, 1]
         size, height = self.sizes[which], self.heights[which]
         moved = np.stack([size * (cos * t - sin * s), size * (sin * t + cos * s), height * found[:, 2]], axis=1)
-        return np.einsum("qij,qi->qj", self.charts.frames(local, which), moved), np.clip(found[:, 3], 0.0, 1.0)
+        return np.einsum("qij,qi->qj", frames, moved), np.clip(found[:, 3], 0.0, 1.0)
 
     @cached_property
     def matched(self) -> Array:
@@ -217,7 +221,7 @@ class Copies:
                 continue
             (u0, u1), (v0, v1) = box
             own = delta[u0:u1, v0:v1] @ (target.turn.T @ turn @ source.turn).T * self.heights[i]
-            sums = self.shifts.setdefault(target.index, (np.zeros(target.net.poles.shape), np.empty(0)))[0]
+            sums = self.shifts.setdefault(target.index, np.zeros(target.net.poles.shape))
             at = np.ix_(*((np.arange(a, b) + k) % kv.count for (a, b), k, kv in zip(box, found, target.knots, strict=True)))  # noqa: E501
             sums[at] += own
             matched[i] = True
@@ -281,13 +285,11 @@ class Copies:
             joined = [(s, r) for s, r in joined if s.edge not in broken]
         copies = self._compared(offsets, before, removed)
         for copy, place in zip(copies, self.places, strict=True):
-            height = self.feature.height * place.height
-            if copy.lost > LOST * height and not clip:
-                face = self.ground.face(int(self.feet.surface[copies.index(copy)]), self.feet.uv[copies.index(copy)])
-                number = f"#{face.index + 1}" if face else "the face"
+            share = copy.lost / (self.feature.height * abs(place.height))
+            if share > LOST and not clip:
                 raise EditError(
-                    f"{copy.place}: edges or holes of {number} hold {100 * min(copy.lost / height, 1):.0f} % of the "
-                    "height of the copy there",
+                    f"{copy.place}: edges or holes that do not move take {100 * min(share, 1):.0f} % of the height of "
+                    f"the copy there ({_numbers(copy.faces)})",
                     "move it away from them, make it smaller with --size, or let them take it with --clip",
                 )
         used = {i: o for i, o in offsets.items() if np.any(o.poles)}
@@ -363,19 +365,30 @@ class Copies:
             poles = self._interpolant(sheet, *knots)
             delta = Net(*knots, poles, _weights(sheet, *knots))
             more = []
-            for axis, kv in enumerate(knots):
-                uv, span = self._between(sheet, knots, axis, some)
+            for axis, (kv, (uv, span)) in enumerate(zip(knots, self._between(sheet, knots, some), strict=True)):
                 points, _, _, normals = sheet.evaluate(uv)
                 wanted, _ = self.ideal(sheet, points, normals, self.matched)
                 missed = np.linalg.norm(np.asarray(delta.evaluate(uv)) - wanted, axis=1)
                 worst = np.zeros(kv.spans)
                 np.maximum.at(worst, span, missed)
-                pieces = np.clip(np.ceil((worst / limit[axis]) ** (1 / (kv.degree + 1))), 1, PIECES).astype(int)
+                pieces = np.clip(np.ceil((worst / limit[axis]) ** (1 / (kv.degree + 1))), 1, PIECES)
+                pieces = np.minimum(pieces, self._most(sheet, knots, axis, uv, span)).astype(int)
                 more.append(_divided(kv, pieces))
             if not any(len(x) for x in more):
                 break
             extra = np.sort(np.r_[extra[0], more[0]]), np.sort(np.r_[extra[1], more[1]])
         return extra
+
+    def _most(
+        self, sheet: Sheet, knots: tuple[KnotVector, KnotVector], axis: int, uv: Array, span: Array
+    ) -> Array:
+        """Into how many pieces spans may be divided: copies need none narrower than those that held the feature."""
+        kv = knots[axis]
+        speed = np.zeros(kv.spans)
+        np.maximum.at(speed, span, np.linalg.norm(sheet.evaluate(uv)[1 + axis], axis=1))
+        least = self.feature.spacing * float(self.sizes.min()) * (1.0 if kv.degree > 2 else 0.5)
+        width = speed * np.diff(kv.breaks)
+        return np.where(width > SPARE * least, np.ceil(width / least), 1.0)
 
     def _first(self, sheet: Sheet, some: Array) -> tuple[Array, Array]:
         """Knots that make spans under copies no longer than a share of their reach."""
@@ -405,33 +418,37 @@ class Copies:
             result.append(_divided(kv, np.maximum(np.ceil(needed - 1e-6), 1).astype(int)))
         return result[0], result[1]
 
-    def _between(
-        self, sheet: Sheet, knots: tuple[KnotVector, KnotVector], axis: int, some: Array
-    ) -> tuple[Array, Array]:
-        """Places under copies half-way between Greville points in one direction, on them in the other; and spans."""
-        at = [k.greville() for k in knots]
-        kv = knots[axis]
-        ordered = np.sort(at[axis])
-        at[axis] = (ordered[1:] + ordered[:-1]) / 2
-        if not len(at[axis]):
-            return np.empty((0, 2)), np.empty(0, int)
-        rng = np.random.default_rng(0)
-        points = np.asarray(sheet.net.grid(*at))
+    def _between(self, sheet: Sheet, knots: tuple[KnotVector, KnotVector], some: Array) -> list[tuple[Array, Array]]:
+        """For each direction: places under copies half-way between Greville points in it, on them in the other, and
+        the spans they are in."""
         from scipy.spatial import cKDTree
 
-        tree = cKDTree(points.reshape(-1, 3))
-        chosen = []
-        for i in np.flatnonzero(some):
-            hit = np.asarray(tree.query_ball_point(self.charts.origin[i], self.reach[i]), int)
-            chosen.append(hit if len(hit) <= CHECKS else rng.choice(hit, CHECKS, replace=False))
+        at = [k.greville() for k in knots]
+        tree = cKDTree(np.asarray(sheet.net.grid(*at)).reshape(-1, 3))
+        rng = np.random.default_rng(0)
+        which = np.flatnonzero(some)
+        hits = tree.query_ball_point(self.charts.origin[which], self.reach[which])
+        chosen = [np.asarray(h, int) if len(h) <= CHECKS else rng.choice(h, CHECKS, replace=False) for h in hits]
         index = np.unique(np.concatenate(chosen)) if chosen else np.empty(0, int)
-        i, j = np.divmod(index, len(at[1]))
-        uv = np.stack([at[0][i], at[1][j]], axis=1)
-        span = np.clip(np.searchsorted(kv.breaks, uv[:, axis], side="right") - 1, 0, kv.spans - 1)
-        return uv, span
+        found = []
+        for axis, kv in enumerate(knots):
+            place = list(np.divmod(index, len(at[1])))
+            order = np.argsort(at[axis], kind="stable")
+            rank = np.empty(len(order), int)
+            rank[order] = np.arange(len(order))
+            own = rank[place[axis]]
+            keep = own + 1 < len(order)
+            uv = np.stack([at[0][place[0]], at[1][place[1]]], axis=1)[keep]
+            uv[:, axis] = (at[axis][order[own[keep]]] + at[axis][order[own[keep] + 1]]) / 2
+            span = np.clip(np.searchsorted(kv.breaks, uv[:, axis], side="right") - 1, 0, kv.spans - 1)
+            found.append((uv, span))
+        return found
 
     def _interpolant(self, sheet: Sheet, u: KnotVector, v: KnotVector) -> Array:
         """Control points whose surface takes the ideal displacement (of copies that are no shifts), part's frame."""
+        key = sheet.index, u, v
+        if key in self._kept:
+            return self._kept[key]
         us, vs = u.greville(), v.greville()
         points, su, sv = sheet.net.grid(us, vs, 1)
         normals = sheet.sign * np.cross(su, sv)
@@ -444,7 +461,9 @@ class Copies:
         poles = interpolated(u, v, values)
         if weights is not None:
             poles = poles / weights[..., None]
-        return np.where(_grown(near, (u, v))[..., None], poles, 0.0)
+        self._kept = {k: x for k, x in self._kept.items() if k[0] != sheet.index}
+        self._kept[key] = np.where(_grown(near, (u, v))[..., None], poles, 0.0)
+        return self._kept[key]
 
     def _offsets(
         self,
@@ -465,7 +484,7 @@ class Copies:
             net = own.refined(*extra[i])
             own_space = np.zeros(own.poles.shape) if i not in removed else removed[i].copy()
             if i in self.shifts:
-                own_space += self.shifts[i][0]
+                own_space += self.shifts[i]
             poles = _refined_offset(own, net, own_space)
             alone = poles - (_refined_offset(own, net, removed[i]) if i in removed else 0.0)
             if (self.touched[:, number] & ~matched).any():
@@ -518,35 +537,32 @@ class Copies:
             both = np.concatenate([(offsets[i].poles - taken) @ sheet.turn.T, before[i] @ sheet.turn.T], axis=-1)
             pair = Net(net.u, net.v, both, net.weights)
             some = self.touched[:, number]
-            for axis in (0, 1):
-                uv, _ = self._between(sheet, (net.u, net.v), axis, some)
-                if not len(uv):
-                    continue
+            for uv, _ in self._between(sheet, (net.u, net.v), some):
+                only = np.full(len(uv), sheet.faces[0].index)
                 uv = uv[sheet.covers(uv)]
                 points, _, _, normals = sheet.evaluate(uv)
                 wanted, _ = self.ideal(sheet, points, normals)
+                if not len(uv):
+                    continue
+                on = self.ground.faces(np.full(len(uv), i), uv) if len(sheet.faces) > 1 else only
                 values = np.asarray(pair.evaluate(uv))
                 missed = np.linalg.norm(values[:, :3] - wanted, axis=1)
                 gone = np.linalg.norm(values[:, :3] - values[:, 3:], axis=1)
-                tree = cKDTree(points) if len(points) else None
-                for k in np.flatnonzero(some) if tree else ():
-                    hit = np.asarray(tree.query_ball_point(self.charts.origin[k], self.reach[k]), int)
+                chosen = np.flatnonzero(some)
+                hits = cKDTree(points).query_ball_point(self.charts.origin[chosen], self.reach[chosen])
+                for k, hit in zip(chosen, hits, strict=True):
                     if not len(hit):
                         continue
                     worst[k], lost[k] = max(worst[k], missed[hit].max()), max(lost[k], gone[hit].max())
                     squares[k] += (missed[hit] ** 2).sum()
                     samples[k] += len(hit)
-                    if len(sheet.faces) == 1:
-                        faces[k].add(sheet.faces[0].index)
-                    else:
-                        at = self.ground.face(i, uv[hit[0]])
-                        faces[k] |= {at.index} if at else set()
+                    faces[k].update(on[hit].tolist())
         rms = np.sqrt(squares / np.maximum(samples, 1))
         return [
             Copy(
                 place.label,
                 tuple(float(x) for x in self.feet.points[k]),  # type: ignore[arg-type]
-                tuple(sorted(faces[k])),
+                tuple(sorted(faces[k] - {-1})),
                 float(worst[k]),
                 float(rms[k]),
                 float(lost[k]),
@@ -554,6 +570,10 @@ class Copies:
             )
             for k, place in enumerate(self.places)
         ]
+
+
+def _numbers(faces: Sequence[int]) -> str:
+    return " ".join(f"#{i + 1}" for i in faces)
 
 
 def _part(feet: Feet, some: slice) -> Feet:

@@ -75,6 +75,8 @@ class Feature:
     ----------
     radius, reach : float
         Where its taper begins and where it ends, mm.
+    spacing : float
+        Width of the knot spans that held it, mm.
     table : ndarray (n, n, 4)
         Displacement along x, y and the normal (mm) and window (0 to 1) over ``[-reach, reach]²``.
     name : str
@@ -84,6 +86,7 @@ class Feature:
 
     radius: float
     reach: float
+    spacing: float
     table: Array
     name: str = ""
     origin: Origin | None = field(default=None)
@@ -116,6 +119,7 @@ class _File(msgspec.Struct, forbid_unknown_fields=True):
     name: str
     radius: float
     reach: float
+    spacing: float
     size: int
     along_x: list[float]
     along_y: list[float]
@@ -126,7 +130,9 @@ class _File(msgspec.Struct, forbid_unknown_fields=True):
 def save(feature: Feature) -> bytes:
     """A feature as the bytes of a file (JSON, ``docs/features.md``)."""
     columns = np.round(feature.table.reshape(-1, 4).T, 9).tolist()
-    content = _File(FORMAT, feature.name, feature.radius, feature.reach, len(feature.table), *columns)
+    content = _File(
+        FORMAT, feature.name, feature.radius, feature.reach, feature.spacing, len(feature.table), *columns
+    )
     return msgspec.json.encode(content) + b"\n"
 
 
@@ -145,10 +151,10 @@ def load(path: str | os.PathLike) -> Feature:
         raise FileError(f"'{file.name}' is not a feature: its format is {content.format!r}, not {FORMAT!r}", hint)
     if content.size < 4 or any(len(column) != content.size**2 for column in columns):
         raise FileError(f"'{file.name}' is damaged: its table is not {content.size} × {content.size}", hint)
-    if not (0 < content.radius <= content.reach < np.inf):
+    if not (0 < content.radius <= content.reach < np.inf and 0 < content.spacing < np.inf):
         raise FileError(f"'{file.name}' is damaged: its radius is {content.radius} mm", hint)
     table = np.array(columns).T.reshape(content.size, content.size, 4)
-    return Feature(content.radius, content.reach, table, content.name)
+    return Feature(content.radius, content.reach, content.spacing, table, content.name)
 
 
 def taper(share: Array) -> Array:
@@ -317,30 +323,40 @@ def _made(
                 "use a smaller window or --keep g0",
             )
         offsets[index] = np.where(free[..., None], offsets[index], 0.0)
-    table = _table(ground, chart, reach, offsets, windows)
+    spacing = _spacing(ground, windows, reach)
+    table = _table(ground, chart, reach, spacing, offsets, windows)
     origin = Origin(offsets, window.feet, chart.axes[0])
-    return Feature(reach - (window.width or 0.0), reach, table, named, origin)
+    return Feature(window.radius, reach, spacing, table, named, origin)
+
+
+def _spacing(ground: Ground, windows: Mapping[int, Array], reach: float) -> float:
+    """Distance between control points under a window, in the denser direction, mm."""
+    steps = []
+    for index, w in windows.items():
+        for axis in (0, 1):
+            apart = np.linalg.norm(np.diff(ground.sheets[index].net.poles, axis=axis), axis=-1)
+            own = apart[(w[1:] if axis == 0 else w[:, 1:]) > 0]
+            steps += [float(np.median(own))] if len(own) else []
+    return max(min(steps, default=reach), 1e-3 * reach)
 
 
 def _table(
-    ground: Ground, chart: Charts, reach: float, offsets: dict[int, Array], windows: dict[int, Array]
+    ground: Ground,
+    chart: Charts,
+    reach: float,
+    spacing: float,
+    offsets: Mapping[int, Array],
+    windows: Mapping[int, Array],
 ) -> Array:
     """Displacements in carried frames and window over the square of normal coordinates."""
-    spans = [
-        np.linalg.norm(np.diff(sheet.net.poles, axis=axis), axis=-1)[windows[i][1:] > 0 if axis == 0 else windows[i][:, 1:] > 0]
-        for i, sheet in ground.sheets.items()
-        if i in windows
-        for axis in (0, 1)
-    ]
-    least = min((float(np.median(s)) for s in spans if len(s)), default=reach)
-    cells = int(np.clip(2 * np.ceil(2 * reach / max(least, 1e-9)), COARSEST, FINEST))
+    cells = int(np.clip(2 * np.ceil(2 * reach / spacing), COARSEST, FINEST))
     side = np.linspace(-reach, reach, cells + 1)
     xy = np.stack(np.meshgrid(side, side, indexing="ij"), axis=-1).reshape(-1, 2)
     table = np.zeros((len(xy), 4))
     disc = np.flatnonzero(np.linalg.norm(xy, axis=1) <= reach * (1 + 1e-9))
     zero = np.zeros(len(disc), int)
     ab = chart.places(xy[disc], zero)
-    frames = chart.frames(ab, zero)
+    frames = chart.jets(ab, zero)[1]
     for index, offset in offsets.items():
         sheet = ground.sheets[index]
         uv, found = _under(sheet, chart, ab)

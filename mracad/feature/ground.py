@@ -22,7 +22,7 @@ SEEDS = 90
 STEPS = 12
 """Newton steps of a projection."""
 
-GRID = 13
+GRID = 11
 """Samples in each direction around a place."""
 
 STEEP = 0.2
@@ -87,6 +87,12 @@ class Sheet:
         return low, high
 
     @property
+    def size(self) -> Array:
+        """Lengths of the domain in u and v."""
+        low, high = self.domain
+        return high - low
+
+    @property
     def periodic(self) -> Array:
         return np.array([k.periodic for k in self.knots])
 
@@ -132,6 +138,8 @@ class Sheet:
             good = there <= apart * (1 + 1e-15)
             uv, apart = np.where(good[:, None], tried, uv), np.where(good, there, apart)
             share = np.where(good, 1.0, share / 4)
+            if (np.abs(step) <= 1e-13 * self.size).all():
+                break
         return uv, apart
 
     def around(self, uv: Array, centre: Array, reach: Array, count: int) -> tuple[Array, Array, Array]:
@@ -237,9 +245,15 @@ class Ground:
                 along[own] = su / np.maximum(np.linalg.norm(su, axis=1, keepdims=True), 1e-300)
         return Feet(surface, uv, points, normals, along, apart)
 
-    def face(self, surface: int, uv: Array) -> Face | None:
-        """The face of the ground that a place of a surface lies in."""
-        return next((f for f in self.sheets[surface].faces if inside(f, self.sheets[surface], uv)), None)
+    def faces(self, surface: Array, uv: Array) -> Array:
+        """The face of the ground that each place of a surface lies in, or -1."""
+        found = np.full(len(uv), -1)
+        for index, sheet in self.sheets.items():
+            for face in sheet.faces:
+                own = np.flatnonzero((surface == index) & (found < 0))
+                if len(own):
+                    found[own[inside(face, sheet, uv[own])]] = face.index
+        return found
 
     def samples(self, feet: Feet, reach: Array, count: int = GRID) -> tuple[Array, Array, Array]:
         """Points around feet on all surfaces, which of them count, and which feet reach which surface.
@@ -297,31 +311,28 @@ def axes(normals: Array, directions: Array) -> Array:
     return np.stack([x, np.cross(normals, x), normals], axis=1)
 
 
-def inside(face: Face, sheet: Sheet, uv: Array, margin: float = 1e-6) -> bool:
-    """Whether parameters ``(2,)`` lie within a face or on its boundary."""
+def inside(face: Face, sheet: Sheet, uv: Array, margin: float = 1e-6) -> Array:
+    """Whether parameters ``(q, 2)`` lie within a face or on its boundary."""
+    found = np.zeros(len(uv), bool)
     if not face.trims:
-        return True
-    low, high = sheet.domain
-    loops = []
+        return ~found
+    low, size = sheet.domain[0], sheet.size
+    lines = []
     for trim in face.trims:
         k = trim.curve.knots
         count = 2 if k.degree == 1 and k.spans == 1 else _CHORDS * k.spans + 1
-        loops.append(trim.curve.evaluate(np.linspace(*k.domain, count))[0])
-    for turn_u in (-1, 0, 1) if sheet.periodic[0] else (0,):
-        for turn_v in (-1, 0, 1) if sheet.periodic[1] else (0,):
-            at = (uv + np.array([turn_u, turn_v]) * (high - low) - low) / (high - low)
-            odd = False
-            for line in loops:
-                chord = (line - low) / (high - low)
-                p, q = chord[:-1], chord[1:]
-                way = q - p
-                t = np.clip(((at - p) * way).sum(1) / np.maximum((way**2).sum(1), 1e-300), 0, 1)
-                if np.linalg.norm(p + t[:, None] * way - at, axis=1).min() <= margin:
-                    return True
-                cross = (p[:, 1] > at[1]) != (q[:, 1] > at[1])
-                with np.errstate(divide="ignore", invalid="ignore"):
-                    x = p[:, 0] + (at[1] - p[:, 1]) * way[:, 0] / way[:, 1]
-                odd ^= bool(np.count_nonzero(cross & (x > at[0])) % 2)
-            if odd:
-                return True
-    return False
+        lines.append((trim.curve.evaluate(np.linspace(*k.domain, count))[0] - low) / size)
+    p, q = (np.concatenate([line[s] for line in lines]) for s in (slice(None, -1), slice(1, None)))
+    way = q - p
+    length = np.maximum((way**2).sum(axis=1), 1e-300)
+    turns = [(-1, 0, 1) if periodic else (0,) for periodic in sheet.periodic]
+    for turn in ((u, v) for u in turns[0] for v in turns[1]):
+        for block in np.array_split(np.arange(len(uv)), max(len(uv) * len(p) >> 20, 1)):
+            at = ((uv[block] - low) / size + np.array(turn))[:, None]
+            t = np.clip(((at - p) * way).sum(axis=2) / length, 0, 1)
+            near = np.linalg.norm(p + t[..., None] * way - at, axis=2).min(axis=1) <= margin
+            cross = (p[:, 1] > at[..., 1]) != (q[:, 1] > at[..., 1])
+            slope = np.where(way[:, 1] == 0, np.inf, way[:, 1])
+            x = p[:, 0] + (at[..., 1] - p[:, 1]) * way[:, 0] / slope
+            found[block] |= near | ((cross & (x > at[..., 0])).sum(axis=1) % 2 == 1)
+    return found

@@ -136,8 +136,8 @@ def _inward(model: Model, ground: Ground, edge: int, points: Array, tangents: Ar
     middle = len(points) // 2
     for sign in (1.0, -1.0):
         at = ground.feet(points[middle : middle + 1] + sign * size * way[middle : middle + 1])
-        face = ground.face(int(at.surface[0]), at.uv[0])
-        if face is not None and face.index == own and surface == at.surface[0] and at.apart[0] < 0.2 * size:
+        face = ground.faces(at.surface, at.uv)[0]
+        if face == own and surface == at.surface[0] and at.apart[0] < 0.2 * size:
             return sign * way
     return way
 

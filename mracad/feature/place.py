@@ -77,7 +77,7 @@ def place(ground: Ground, text: str, label: str) -> Place:
         face = face_number(ground.model, name, label, PLACE)
         uv = np.array(numbers(rest, label, PLACE, (2,)))
         sheet = sheet_of(ground, face, label)
-        if not _within(sheet, uv) or not inside(ground.model.faces[face], sheet, uv):
+        if not _within(sheet, uv) or not inside(ground.model.faces[face], sheet, uv[None])[0]:
             raise EditError(f"{label} is off the face: {_domain(sheet)}", "give parameters inside the face")
         return Place(label, np.asarray(sheet.net.evaluate(uv[None]))[0], face, uv)
     return Place(label, np.array(numbers(text.removeprefix("near:"), label, PLACE, (3,))))
@@ -138,15 +138,17 @@ def standing(ground: Ground, places: Sequence[Place], far: float) -> Feet:
         if p.face is not None and p.uv is not None:
             surface[i], uv[i], apart[i] = ground.model.faces[p.face].surface, p.uv, 0.0
     feet = ground.standing(surface, uv, apart)
-    for i, p in enumerate(places):
-        way = p.point - feet.points[i]
-        sideways = float(np.linalg.norm(way - (way @ feet.normals[i]) * feet.normals[i]))
-        face = ground.face(int(surface[i]), uv[i]) if np.isfinite(apart[i]) else None
-        if face is None or apart[i] > far or sideways > 1e-3 * far:
-            off = f"{apart[i]:.3g} mm off" if np.isfinite(apart[i]) and face else "off"
-            raise EditError(
-                f"{p.label} is {off} the faces to edit", "give a point on one of them, or select others with --faces"
-            )
+    way = points - feet.points
+    sideways = np.linalg.norm(way - (way * feet.normals).sum(axis=1, keepdims=True) * feet.normals, axis=1)
+    on = np.isfinite(apart) & (ground.faces(surface, uv) >= 0)
+    given = np.array([p.face is not None for p in places], bool)
+    bad = ~on | ~(given | ((apart <= far) & (sideways <= 1e-3 * far)))
+    if bad.any():
+        i = int(np.flatnonzero(bad)[0])
+        off = f"{apart[i]:.3g} mm off" if on[i] else "off"
+        raise EditError(
+            f"{places[i].label} is {off} the faces to edit", "give a point on one of them, or select others with --faces"
+        )
     return feet
 
 
@@ -247,7 +249,7 @@ def window(ground: Ground, text: str, taper: float | None) -> Window:
     if not all(_within(sheet, corner) for corner in corners):
         raise EditError(f"{label}: the window is outside the face: {_domain(sheet)}", "give parameters inside the face")
     middle = corners.mean(axis=0)
-    if not inside(ground.model.faces[face], sheet, middle):
+    if not inside(ground.model.faces[face], sheet, middle[None])[0]:
         raise EditError(f"{label}: the middle of the window is outside the face", "move it onto the face")
     surface = ground.model.faces[face].surface
     feet = ground.standing(np.array([surface]), middle[None], np.zeros(1))
