@@ -199,7 +199,7 @@ def run(
     document : Document
         Changed in place unless ``apply`` is false.
     edit : callable
-        ``edit(model, options, faces=…, held=…, progress=…) -> Edit``.
+        ``edit(model, options, *models, faces=…, held=…, progress=…) -> Edit``, ``models`` those that the options name.
     options : Selection
         The edit's options, selectors among them.
     apply : bool
@@ -214,7 +214,7 @@ def run(
     from mracad.occ.apply import apply as put
     from mracad.occ.apply import restore
     from mracad.occ.check import check
-    from mracad.occ.select import select_cq
+    from mracad.occ.read import read_step
     from mracad.occ.view import view
 
     def stage(name: str) -> Callable[[int, int], None]:
@@ -222,22 +222,13 @@ def run(
 
     start = time.perf_counter()
     stage("looking at faces")(0, 1)
-    model = view(document)
-
-    def cadquery(expression: str) -> set[int]:
-        return select_cq(document, expression)
-
-    nurbs = [face.index for face in model.faces if face.kind in NURBS]
-    chosen = select(model, options.faces, nurbs, cadquery).faces if options.faces else frozenset(nurbs)
-    held = select(model, options.hold, nurbs, cadquery).faces if options.hold else frozenset()
-    convertible = {i for i in chosen - held if model.faces[i].surface is None}
-    if convertible:
-        model = view(document, convert=convertible)
+    model, chosen, held = looked_at(document, options.faces, options.hold)
+    others = [view(read_step(file)) for file in options.models()]
     before: list[SeamMeasure] = []
     valid_before: Validity | None = None
     spoiled: dict[int, str] = {}
     while True:
-        result = edit(model, options, faces=chosen, held=held | spoiled.keys(), progress=stage("editing"))
+        result = edit(model, options, *others, faces=chosen, held=held | spoiled.keys(), progress=stage("editing"))
         result = _named(result, spoiled)
         _refuse_if_stuck(model, result)
         if valid_before is None:
@@ -277,6 +268,28 @@ def run(
         valid_after,
         time.perf_counter() - start,
     )
+
+
+def looked_at(
+    document: Document, faces: Sequence[str], hold: Sequence[str]
+) -> tuple[Model, frozenset[int], frozenset[int]]:
+    """The view of a document for an edit, the faces that selectors name (all NURBS faces by default), and those held.
+
+    Selected faces that are not NURBS are seen as such.
+    """
+    from mracad.occ.select import select_cq
+    from mracad.occ.view import view
+
+    model = view(document)
+
+    def cadquery(expression: str) -> set[int]:
+        return select_cq(document, expression)
+
+    nurbs = [face.index for face in model.faces if face.kind in NURBS]
+    chosen = select(model, faces, nurbs, cadquery).faces if faces else frozenset(nurbs)
+    held = select(model, hold, nurbs, cadquery).faces if hold else frozenset()
+    convertible = {i for i in chosen - held if model.faces[i].surface is None}
+    return (view(document, convert=convertible) if convertible else model), chosen, held
 
 
 def _refuse_if_stuck(model: Model, result: Edit) -> None:

@@ -19,7 +19,8 @@ SHORT = {"faces": "SEL", "hold": "SEL", "max_angle": "DEG", "kink": "DEG", "fit_
 
 
 def of(struct: type[Struct], without: str = "") -> Callable[[Command], Command]:
-    """Add one option for each field of a struct but one, its own before the inherited ones, under the same names."""
+    """Add one option for each field of a struct, its own before the inherited ones, under the same names; not for
+    those whose names stand, between blanks, in ``without``."""
 
     def decorate(command: Command) -> Command:
         hints, kinds = typing.get_type_hints(struct, include_extras=True), plain_types(struct)
@@ -27,7 +28,7 @@ def of(struct: type[Struct], without: str = "") -> Callable[[Command], Command]:
         shared = len(structs.fields(base)) if base is not None and base is not Struct else 0
         fields = structs.fields(struct)
         for field in reversed(fields[shared:] + fields[:shared]):
-            if field.name == without:
+            if field.name in without.split():
                 continue
             meta = next(m for m in hints[field.name].__metadata__ if isinstance(m, Meta) and m.description)
             command = _option(field.name, meta.description or "", kinds[field.name], field.default)(command)
