@@ -226,8 +226,8 @@ class Featured(Selection, frozen=True, kw_only=True, forbid_unknown_fields=True)
     edges: Annotated[
         Literal["frozen", "coupled"],
         Meta(
-            description="Edges between two edited faces: coupled, they move with a copy that lies over them and stay as "
-            "smooth as they were, where that is possible; frozen, none moves."
+            description="Edges between two edited faces: coupled, they move with a copy that lies over them and stay "
+            "as smooth as they were, where that is possible; frozen, none moves."
         ),
     ] = "coupled"
     taper: Annotated[
@@ -321,8 +321,8 @@ class Repeat(Single, frozen=True, kw_only=True, forbid_unknown_fields=True):
     at: Annotated[
         tuple[str, ...],
         Meta(
-            description="A place: X,Y,Z (mm, brought to the nearest selected face), #face@u,v, or @places.csv with lines "
-            "x,y,z[,rotate[,size[,height]]]; repeatable."
+            description="A place: X,Y,Z (mm, brought to the nearest selected face), #face@u,v, or @places.csv with "
+            "lines x,y,z[,rotate[,size[,height]]]; repeatable."
         ),
     ] = ()
     grid: Annotated[

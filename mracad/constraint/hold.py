@@ -37,9 +37,7 @@ def held(
     """
     conditions = Conditions(nets, seams, {i: (net.u, net.v) for i, net in nets.items()})
     size = {i: float(np.ptp(net.poles.reshape(-1, 3), axis=0).max()) for i, net in nets.items()}
-    diagonal = np.concatenate(
-        [size[i] ** 2 * np.outer(_mass(net.u), _mass(net.v)).ravel() for i, net in nets.items()]
-    )
+    diagonal = np.concatenate([size[i] ** 2 * np.outer(_mass(net.u), _mass(net.v)).ravel() for i, net in nets.items()])
     mask = np.concatenate([free[i].ravel() for i in nets])
     stacked = np.concatenate([delta[i].reshape(-1, 3) for i in nets])
     restoration = Restoration(conditions.matrix, diagonal, mask)

@@ -14,18 +14,19 @@ import numpy as np
 
 from mracad.constraint.seam import Treatment
 from mracad.edit.result import Edit, FaceOutcome
-from mracad.errors import EditError
+from mracad.errors import EditError, UsageError
+from mracad.feature.character import at_scale, laid_on
 from mracad.feature.copies import Copies, Laid
 from mracad.feature.detail import Feature, above_surroundings, between_levels, load
-from mracad.feature.ground import Feet, Ground
+from mracad.feature.ground import Ground, axes
 from mracad.feature.pattern import along, grid, listed, polar, scattered
-from mracad.feature.place import Place, place, standing, window
+from mracad.feature.place import Place, face_number, place, sheet_of, standing, window
 from mracad.model import Displacement, Model
-from mracad.options import Featured, Move, Repeat, Single, band_of, length
-from mracad.wavelet.ladder import arc_lengths, ladder_for_scale
-from mracad.wavelet.project import projection
+from mracad.options import Featured, Move, Repeat, Single, Transfer, band_of, length
 
 Array = np.ndarray
+
+FACE = "write a face as #3, or its name"
 
 
 def move(
@@ -48,8 +49,7 @@ def move(
     assert feature.origin is not None
     removed = {i: -offset for i, offset in feature.origin.offsets.items()}
     ground = _cleared(model, chosen, feature)
-    target = replace(place(ground, options.to, "place"), rotate=math.radians(options.rotate))
-    laid = _laid(ground, feature, [target], options, "add", removed)
+    laid = _laid(ground, feature, [_target(ground, options.to, options)], options, "add", removed)
     return _edit(model, laid, chosen, held)
 
 
@@ -69,6 +69,48 @@ def repeat(
     return _edit(model, laid, chosen, held)
 
 
+def transfer(
+    model: Model,
+    options: Transfer,
+    source: Model,
+    *,
+    faces: Collection[int] | None = None,
+    held: Collection[int] = (),
+    progress: Callable[[int, int], None] | None = None,
+) -> Edit:
+    """Carry the detail of a face, or a feature, of another model onto this one.
+
+    Parameters
+    ----------
+    source : Model
+        The other one; the rest, and errors, as for :func:`move`.
+    """
+    chosen = _chosen(model, faces, held)
+    ground = Ground(model, chosen)
+    every = {f.index for f in source.faces if f.surface is not None}
+    if _is_window(options.from_):
+        feature = extract(source, options, every, options.from_)
+        feature = replace(feature, origin=None)
+        laid = _laid(ground, feature, [_target(ground, options.to, options)], options, "add", {})
+        return _edit(model, laid, chosen, held)
+    if options.band is None:
+        raise UsageError("band: the detail of a face needs one", "give --band 0mm:20mm")
+    one = sheet_of(Ground(source, every), face_number(source, options.from_, "from", FACE), "from")
+    two = sheet_of(ground, face_number(model, options.to, "to", FACE), "to")
+    width = None if options.taper is None else length(options.taper, model.diagonal, "taper")
+    return _edit(model, laid_on(model, two, one, band_of(options.band, source.diagonal), options, width), chosen, held)
+
+
+def _is_window(text: str) -> bool:
+    """Whether a text names a feature, and not a face."""
+    return text.startswith("near:") or "@" in text or text.endswith(".feature")
+
+
+def _target(ground: Ground, text: str, options: Featured) -> Place:
+    found = place(ground, text, "place")
+    return replace(found, rotate=math.radians(options.rotate), size=options.size, height=options.height)
+
+
 def extract(model: Model, options: Featured, chosen: Collection[int], text: str = "") -> Feature:
     """The feature that options name: from a file, or from a window of the model."""
     text = text or (options.feature if isinstance(options, Single) else "")
@@ -83,20 +125,10 @@ def extract(model: Model, options: Featured, chosen: Collection[int], text: str 
     if options.base == "surroundings":
         return above_surroundings(ground, area, area.width, options.keep, label, text)
     low, high = band_of(options.band or "", model.diagonal)
-    coarse = {i: _at_scale(model, i, high) for i in ground.sheets}
-    fine = {i: _at_scale(model, i, low) if low else model.surfaces[i].net.poles for i in ground.sheets}
+    coarse = {i: at_scale(model.surfaces[i].net, high) for i in ground.sheets}
+    fine = {i: at_scale(model.surfaces[i].net, low) if low else model.surfaces[i].net.poles for i in ground.sheets}
     bands = {i: fine[i] - coarse[i] for i in ground.sheets}
     return between_levels(Ground(model, chosen, coarse), bands, area, area.width, options.keep, label, text)
-
-
-def _at_scale(model: Model, surface: int, scale: float) -> Array:
-    """Control points of a surface, over its own knots, without what is finer than a scale (mm)."""
-    net = model.surfaces[surface].net
-    poles = net.poles
-    for axis, knots in enumerate((net.u, net.v)):
-        coarse = ladder_for_scale(knots, arc_lengths(net, axis), scale)
-        poles = projection(coarse, knots).apply(poles, axis=axis)
-    return poles
 
 
 def _chosen(model: Model, faces: Collection[int] | None, held: Collection[int]) -> set[int]:
@@ -122,10 +154,12 @@ def _places(ground: Ground, feature: Feature, options: Repeat) -> list[Place]:
             origin = ground.standing(feature.origin.feet.surface, feature.origin.feet.uv, np.zeros(1)).points[0]
         elif found:
             foot = standing(ground, found[:1], feature.reach)
-            origin, frame = foot.points[0], _frame(foot)
+            origin, frame = foot.points[0], axes(foot.normals, foot.along)[0]
         else:
             raise EditError("a feature from a file has no place of its own to begin at", "give --at, too")
-        pattern = grid(options.grid, origin, frame, own) if options.grid else polar(options.polar or "", origin, frame, own)
+        pattern = (
+            grid(options.grid, origin, frame, own) if options.grid else polar(options.polar or "", origin, frame, own)
+        )
         first = found[0] if found else None
         if first is not None:
             pattern = [replace(p, rotate=first.rotate, size=first.size, height=first.height) for p in pattern]
@@ -143,12 +177,6 @@ def _places(ground: Ground, feature: Feature, options: Repeat) -> list[Place]:
     return found
 
 
-def _frame(feet: Feet) -> Array:
-    from mracad.feature.ground import axes
-
-    return axes(feet.normals, feet.along)[0]
-
-
 def _laid(
     ground: Ground,
     feature: Feature,
@@ -157,8 +185,6 @@ def _laid(
     overlap: str,
     removed: Mapping[int, Array],
 ) -> Laid:
-    if isinstance(options, Move):
-        places = [replace(p, size=options.size, height=options.height) for p in places]
     feet = standing(ground, places, feature.reach)
     copies = Copies(ground, feature, places, feet, overlap, options.mirror)
     return copies.laid(options.keep, options.edges == "coupled", options.clip, removed)
@@ -179,7 +205,9 @@ def _edit(model: Model, laid: Laid, chosen: Collection[int], held: Collection[in
             outcomes.append(FaceOutcome(face.index, "held", "held"))
         elif face.index not in chosen:
             outcomes.append(FaceOutcome(face.index, "unselected", "not selected"))
-        elif offset is None or (len(model.surfaces[face.surface].faces) > 1 and face.index not in touched and not moved):
+        elif offset is None or (
+            len(model.surfaces[face.surface].faces) > 1 and face.index not in touched and not moved
+        ):
             outcomes.append(FaceOutcome(face.index, "unchanged", "no copy there", points=points))
         else:
             outcomes.append(FaceOutcome(face.index, "edited", moved=moved, points=points, inserted=inserted))

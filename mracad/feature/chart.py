@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache, cached_property
+from itertools import pairwise
 
 import numpy as np
 
@@ -110,8 +111,8 @@ class Charts:
         """Polynomials ``(m, terms, k)`` of degree :data:`DEGREE` + 1 at points ``(2, q)``, each in its own chart."""
         rows = _products(at)
         found = np.empty((at.shape[1], coefficients.shape[2]))
-        begin = np.flatnonzero(np.diff(which, prepend=-1))
-        for low, high in zip(begin, np.append(begin[1:], len(which)), strict=True):
+        begin = np.append(np.flatnonzero(np.diff(which, prepend=-1)), len(which))
+        for low, high in pairwise(begin.tolist()):
             found[low:high] = (coefficients[which[low]].T @ rows[:, low:high]).T
         return found
 

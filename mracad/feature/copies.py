@@ -18,16 +18,15 @@ import numpy as np
 from mracad.bspline.interpolate import interpolated
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.net import Net
-from mracad.bspline.refine import refinement
 from mracad.constraint.frozen import separate
 from mracad.constraint.hold import held, matching
-from mracad.constraint.seam import Border, Seam, Wishes, opening, seams
+from mracad.constraint.seam import Seam, Wishes, opening, seams
 from mracad.errors import EditError
 from mracad.feature.chart import Charts
 from mracad.feature.detail import LOST, Feature
 from mracad.feature.ground import STEEP, Feet, Ground, Sheet
 from mracad.feature.place import Place
-from mracad.model import Model, Offset, Surface
+from mracad.model import Offset, Surface
 
 Array = np.ndarray
 
@@ -133,10 +132,8 @@ class Copies:
         self.turns = np.array([p.rotate for p in places])
         self.reach = feature.reach * self.sizes
         given = [feet.along[i] if p.direction is None else p.direction for i, p in enumerate(places)]
-        parts = [
-            ground.charts(_part(feet, slice(k, k + BATCH)), np.array(given[k : k + BATCH]), 1.05 * self.reach[k : k + BATCH])
-            for k in range(0, len(places), BATCH)
-        ]
+        blocks = [slice(k, k + BATCH) for k in range(0, len(places), BATCH)]
+        parts = [ground.charts(_part(feet, b), np.array(given[b]), 1.05 * self.reach[b]) for b in blocks]
         names = ("origin", "axes", "reach", "graph", "log", "exp")
         self.charts = Charts(*(np.concatenate([getattr(c, name) for c, _ in parts]) for name in names))
         self.touched = np.concatenate([t for _, t in parts])
@@ -222,7 +219,9 @@ class Copies:
             (u0, u1), (v0, v1) = box
             own = delta[u0:u1, v0:v1] @ (target.turn.T @ turn @ source.turn).T * self.heights[i]
             sums = self.shifts.setdefault(target.index, np.zeros(target.net.poles.shape))
-            at = np.ix_(*((np.arange(a, b) + k) % kv.count for (a, b), k, kv in zip(box, found, target.knots, strict=True)))  # noqa: E501
+            at = np.ix_(
+                *((np.arange(a, b) + k) % kv.count for (a, b), k, kv in zip(box, found, target.knots, strict=True))
+            )
             sums[at] += own
             matched[i] = True
         return matched
@@ -293,7 +292,7 @@ class Copies:
                     "move it away from them, make it smaller with --size, or let them take it with --clip",
                 )
         used = {i: o for i, o in offsets.items() if np.any(o.poles)}
-        return Laid(used, tuple(copies), {e: r for e, r in frozen.items()}, frozenset(moving - closing))
+        return Laid(used, tuple(copies), frozen, frozenset(moving - closing))
 
     def _stretch(self, seam: Seam, removed: Mapping[int, Array]) -> tuple[float, float] | None:
         """Fractions of a seam between which copies, or what is removed, move it."""
@@ -325,7 +324,9 @@ class Copies:
             for i, sheet in self.ground.sheets.items():
                 result[i] = self._fine(sheet)
         knots = {
-            (i, axis): kv for i, sheet in self.ground.sheets.items() for axis, kv in enumerate(self._spans(sheet, result[i]))
+            (i, axis): kv
+            for i, sheet in self.ground.sheets.items()
+            for axis, kv in enumerate(self._spans(sheet, result[i]))
         }
         stretches = []
         for number, (seam, (low, high)) in enumerate(joined):
@@ -363,7 +364,7 @@ class Copies:
                     "use larger or fewer copies",
                 )
             poles = self._interpolant(sheet, *knots)
-            delta = Net(*knots, poles, _weights(sheet, *knots))
+            delta = Net(*knots, poles, weights_over(sheet, *knots))
             more = []
             for axis, (kv, (uv, span)) in enumerate(zip(knots, self._between(sheet, knots, some), strict=True)):
                 points, _, _, normals = sheet.evaluate(uv)
@@ -373,15 +374,13 @@ class Copies:
                 np.maximum.at(worst, span, missed)
                 pieces = np.clip(np.ceil((worst / limit[axis]) ** (1 / (kv.degree + 1))), 1, PIECES)
                 pieces = np.minimum(pieces, self._most(sheet, knots, axis, uv, span)).astype(int)
-                more.append(_divided(kv, pieces))
+                more.append(divided(kv, pieces))
             if not any(len(x) for x in more):
                 break
             extra = np.sort(np.r_[extra[0], more[0]]), np.sort(np.r_[extra[1], more[1]])
         return extra
 
-    def _most(
-        self, sheet: Sheet, knots: tuple[KnotVector, KnotVector], axis: int, uv: Array, span: Array
-    ) -> Array:
+    def _most(self, sheet: Sheet, knots: tuple[KnotVector, KnotVector], axis: int, uv: Array, span: Array) -> Array:
         """Into how many pieces spans may be divided: copies need none narrower than those that held the feature."""
         kv = knots[axis]
         speed = np.zeros(kv.spans)
@@ -415,7 +414,7 @@ class Copies:
             rooms = np.full((kv.spans, length.shape[1 - axis]), np.inf)
             np.minimum.at(rooms, cell, room if axis == 0 else room.T)
             needed = (lengths / (rooms / FIRST)).max(axis=1)
-            result.append(_divided(kv, np.maximum(np.ceil(needed - 1e-6), 1).astype(int)))
+            result.append(divided(kv, np.maximum(np.ceil(needed - 1e-6), 1).astype(int)))
         return result[0], result[1]
 
     def _between(self, sheet: Sheet, knots: tuple[KnotVector, KnotVector], some: Array) -> list[tuple[Array, Array]]:
@@ -424,7 +423,7 @@ class Copies:
         from scipy.spatial import cKDTree
 
         at = [k.greville() for k in knots]
-        tree = cKDTree(np.asarray(sheet.net.grid(*at)).reshape(-1, 3))
+        tree = cKDTree(np.asarray(sheet.net.grid(at[0], at[1])).reshape(-1, 3))
         rng = np.random.default_rng(0)
         which = np.flatnonzero(some)
         hits = tree.query_ball_point(self.charts.origin[which], self.reach[which])
@@ -455,7 +454,7 @@ class Copies:
         normals /= np.maximum(np.linalg.norm(normals, axis=-1, keepdims=True), 1e-300)
         values, count = self.ideal(sheet, points.reshape(-1, 3), normals.reshape(-1, 3), self.matched)
         values, near = values.reshape(points.shape), count.reshape(points.shape[:2]) > 0
-        weights = _weights(sheet, u, v)
+        weights = weights_over(sheet, u, v)
         if weights is not None:
             values = values * np.asarray(Net(u, v, weights[..., None]).grid(us, vs))
         poles = interpolated(u, v, values)
@@ -485,8 +484,8 @@ class Copies:
             own_space = np.zeros(own.poles.shape) if i not in removed else removed[i].copy()
             if i in self.shifts:
                 own_space += self.shifts[i]
-            poles = _refined_offset(own, net, own_space)
-            alone = poles - (_refined_offset(own, net, removed[i]) if i in removed else 0.0)
+            poles = refined_offset(own, net, own_space)
+            alone = poles - (refined_offset(own, net, removed[i]) if i in removed else 0.0)
             if (self.touched[:, number] & ~matched).any():
                 laid = self._interpolant(sheet, net.u, net.v) @ sheet.turn
                 poles, alone = poles + laid, alone + laid
@@ -533,7 +532,7 @@ class Copies:
                 continue
             own = self.ground.model.surfaces[i].net
             net = own.refined(offsets[i].u_knots, offsets[i].v_knots)
-            taken = _refined_offset(own, net, removed[i]) if i in removed else 0.0
+            taken = refined_offset(own, net, removed[i]) if i in removed else 0.0
             both = np.concatenate([(offsets[i].poles - taken) @ sheet.turn.T, before[i] @ sheet.turn.T], axis=-1)
             pair = Net(net.u, net.v, both, net.weights)
             some = self.touched[:, number]
@@ -580,18 +579,18 @@ def _part(feet: Feet, some: slice) -> Feet:
     return replace(feet, **{name: getattr(feet, name)[some] for name in feet.__dataclass_fields__})
 
 
-def _weights(sheet: Sheet, u: KnotVector, v: KnotVector) -> Array | None:
+def weights_over(sheet: Sheet, u: KnotVector, v: KnotVector) -> Array | None:
     return sheet.net.weights if sheet.net.weights is None else sheet.net.over(u, v).weights
 
 
-def _refined_offset(own: Net, net: Net, offset: Array) -> Array:
+def refined_offset(own: Net, net: Net, offset: Array) -> Array:
     """Offsets over a net's own knots as offsets over finer ones."""
     if net is own:
         return offset
     return Net(own.u, own.v, offset, own.weights).over(net.u, net.v).poles
 
 
-def _divided(kv: KnotVector, pieces: Array) -> Array:
+def divided(kv: KnotVector, pieces: Array) -> Array:
     """Knots that divide each span into equal pieces."""
     found = [
         low + (high - low) * np.arange(1, k) / k
@@ -613,9 +612,7 @@ def _grown(near: Array, knots: tuple[KnotVector, KnotVector]) -> Array:
     return near
 
 
-def _shift(
-    source: Sheet, target: Sheet, box: tuple[tuple[int, int], ...], way: Array
-) -> tuple[int, int] | None:
+def _shift(source: Sheet, target: Sheet, box: tuple[tuple[int, int], ...], way: Array) -> tuple[int, int] | None:
     """By how many poles a target's knots are those of the source moved by ``way``; None where they are not."""
     found = []
     for axis, (a, b) in enumerate(box):

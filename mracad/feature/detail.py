@@ -130,9 +130,7 @@ class _File(msgspec.Struct, forbid_unknown_fields=True):
 def save(feature: Feature) -> bytes:
     """A feature as the bytes of a file (JSON, ``docs/features.md``)."""
     columns = np.round(feature.table.reshape(-1, 4).T, 9).tolist()
-    content = _File(
-        FORMAT, feature.name, feature.radius, feature.reach, feature.spacing, len(feature.table), *columns
-    )
+    content = _File(FORMAT, feature.name, feature.radius, feature.reach, feature.spacing, len(feature.table), *columns)
     return msgspec.json.encode(content) + b"\n"
 
 
@@ -204,9 +202,9 @@ def above_surroundings(ground: Ground, window: Window, width: float, keep: str, 
         if net.weights is not None:
             first = Net(net.u, net.v, net.weights[..., None]).grid(net.u.greville(), net.v.greville())
             values = values * np.asarray(first)
-        w = np.zeros(len(points))
-        w[hit] = weight
-        w = w.reshape(net.poles.shape[:2])
+        flat = np.zeros(len(points))
+        flat[hit] = weight
+        w = flat.reshape(net.poles.shape[:2])
         offsets[index] = interpolated(net.u, net.v, values) / weights[..., None] * w[..., None]
         windows[index] = w
     return _made(ground, chart, window, reach, offsets, windows, keep, label, named)
@@ -282,9 +280,9 @@ def between_levels(
             continue
         zero = np.zeros(len(hit), int)
         shares = window.share(sheet, hit, found.coordinates(found.local(points[hit], zero), zero), width)
-        w = np.zeros(len(points))
-        w[hit] = taper(shares)
-        w = w.reshape(sheet.net.poles.shape[:2])
+        flat = np.zeros(len(points))
+        flat[hit] = taper(shares)
+        w = flat.reshape(sheet.net.poles.shape[:2])
         if w.any():
             windows[index], offsets[index] = w, bands[index] * w[..., None]
     return _made(ground, found, window, reach, offsets, windows, keep, label, named)
@@ -312,8 +310,8 @@ def _made(
         sheet = ground.sheets[index]
         surface = model.surfaces[index]
         faces = [model.faces[i] for i in surface.faces]
-        moving = {t.edge for f in faces for t in f.trims if len({s.face for s in model.edges[t.edge].sides} - ground.chosen) == 0} if model.edges else set()  # noqa: E501
-        moving = {e for e in moving if len(model.edges[e].sides) == 2}
+        edges = [model.edges[trim.edge] for face in faces for trim in face.trims if model.edges]
+        moving = {e.index for e in edges if len(e.sides) == 2 and {side.face for side in e.sides} <= ground.chosen}
         free = separate(surface.net, faces, [f.index for f in sheet.faces], keep, moving).free
         lost = float(np.linalg.norm(offsets[index][~free], axis=-1).max(initial=0.0))
         if lost > LOST * largest:

@@ -33,7 +33,7 @@ GROWS = 1.25
 """A larger scale counts where the feature is so many times as high there."""
 
 LOBE, FAR = 0.15, 4.0
-"""What is lower than this share of a feature within so many times its largest scale is a side lobe of the projection."""
+"""What is lower than this share of a feature within so many times its largest scale is a side lobe of it."""
 
 LEAST = 1e-4
 """mm: what is lower is no feature."""
@@ -62,9 +62,9 @@ class Found:
 
     @property
     def text(self) -> str:
-        """It as ``--feature`` takes it."""
-        x, y, z = (f"{value:.6g}" for value in self.place)
-        return f"near:{x},{y},{z},radius:{self.size / 2:.4g}"
+        """It as ``--feature`` takes it, twice as wide as it is at its rim: what lies around it must be flat there."""
+        x, y, z = (f"{value:.6g}" for value in np.round(self.place, 6) + 0.0)
+        return f"near:{x},{y},{z},radius:{self.size:.4g}"
 
 
 def found(model: Model, faces: Collection[int]) -> list[Found]:
@@ -95,7 +95,7 @@ def _on(sheet: Sheet) -> list[Found]:
     scale = 4 * min(float(np.median(x)) for x in lengths)
     kept: list[Found] = []
     while scale < max(float(x.sum()) for x in lengths) / 2:
-        height = (_detail(net, lengths, scale).grid(us, vs) * normals).sum(axis=-1)
+        height = (np.asarray(_detail(net, lengths, scale).grid(us, vs)) * normals).sum(axis=-1)
         size = np.where(seen, np.abs(height), 0.0)
         usual = max(USUAL * float(np.median(size[seen])), LEAST)
         regions, count = label(size > usual, np.ones((3, 3)))
@@ -110,7 +110,7 @@ def _on(sheet: Sheet) -> list[Found]:
             place = points[own][np.linalg.norm(points[own] - middle, axis=1).argmin()]
             across = 2 * float(np.linalg.norm(points[own] - place, axis=1).max())
             face = next((f.index for f in sheet.faces), 0)
-            new = Found(face, tuple(float(x) for x in place), across, float(size[peak]), (scale / 2, scale))  # type: ignore[arg-type]  # noqa: E501
+            new = Found(face, tuple(float(x) for x in place), across, float(size[peak]), (scale / 2, scale))  # type: ignore[arg-type]
             kept = _merged(kept, new)
         scale *= 2
     return [f for f in kept if not any(_lobe(f, g) for g in kept)]

@@ -100,7 +100,7 @@ def table(path: str) -> list[tuple[str, list[float]]]:
         why = error.strerror if isinstance(error, OSError) else "it is not UTF-8 text"
         raise FileError(f"cannot read '{path}': {why}", "give the path of a CSV file with columns x,y,z") from error
     name = path.replace("\\", "/").rpartition("/")[2]
-    rows = []
+    rows: list[tuple[str, list[float]]] = []
     for number, line in enumerate(lines, 1):
         if not line.strip() or line.lstrip().startswith("#") or (not rows and re.match(r"\s*[\"A-Za-z]", line)):
             continue
@@ -147,7 +147,8 @@ def standing(ground: Ground, places: Sequence[Place], far: float) -> Feet:
         i = int(np.flatnonzero(bad)[0])
         off = f"{apart[i]:.3g} mm off" if on[i] else "off"
         raise EditError(
-            f"{places[i].label} is {off} the faces to edit", "give a point on one of them, or select others with --faces"
+            f"{places[i].label} is {off} the faces to edit",
+            "give a point on one of them, or select others with --faces",
         )
     return feet
 

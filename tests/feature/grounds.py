@@ -6,6 +6,7 @@ from mracad.bspline.knots import KnotVector
 from mracad.bspline.net import Net
 from samples import make
 from tests.edit.models import fitted
+from tests.edit.panels import interpolated
 from tests.occ import shapes
 
 HEIGHT, SIGMA = 2.0, 4.0
@@ -88,22 +89,13 @@ def rhombi(side=60.0, spans=30, bend=0.0, degree=3, turns=("", "", "")):
     rim = [make.vertex(lift(c)) for c in corner]
     tips = [make.vertex(lift(corner[i] + corner[(i + 1) % 3])) for i in range(3)]
 
-    def net(p, q):
-        return fitted(
-            k,
-            k,
-            lambda x, y: 0 * x,
-            u_of=lambda t: t,
-            v_of=lambda t: t,
-        ), p, q
-
+    u, v = np.meshgrid(k.greville(), k.greville(), indexing="ij")
     nets = []
     for i in range(3):
-        flat, p, q = net(corner[i], corner[(i + 1) % 3])
-        u, v = flat.poles[..., 0], flat.poles[..., 1]
+        p, q = corner[i], corner[(i + 1) % 3]
         x, y = (u * p[axis] + v * q[axis] for axis in (0, 1))
-        z = _interpolated(k, lambda s, t, p=p, q=q: bend / 2 * ((s * p[0] + t * q[0]) ** 2 + (s * p[1] + t * q[1]) ** 2))
-        nets.append(Net(k, k, np.stack([x, y, z], axis=-1)))
+        paraboloid = lambda s, t, p=p, q=q: bend / 2 * sum((s * p[k] + t * q[k]) ** 2 for k in (0, 1))  # noqa: E731
+        nets.append(Net(k, k, np.stack([x, y, _interpolated(k, paraboloid)], axis=-1)))
     spokes = [make.edge(make.curve(nets[i].poles[:, 0], k.knots, degree), (hub, rim[i]), (0.0, 1.0)) for i in range(3)]
     faces = []
     for i, n in enumerate(nets):
@@ -125,8 +117,6 @@ def rhombi(side=60.0, spans=30, bend=0.0, degree=3, turns=("", "", "")):
 
 
 def _interpolated(k, function):
-    from tests.edit.panels import interpolated, values
-
+    """Poles of the spline over k × k that takes the values of a function at the Greville points."""
     at = k.greville()
-    grid = function(*np.meshgrid(at, at, indexing="ij"))
-    return interpolated(k, at, interpolated(k, at, grid).T).T if values is not None else grid
+    return interpolated(k, at, interpolated(k, at, function(*np.meshgrid(at, at, indexing="ij"))).T).T

@@ -45,7 +45,9 @@ def list_(source: str, input_unit: str | None, faces: tuple[str, ...], as_json: 
     options.reading,
     click.option("--feature", required=True, help="near:X,Y,Z,radius:R (mm) or #3@u0:u1,v0:v1."),
     options.of(Repeat, " ".join(f for f in Repeat.__struct_fields__ if f not in ("faces", "taper", "base", "band"))),
-    click.option("-o", "--output", "output", metavar="F.feature", required=True, type=click.Path(), help="File to write."),
+    click.option(
+        "-o", "--output", "output", metavar="F.feature", required=True, type=click.Path(), help="File to write."
+    ),
     options.overwrite,
     options.printing,
 )
@@ -68,7 +70,13 @@ def extract(
     model, chosen, _ = job.looked_at(read(source, input_unit), chosen_options.faces, ())
     found = taken(model, chosen_options, chosen)
     put(save(found), path)
-    body = {"file": model.name, "radius": found.radius, "reach": found.reach, "height": found.height, "written": path.name}
+    body = {
+        "file": model.name,
+        "radius": found.radius,
+        "reach": found.reach,
+        "height": found.height,
+        "written": path.name,
+    }
     if as_json:
         print(json.dumps(body, ensure_ascii=False))
     else:
