@@ -26,9 +26,6 @@ RAYS, STEPS = 24, 8
 RIDGE = 1e-9
 """Keeps fits with few points from swinging."""
 
-BETTER = 3.0
-"""A graph has a higher degree where that makes its residual so many times smaller."""
-
 
 @cache
 def _powers(degree: int) -> tuple[Array, Array]:
@@ -172,7 +169,7 @@ def _tangents(ca: Array, cb: Array) -> tuple[Array, Array, Array]:
     return f1, np.cross(n, f1), n
 
 
-def charts(origin: Array, axes: Array, reach: Array, points: Array, mask: Array, adaptive: bool = False) -> Charts:
+def charts(origin: Array, axes: Array, reach: Array, points: Array, mask: Array, degree: int = DEGREE) -> Charts:
     """Charts around places, from points of the coarse surface around each of them.
 
     Parameters
@@ -182,23 +179,13 @@ def charts(origin: Array, axes: Array, reach: Array, points: Array, mask: Array,
     points : ndarray (m, q, 3)
     mask : ndarray of bool (m, q)
         Which of them count.
-    adaptive : bool
-        Whether a lower degree is taken where a higher one fits hardly better: where the points do not lie all
-        around, so that the polynomial has to bridge a hole.
+    degree : int
+        Of the graph.
     """
     local = np.einsum("mij,mqj->mqi", axes, points - origin[:, None]) / reach[:, None, None]
     a, b, c = (local[..., k] for k in range(3))
-    degrees = (1, 2, 4, DEGREE) if adaptive else (DEGREE,)
-    graph = np.zeros((len(origin), len(_powers(DEGREE)[0])))
-    best = np.full(len(origin), np.inf)
-    for degree in degrees:
-        found = fitted(a, b, c[..., None], degree, mask)[..., 0]
-        missed = (np.einsum("mqt,mt->mq", monomials(a, b, degree), found) - c) * mask
-        size = np.sqrt((missed**2).sum(axis=1) / np.maximum(mask.sum(axis=1), 1))
-        better = size < best / BETTER
-        graph[better] = 0.0
-        graph[better, : found.shape[1]] = found[better]
-        best[better] = size[better]
+    found = fitted(a, b, c[..., None], degree, mask)[..., 0]
+    graph = np.pad(found, ((0, 0), (0, len(_powers(DEGREE)[0]) - found.shape[1])))
     x, y, fan_a, fan_b = _fan(graph)
     flat = [z.reshape(len(origin), -1) for z in (x, y, fan_a, fan_b)]
     log = fitted(flat[2], flat[3], np.stack(flat[:2], axis=-1), DEGREE + 1)

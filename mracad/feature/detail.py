@@ -21,7 +21,7 @@ from mracad.bspline.interpolate import interpolated
 from mracad.bspline.net import Net
 from mracad.constraint.frozen import separate
 from mracad.errors import EditError, FileError
-from mracad.feature.chart import Charts, charts
+from mracad.feature.chart import DEGREE, Charts, charts, monomials
 from mracad.feature.ground import STEEP, Feet, Ground, Sheet, axes
 from mracad.feature.place import Window
 
@@ -31,6 +31,10 @@ FORMAT = "mracad feature 1"
 
 RING = 1.5
 """What lies between the rim of a feature and so many times its radius tells what it stands above."""
+
+WORTH, BETTER = 3e-3, 3.0
+"""A ground is bridged by more than a plane where that changes the ring by more than this share of the feature's height,
+and by degree 6 instead of 4 where that fits so many times better."""
 
 SECTORS = 16
 """The ring must be there in three quarters of so many directions."""
@@ -232,7 +236,12 @@ def _surroundings(ground: Ground, window: Window, reach: float, label: str) -> t
         plane = np.linalg.lstsq(np.c_[local[ring], np.ones(ring.sum())][:, [0, 1, 3]], local[ring, 2], rcond=None)[0]
         normal = frame.T @ (np.array([-plane[0], -plane[1], 1.0]) / np.sqrt(1 + plane[0] ** 2 + plane[1] ** 2))
     chart = charts(
-        centre[None], axes(normal[None], feet.along), np.array([RING * reach]), points[None], ring[None], adaptive=True
+        centre[None],
+        axes(normal[None], feet.along),
+        np.array([RING * reach]),
+        points[None],
+        ring[None],
+        _bridging(local / reach, ring, near & ~ring),
     )
     local = (points[ring] - centre) @ chart.axes[0].T
     order = np.random.default_rng(0).permutation(len(local))
@@ -253,6 +262,24 @@ def _surroundings(ground: Ground, window: Window, reach: float, label: str) -> t
         *_graph_points(chart, level, reach, origin),
     )
     return shrunk, lambda ab: level(ab) - level(np.zeros((1, 2)))[0]
+
+
+def _bridging(local: Array, ring: Array, within: Array) -> int:
+    """Degree of the polynomial that the plate corrects.
+
+    A plate reproduces cubics whatever its hole; what a ground has beyond them a higher degree must bridge, which makes
+    more of the feature's own tails: only where that is much.
+    """
+
+    def missed(degree: int) -> tuple[float, float]:
+        rows = monomials(local[:, 0], local[:, 1], degree)
+        rest = local[:, 2] - rows @ np.linalg.lstsq(rows[ring], local[ring, 2], rcond=None)[0]
+        return float(np.sqrt((rest[ring] ** 2).mean())), float(np.abs(rest[within]).max(initial=0.0))
+
+    rest, height = missed(3)
+    if rest <= WORTH * height:
+        return 1
+    return DEGREE if missed(DEGREE)[0] * BETTER < missed(4)[0] else 4
 
 
 def _graph_points(chart: Charts, level: Any, reach: float, origin: Array) -> tuple[Array, Array]:
