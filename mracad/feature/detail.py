@@ -12,7 +12,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any
 
 import msgspec
 import numpy as np
@@ -39,8 +38,12 @@ and by degree 6 instead of 4 where that fits so many times better."""
 SECTORS = 16
 """The ring must be there in three quarters of so many directions."""
 
-PLATE = 900
-"""Points of the ring that the thin plate passes through."""
+PLATE, CLOSE, CELLS = 600, 1.2, 64
+"""Points of the ring that the thin plate passes through, first those up to so many times the reach; and the cells, up
+to there, over which it is tabulated."""
+
+NORMALS = 6
+"""Steps to the foot of a point on the plate."""
 
 FINEST, COARSEST = 512, 64
 """Cells of a table across, at most and at least."""
@@ -180,7 +183,8 @@ def above_surroundings(ground: Ground, window: Window, width: float, keep: str, 
         The window in messages, and the feature's name.
     """
     reach = window.reach(width)
-    chart, level = _surroundings(ground, window, reach, label)
+    around = _Surroundings(ground, window, reach, label)
+    chart = around.chart
     offsets: dict[int, Array] = {}
     windows: dict[int, Array] = {}
     for index, sheet in ground.sheets.items():
@@ -188,19 +192,20 @@ def above_surroundings(ground: Ground, window: Window, width: float, keep: str, 
         points, normals = _grid(sheet)
         local = (points - chart.origin[0]) @ chart.axes[0].T
         hit = np.flatnonzero(
-            (np.linalg.norm(local[:, :2], axis=1) <= reach)
+            (np.linalg.norm(local[:, :2], axis=1) <= 1.1 * reach)
             & (np.abs(local[:, 2]) <= 1.5 * reach)
             & (normals @ chart.axes[0][2] > -STEEP)
         )
         if not len(hit):
             continue
-        shares = window.share(sheet, hit, chart.coordinates(local[hit], np.zeros(len(hit), int)), width)
+        feet = around.feet(local[hit])
+        shares = window.share(sheet, hit, chart.coordinates(feet, np.zeros(len(hit), int)), width)
         weight = taper(shares)
-        hit, weight = hit[shares < 1], weight[shares < 1]
+        hit, weight, feet = hit[shares < 1], weight[shares < 1], feet[shares < 1]
         if not len(hit):
             continue
         values = np.zeros((len(points), 3))
-        values[hit] = (local[hit, 2] - level(local[hit, :2]))[:, None] * (chart.axes[0][2] @ sheet.turn)
+        values[hit] = (local[hit] - feet) @ chart.axes[0] @ sheet.turn
         values = values.reshape(*net.poles.shape)
         weights = np.ones(net.poles.shape[:2]) if net.weights is None else net.weights
         if net.weights is not None:
@@ -211,57 +216,79 @@ def above_surroundings(ground: Ground, window: Window, width: float, keep: str, 
         w = flat.reshape(net.poles.shape[:2])
         offsets[index] = interpolated(net.u, net.v, values) / weights[..., None] * w[..., None]
         windows[index] = w
+    cleared = {i: ground.model.surfaces[i].net.poles - offset for i, offset in offsets.items()}
+    ground = Ground(ground.model, ground.chosen, cleared)
     return _made(ground, chart, window, reach, offsets, windows, keep, label, named)
 
 
-def _surroundings(ground: Ground, window: Window, reach: float, label: str) -> tuple[Charts, Any]:
-    """The chart of what lies around a window, and the height of the plate through it at places (q, 2)."""
-    from scipy.interpolate import RBFInterpolator
+class _Surroundings:
+    """What a thin plate through the surroundings of a window makes of the place.
 
-    feet = window.feet
-    points, near = (x[0] for x in ground.samples(feet, np.array([RING * reach]), SPREAD)[:2])
-    centre = window.point
-    normal = feet.normals[0]
-    for _ in range(3):
+    Attributes
+    ----------
+    chart : Charts
+        Of one place: that of the window, brought to the plate.
+    """
+
+    def __init__(self, ground: Ground, window: Window, reach: float, label: str) -> None:
+        from scipy.interpolate import RBFInterpolator, RectBivariateSpline
+
+        feet, centre = window.feet, window.point
+        points, near = (x[0] for x in ground.samples(feet, np.array([RING * reach]), SPREAD)[:2])
+        normal = feet.normals[0]
+        for _ in range(3):
+            frame = axes(normal[None], feet.along)[0]
+            local = (points - centre) @ frame.T
+            radius = np.linalg.norm(local[:, :2], axis=1)
+            ring = near & (radius > reach) & (radius <= RING * reach)
+            angle = np.arctan2(local[ring, 1], local[ring, 0])
+            if len(np.unique(np.floor((angle / (2 * np.pi) + 0.5) * SECTORS))) < 0.75 * SECTORS:
+                raise EditError(
+                    f"{label}: the feature, {2 * reach:.4g} mm across with its taper, is larger than its face",
+                    "use a smaller window or a shorter --taper, or select its neighbours, too",
+                )
+            rows = np.c_[local[ring, :2], np.ones(ring.sum())]
+            a, b, _ = np.linalg.lstsq(rows, local[ring, 2], rcond=None)[0]
+            normal = frame.T @ (np.array([-a, -b, 1.0]) / np.sqrt(1 + a**2 + b**2))
         frame = axes(normal[None], feet.along)[0]
-        local = (points - centre) @ frame.T
-        radius = np.linalg.norm(local[:, :2], axis=1)
-        ring = near & (radius > reach) & (radius <= RING * reach)
-        angle = np.arctan2(local[ring, 1], local[ring, 0])
-        if len(np.unique(np.floor((angle / (2 * np.pi) + 0.5) * SECTORS))) < 0.75 * SECTORS:
-            raise EditError(
-                f"{label}: the feature, {2 * reach:.4g} mm across with its taper, is larger than its face",
-                "use a smaller window or a shorter --taper, or select its neighbours, too",
-            )
-        plane = np.linalg.lstsq(np.c_[local[ring], np.ones(ring.sum())][:, [0, 1, 3]], local[ring, 2], rcond=None)[0]
-        normal = frame.T @ (np.array([-plane[0], -plane[1], 1.0]) / np.sqrt(1 + plane[0] ** 2 + plane[1] ** 2))
-    chart = charts(
-        centre[None],
-        axes(normal[None], feet.along),
-        np.array([RING * reach]),
-        points[None],
-        ring[None],
-        _bridging(local / reach, ring, near & ~ring),
-    )
-    local = (points[ring] - centre) @ chart.axes[0].T
-    order = np.random.default_rng(0).permutation(len(local))
-    rim = order[np.argsort(np.linalg.norm(local[order, :2], axis=1) > 1.2 * reach, kind="stable")][:PLATE]
-    zero = np.zeros(len(local), int)
-    rest = local[rim, 2] - chart.height(local[rim], zero[: len(rim)])
-    plate = RBFInterpolator(local[rim, :2] / reach, rest / reach, kernel="thin_plate_spline", degree=1)
+        local = (points - centre) @ frame.T / reach
+        degree = _bridging(local, ring, near & ~ring)
+        own = local[ring]
+        rows = monomials(own[:, 0], own[:, 1], degree)
+        graph = np.linalg.lstsq(rows, own[:, 2], rcond=None)[0]
+        order = np.random.default_rng(0).permutation(len(own))
+        far = np.linalg.norm(own[order, :2], axis=1) > CLOSE
+        rim = order[np.argsort(far, kind="stable")][:PLATE]
+        rest = own[rim, 2] - rows[rim] @ graph
+        plate = RBFInterpolator(own[rim, :2], rest, kernel="thin_plate_spline", degree=1)
+        side = np.linspace(-CLOSE, CLOSE, CELLS + 1)
+        ab = np.stack(np.meshgrid(side, side, indexing="ij"), axis=-1).reshape(-1, 2)
+        heights = monomials(ab[:, 0], ab[:, 1], degree) @ graph + plate(ab)
+        level = float(heights[len(heights) // 2])
+        # the chart's origin is the place on the plate, not on the feature
+        self._spline = RectBivariateSpline(side, side, (heights - level).reshape(CELLS + 1, -1))
+        self._reach = reach
+        origin = centre + reach * level * frame[2]
+        within = np.linalg.norm(ab, axis=1) <= CLOSE
+        graph_points = origin + reach * np.c_[ab, heights - level][within] @ frame
+        self.chart = charts(
+            origin[None], frame[None], np.array([CLOSE * reach]), graph_points[None], np.ones((1, within.sum()), bool)
+        )
 
-    def level(ab: Array) -> Array:
-        return chart.height(ab, np.zeros(len(ab), int)) + reach * plate(ab / reach)
-
-    # the chart's origin is the place on the ground, not on the feature; its reach only that of the feature
-    origin = centre + level(np.zeros((1, 2)))[0] * chart.axes[0][2]
-    shrunk = charts(
-        origin[None],
-        chart.axes,
-        np.array([1.05 * reach]),
-        *_graph_points(chart, level, reach, origin),
-    )
-    return shrunk, lambda ab: level(ab) - level(np.zeros((1, 2)))[0]
+    def feet(self, local: Array) -> Array:
+        """The points of the plate on whose normals points ``(q, 3)`` stand, both in the chart's axes, mm."""
+        at = local / self._reach
+        height = np.zeros(len(at))
+        foot = at
+        for _ in range(NORMALS):
+            a, b = foot[:, 0], foot[:, 1]
+            slopes = [self._spline.ev(a, b, dx=dx, dy=1 - dx) for dx in (1, 0)]
+            normal = np.stack([-slopes[0], -slopes[1], np.ones(len(at))], axis=1)
+            normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+            foot = at - height[:, None] * normal
+            height = height + (foot[:, 2] - self._spline.ev(foot[:, 0], foot[:, 1])) * normal[:, 2]
+            foot = at - height[:, None] * normal
+        return np.asarray(self._reach * foot)
 
 
 def _bridging(local: Array, ring: Array, within: Array) -> int:
@@ -280,15 +307,6 @@ def _bridging(local: Array, ring: Array, within: Array) -> int:
     if rest <= WORTH * height:
         return 1
     return DEGREE if missed(DEGREE)[0] * BETTER < missed(4)[0] else 4
-
-
-def _graph_points(chart: Charts, level: Any, reach: float, origin: Array) -> tuple[Array, Array]:
-    side = np.linspace(-1.05, 1.05, 25) * reach
-    ab = np.stack(np.meshgrid(side, side, indexing="ij"), axis=-1).reshape(-1, 2)
-    ab = ab[np.linalg.norm(ab, axis=1) <= 1.1 * reach]
-    heights = level(ab) - level(np.zeros((1, 2)))[0]
-    points = origin + np.c_[ab, heights] @ chart.axes[0]
-    return points[None], np.ones((1, len(ab)), bool)
 
 
 def between_levels(
@@ -326,7 +344,7 @@ def _made(
     label: str,
     named: str,
 ) -> Feature:
-    """The feature with its table."""
+    """The feature with its table, on a ground without it."""
     largest = max((float(np.linalg.norm(x, axis=-1).max()) for x in offsets.values()), default=0.0)
     if not any(w.any() for w in windows.values()):
         raise EditError(f"{label}: no control point lies under the window", "use a larger one")

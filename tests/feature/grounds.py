@@ -2,8 +2,10 @@
 
 import numpy as np
 
+from mracad.bspline.interpolate import interpolated as at_greville
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.net import Net
+from mracad.wavelet.ladder import arc_lengths
 from samples import make
 from tests.edit.models import fitted
 from tests.edit.panels import interpolated
@@ -120,3 +122,15 @@ def _interpolated(k, function):
     """Poles of the spline over k × k that takes the values of a function at the Greville points."""
     at = k.greville()
     return interpolated(k, at, interpolated(k, at, function(*np.meshgrid(at, at, indexing="ij"))).T).T
+
+
+def bumped(net, span, distance, normal):
+    """A net refined to spans of about ``span`` mm, with a bump along normals; both are functions of points."""
+    lengths = [arc_lengths(net, axis).sum() for axis in (0, 1)]
+    extra = [np.linspace(*k.domain, int(x / span) + 1)[1:-1] for k, x in zip((net.u, net.v), lengths, strict=True)]
+    fine = net.refined(*extra)
+    at = fine.u.greville(), fine.v.greville()
+    points = fine.grid(*at)
+    weight = Net(fine.u, fine.v, fine.weights[..., None]).grid(*at)
+    delta = at_greville(fine.u, fine.v, weight * bump(distance(points))[..., None] * normal(points))
+    return Net(fine.u, fine.v, fine.poles + delta / fine.weights[..., None], fine.weights)

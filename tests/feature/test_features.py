@@ -150,6 +150,32 @@ def test_motion_leaves_a_clean_surface(plane, tmp_path):
     assert len(report["copies"]) == 1
 
 
+def test_motion_on_a_cylinder(tmp_path):
+    """A bump along the normals of a rational cylinder: clean where it was, the same where it is."""
+    radius = 40.0
+    bare = grounds.cylinder(radius, 130)
+
+    def normal(points):
+        angle = np.arctan2(points[..., 0], points[..., 2])
+        return np.stack([np.sin(angle), 0 * angle, np.cos(angle)], axis=-1)
+
+    def apart(points, angle=0.75, y=40.0):
+        return np.hypot(radius * (np.arctan2(points[..., 0], points[..., 2]) - angle), points[..., 1] - y)
+
+    source = grounds.save(tmp_path / "in.step", grounds.bumped(bare, 1.0, apart, normal))
+    places = [word((radius * np.sin(a), y, radius * np.cos(a))) for a, y in ((0.75, 40.0), (0.8, 90.3))]
+    window = f"near:{places[0]},radius:18"
+    _, after, _ = repeated(
+        source, tmp_path / "out.step", "--taper", "3mm", "--to", places[1], feature=window, use="move"
+    )
+    uv = square(bare, 400)
+    old, new = bare.evaluate(uv), after.surfaces[0].net.evaluate(uv)
+    off = np.linalg.norm(new - old - bump(apart(old, 0.8, 90.3))[:, None] * normal(old), axis=1) / HEIGHT
+    left = off[apart(old) < 25].max()
+    print(f"left on the cylinder: {left:.1e} of the height; the copy is off by {off.max():.1e}")
+    assert left <= 5e-3 and off.max() <= 1e-2
+
+
 @pytest.mark.parametrize("radius", [3, 4, 5])
 def test_surroundings_tell_the_ground(radius):
     """Off the plane under a bump by the radius of the window in σ (METHOD: 3 %, 1.2e-3, 1.5e-5 of the height)."""
