@@ -157,11 +157,8 @@ class Fitting(Selection, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """How an edit that changes whole faces goes about it."""
 
     fit_g1: Annotated[
-        float | None,
-        Meta(
-            description="Make seams tangent that are meant to be: those between edited faces under this angle (°).",
-            ge=0.0,
-        ),
+        Annotated[float, Meta(ge=0.0)] | None,
+        Meta(description="Make seams tangent that are meant to be: those between edited faces under this angle (°)."),
     ] = None
     close_gaps: Annotated[
         bool,

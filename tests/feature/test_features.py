@@ -60,6 +60,11 @@ def plane(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
+def small(tmp_path_factory):
+    return grounds.save(tmp_path_factory.mktemp("small") / "small.step", grounds.plane(100.0, (25.0, 25.0)))
+
+
+@pytest.fixture(scope="module")
 def feature(plane, tmp_path_factory):
     path = tmp_path_factory.mktemp("feature") / "bump.feature"
     run("feature", "extract", plane, "-o", path, "--feature", FEATURE)
@@ -308,45 +313,46 @@ def test_copies_are_turned_mirrored_and_scaled(tmp_path):
     assert np.abs(new - old - wanted[:, None] * [0, 0, 1]).max() <= 2e-3 * HEIGHT
 
 
-def test_overlapping_copies(plane, tmp_path):
-    places = ["--at", "110,110,0", "--at", "116.5,110,0"]
-    points, found = None, {}
+def test_overlapping_copies(small, tmp_path):
+    places = ["--at", "60,60,0", "--at", "66.5,60,0"]
+    found = {}
     for rule in ("add", "max", "replace"):
-        before, after, _ = repeated(plane, tmp_path / f"{rule}.step", *places, "--overlap", rule)
+        before, after, _ = repeated(
+            small, tmp_path / f"{rule}.step", *places, "--overlap", rule, feature="near:25,25,0,radius:17"
+        )
         old, new = (m.surfaces[0].net for m in (before, after))
         points = old.evaluate(square(old, 400))
         found[rule] = (new.evaluate(square(old, 400)) - points)[:, 2]
-    one, two = (bump(np.hypot(points[:, 0] - x, points[:, 1] - 110)) for x in (110, 116.5))
+    one, two = (bump(np.hypot(points[:, 0] - x, points[:, 1] - 60)) for x in (60, 66.5))
     assert np.abs(found["add"] - one - two).max() <= 1e-3 * HEIGHT
     assert np.abs(found["max"] - np.maximum(one, two)).max() <= 0.05 * HEIGHT  # a crease that knots of 1 mm round off
-    core = np.hypot(points[:, 0] - 116.5, points[:, 1] - 110) < 19
+    core = np.hypot(points[:, 0] - 66.5, points[:, 1] - 60) < 16
     assert np.abs(found["replace"] - two)[core].max() <= 1e-3 * HEIGHT
     assert found["replace"].max() < 1.01 * HEIGHT < found["add"].max()
 
 
-def test_patterns(plane, tmp_path):
-    """A grid and a polar pattern that begin at the feature, and one along an edge."""
+def test_patterns(small, tmp_path):
+    """A grid and a polar pattern that begin at the feature, one along an edge, and places moved at random."""
 
     def at(*arguments):
-        return np.array(
-            [c["at"] for c in repeated(plane, tmp_path / "out.step", "--overwrite", *arguments)[2]["copies"]]
-        )
+        report = tmp_path / "report.json"
+        settings = ["--feature", "near:25,25,0,radius:14", "--taper", "4mm", "--report", report, "--overwrite"]
+        run("repeat", small, "-o", tmp_path / "out.step", "--dry-run", *settings, *arguments)
+        return np.array([c["at"] for c in json.loads(report.read_text())["copies"]])
 
-    grid = at("--grid", "3x2,50,70")
-    wanted = [(50 + 50 * i, 50 + 70 * j, 0) for i in range(3) for j in range(2) if i or j]
-    assert np.abs(grid - wanted).max() < 1e-6
-    polar = at("--polar", "4,100,100,0,0,0,1")
-    assert np.abs(polar - [(150, 50, 0), (150, 150, 0), (50, 150, 0)]).max() < 1e-6
-    along = at("--along", "edge#1,3,35", "--size", "0.5")
-    edge = model(plane).edges[0]
-    assert len(along) == 3
-    apart = np.abs(along - edge.points[12]) @ np.abs(np.cross(edge.tangents[12], [0, 0, 1]))
-    assert np.abs(apart - 35).max() < 1e-3
-    steps = np.linalg.norm(np.diff(along, axis=0), axis=1)
-    assert np.abs(steps - 200 / 3).max() < 0.05
-    first, again = (at("--at", "100,100,0", "--jitter", "3mm", "--spin", 90, "--seed", 5) for _ in range(2))
-    assert (first == again).all() and 0 < np.linalg.norm(first - [100, 100, 0]) <= 3
-    other = at("--at", "100,100,0", "--jitter", "3mm", "--seed", 6)
+    grid = at("--grid", "3x2,25,50")
+    wanted = [(25 + 25 * i, 25 + 50 * j, 0) for i in range(3) for j in range(2) if i or j]
+    assert np.abs(grid - wanted).max() < 1e-5
+    polar = at("--polar", "4,50,50,0,0,0,1")
+    assert np.abs(polar - [(75, 25, 0), (75, 75, 0), (25, 75, 0)]).max() < 1e-5
+    along = at("--along", "edge#1,3,20", "--size", "0.8")
+    edge = model(small).edges[0]
+    apart = (along - edge.points[12]) @ np.cross(edge.tangents[12], [0, 0, 1])
+    assert len(along) == 3 and np.abs(np.abs(apart) - 20).max() < 1e-3
+    assert np.abs(np.linalg.norm(np.diff(along, axis=0), axis=1) - 100 / 3).max() < 0.05
+    first, again = (at("--at", "50,50,0", "--jitter", "3mm", "--spin", 90, "--seed", 5) for _ in range(2))
+    assert (first == again).all() and 0 < np.linalg.norm(first - [50, 50, 0]) <= 3
+    other = at("--at", "50,50,0", "--jitter", "3mm", "--seed", 6)
     assert np.linalg.norm(first - other) > 1e-3
 
 
