@@ -157,9 +157,10 @@ def _places(ground: Ground, feature: Feature, options: Repeat) -> list[Place]:
             origin, frame = foot.points[0], axes(foot.normals, foot.along)[0]
         else:
             raise EditError("a feature from a file has no place of its own to begin at", "give --at, too")
-        pattern = (
-            grid(options.grid, origin, frame, own) if options.grid else polar(options.polar or "", origin, frame, own)
-        )
+        if options.grid:
+            pattern = grid(ground, options.grid, origin, frame, own)
+        else:
+            pattern = polar(options.polar or "", origin, frame, own)
         first = found[0] if found else None
         if first is not None:
             pattern = [replace(p, rotate=first.rotate, size=first.size, height=first.height) for p in pattern]

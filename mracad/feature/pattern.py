@@ -19,6 +19,9 @@ GRID = "write it as NxM,DX,DY: 4x3,25,25"
 POLAR = "write it as N,x|y|z or N,X,Y,Z,DX,DY,DZ: 6,z"
 ALONG = "write it as EDGE,N or EDGE,N,OFFSET: edge#4,10,15"
 
+STRIDES = 4
+"""Steps from one place of a grid to the next."""
+
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 
@@ -36,18 +39,39 @@ def listed(ground: Ground, words: Sequence[str]) -> list[Place]:
     return found
 
 
-def grid(text: str, origin: Array, frame: Array, own: bool) -> list[Place]:
-    """A grid along the axes of a frame (rows); the first place is left out where the feature is there already."""
+def grid(ground: Ground, text: str, origin: Array, frame: Array, own: bool) -> list[Place]:
+    """A grid that follows the ground along the axes of a frame (rows); the first place is left out where the feature
+    is there already."""
     match = re.fullmatch(r"\s*(\d+)\s*[xX]\s*(\d+)\s*,(.*)", text)
     if not match or 0 in (int(match[1]), int(match[2])):
         raise UsageError(f"grid: {text!r} is not right", GRID)
     dx, dy = numbers(match[3], "grid", GRID, (2,))
+    rows = [(origin[None], frame[None])]
+    for _ in range(int(match[1]) - 1):
+        rows.append(_walked(ground, *rows[-1], 0, dx))
+    columns = [tuple(np.concatenate(parts) for parts in zip(*rows, strict=True))]
+    for _ in range(int(match[2]) - 1):
+        columns.append(_walked(ground, *columns[-1], 1, dy))
     return [
-        Place(f"place {i + 1},{j + 1} of the grid", origin + i * dx * frame[0] + j * dy * frame[1], direction=frame[0])
+        Place(f"place {i + 1},{j + 1} of the grid", points[i], direction=frames[i, 0])
         for i in range(int(match[1]))
-        for j in range(int(match[2]))
+        for j, (points, frames) in enumerate(columns)
         if i or j or not own
     ]
+
+
+def _walked(ground: Ground, points: Array, frames: Array, axis: int, distance: float) -> tuple[Array, Array]:
+    """Points and frames (rows x, y, normal) after a walk over the ground; straight on where it ends."""
+    on = np.ones(len(points), bool)
+    for _ in range(STRIDES):
+        ahead = points + distance / STRIDES * frames[:, axis]
+        feet = ground.feet(ahead)
+        way = ahead - feet.points
+        sideways = np.linalg.norm(way - (way * feet.normals).sum(axis=1, keepdims=True) * feet.normals, axis=1)
+        on &= sideways <= 1e-3 * abs(distance)
+        points = np.where(on[:, None], feet.points, ahead)
+        frames = np.where(on[:, None, None], axes(feet.normals, frames[:, 0]), frames)
+    return points, frames
 
 
 def polar(text: str, origin: Array, frame: Array, own: bool) -> list[Place]:
