@@ -49,7 +49,7 @@ def grid(ground: Ground, text: str, origin: Array, frame: Array, own: bool) -> l
     rows = [(origin[None], frame[None])]
     for _ in range(int(match[1]) - 1):
         rows.append(_walked(ground, *rows[-1], 0, dx))
-    columns = [tuple(np.concatenate(parts) for parts in zip(*rows, strict=True))]
+    columns = [(np.concatenate([p for p, _ in rows]), np.concatenate([f for _, f in rows]))]
     for _ in range(int(match[2]) - 1):
         columns.append(_walked(ground, *columns[-1], 1, dy))
     return [

@@ -9,13 +9,12 @@ import sys
 from pathlib import Path
 
 import numpy as np
-
 from OCP.BRep import BRep_Builder
 from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeFace
 from OCP.TopoDS import TopoDS_Compound
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
-from samples import make  # noqa: E402
+from samples import make
 
 SIDE, SPANS = 60.0, 40
 

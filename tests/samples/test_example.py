@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
 from mracad_cli.__main__ import main
+
 from samples.example import make
 
 FOLDER = Path(make.__file__).parent
