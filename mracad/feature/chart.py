@@ -20,7 +20,7 @@ Array = np.ndarray
 DEGREE = 6
 """Of the graph; the maps have one more."""
 
-RAYS, STEPS = 24, 8
+RAYS, STEPS = 16, 8
 """The fan of geodesics."""
 
 RIDGE = 1e-9
@@ -187,14 +187,16 @@ def charts(origin: Array, axes: Array, reach: Array, points: Array, mask: Array,
     found = fitted(a, b, c[..., None], degree, mask)[..., 0]
     graph = np.pad(found, ((0, 0), (0, len(_powers(DEGREE)[0]) - found.shape[1])))
     x, y, fan_a, fan_b = _fan(graph)
-    flat = [z.reshape(len(origin), -1) for z in (x, y, fan_a, fan_b)]
-    log = fitted(flat[2], flat[3], np.stack(flat[:2], axis=-1), DEGREE + 1)
-    exp = fitted(flat[0], flat[1], np.stack(flat[2:], axis=-1), DEGREE + 1)
+    fan = np.stack([fan_a, fan_b], axis=-1).reshape(len(origin), -1, 2)
+    ray = np.stack([x, y], axis=-1).reshape(1, -1, 2)
+    log = fitted(fan[..., 0], fan[..., 1], np.broadcast_to(ray, fan.shape), DEGREE + 1)
+    exp = np.linalg.pinv(monomials(ray[0, :, 0], ray[0, :, 1], DEGREE + 1)) @ fan
     return Charts(origin, axes, reach, graph, log, exp)
 
 
 def _fan(graph: Array) -> tuple[Array, Array, Array, Array]:
-    """Normal coordinates and places ``(m, rays, steps + 1)`` on a fan of geodesics of unit length, by Runge–Kutta."""
+    """Normal coordinates ``(rays, steps + 1)`` and places ``(m, rays, steps + 1)`` on a fan of geodesics of unit length,
+    by Runge–Kutta."""
 
     by_a, by_b = _derivations()
     padded = np.pad(graph, ((0, 0), (0, len(by_a) - graph.shape[1])))
@@ -225,4 +227,4 @@ def _fan(graph: Array) -> tuple[Array, Array, Array, Array]:
     a, b = np.stack(track, axis=-1)
     radius = h * np.arange(STEPS + 1)
     x, y = np.cos(angle)[:, None] * radius, np.sin(angle)[:, None] * radius
-    return np.broadcast_to(x, a.shape), np.broadcast_to(y, a.shape), a, b
+    return x, y, a, b

@@ -27,6 +27,7 @@ from mracad.feature.detail import LOST, Feature
 from mracad.feature.ground import STEEP, Feet, Ground, Sheet
 from mracad.feature.place import Place
 from mracad.model import Offset, Surface
+from mracad.wavelet.ladder import arc_lengths
 
 Array = np.ndarray
 
@@ -42,8 +43,8 @@ SPARE = 1.5
 ROUNDS, PIECES = 5, 6
 """Times that spans are divided, and into how many pieces at most each time."""
 
-CHECKS = 300
-"""Points at which a copy is compared with the ideal, at most."""
+CHECKS, FEWEST, ALL = 300, 60, 30_000
+"""Points in each direction at which a copy is compared with the ideal: at most, at least, and for all copies."""
 
 BATCH = 48
 """Copies worked on at a time."""
@@ -391,6 +392,9 @@ class Copies:
 
     def _first(self, sheet: Sheet, some: Array) -> tuple[Array, Array]:
         """Knots that make spans under copies no longer than a share of their reach."""
+        longest = max(float(arc_lengths(sheet.net, axis).max()) for axis in (0, 1))
+        if 2 * longest <= float(self.reach[some].min()) / FIRST:
+            return np.empty(0), np.empty(0)
         us, vs = (np.unique(np.r_[k.breaks, np.linspace(*k.domain, 160)]) for k in sheet.knots)
         points = np.asarray(sheet.net.grid(us, vs))
         from scipy.spatial import cKDTree
@@ -427,7 +431,8 @@ class Copies:
         rng = np.random.default_rng(0)
         which = np.flatnonzero(some)
         hits = tree.query_ball_point(self.charts.origin[which], self.reach[which])
-        chosen = [np.asarray(h, int) if len(h) <= CHECKS else rng.choice(h, CHECKS, replace=False) for h in hits]
+        most = int(np.clip(ALL // max(len(which), 1), FEWEST, CHECKS))
+        chosen = [np.asarray(h, int) if len(h) <= most else rng.choice(h, most, replace=False) for h in hits]
         index = np.unique(np.concatenate(chosen)) if chosen else np.empty(0, int)
         found = []
         for axis, kv in enumerate(knots):

@@ -98,7 +98,7 @@ class Feature:
     name: str = ""
     origin: Origin | None = field(default=None)
 
-    @property
+    @cached_property
     def height(self) -> float:
         """Its largest displacement, mm."""
         return float(np.linalg.norm(self.table[..., :3], axis=-1).max())
