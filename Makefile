@@ -51,6 +51,7 @@ lint: $(VENV)/dev
 bench: $(VENV)/dev
 	$(BIN)/python benchmarks/transform.py
 	$(BIN)/python benchmarks/command.py
+	$(BIN)/python benchmarks/features.py
 
 # Batches: what workers gain, kills, a lost cluster worker; some minutes
 bench-batch: $(VENV)/dev

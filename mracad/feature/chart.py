@@ -195,8 +195,15 @@ def charts(origin: Array, axes: Array, reach: Array, points: Array, mask: Array,
 
 
 def _fan(graph: Array) -> tuple[Array, Array, Array, Array]:
-    """Normal coordinates ``(rays, steps + 1)`` and places ``(m, rays, steps + 1)`` on a fan of geodesics of unit length,
-    by Runge–Kutta."""
+    """A fan of geodesics of unit length, by Runge–Kutta.
+
+    Returns
+    -------
+    x, y : ndarray (rays, steps + 1)
+        Normal coordinates.
+    a, b : ndarray (m, rays, steps + 1)
+        Places.
+    """
 
     by_a, by_b = _derivations()
     padded = np.pad(graph, ((0, 0), (0, len(by_a) - graph.shape[1])))

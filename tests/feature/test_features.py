@@ -237,6 +237,22 @@ def test_copies_over_seams_of_a_curved_panel(feature, tmp_path):
     assert [len(c["faces"]) for c in report["copies"]] == [2, 4, 4]
 
 
+def test_copies_on_an_analytic_cylinder(feature, tmp_path):
+    """The face is converted; a copy lies over the edge where it closes."""
+    radius = 40.0
+    source = shapes.save(BRepPrimAPI_MakeCylinder(radius, 100.0).Shape(), tmp_path / "in.step")
+    _, after, _ = repeated(
+        source, tmp_path / "out.step", "--faces", "type:cylinder", "--at", "40,0,48", feature=feature
+    )
+    net = next(s.net for s in after.surfaces)
+    points = net.evaluate(square(net, 400))
+    angle = np.arctan2(points[:, 1], points[:, 0])
+    height = np.hypot(points[:, 0], points[:, 1]) - radius
+    off = np.abs(height - bump(np.hypot(radius * angle, points[:, 2] - 48))).max() / HEIGHT
+    print(f"analytic cylinder: off by {off:.1e} of the height")
+    assert off <= 1e-2
+
+
 def hole(path):
     face = shapes.face_on(make.surface(*_flat()))
     tool = BRepPrimAPI_MakeCylinder(gp_Ax2(gp_Pnt(60, 60, -5), gp_Dir(0, 0, 1)), 6.0, 10.0).Shape()
