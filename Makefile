@@ -1,6 +1,7 @@
 # mracad: multiresolution editing for CAD models.
 #
 #   make demo    set everything up and smooth a sample
+#   make example fair a panel of six patches and put details on it: moved, repeated over seams, carried from a file
 #   make test    set everything up and run the tests
 #   make test-long  and refine the largest real models as well
 #   make regress compare every sample with the reference figures in samples/figures.json
@@ -19,13 +20,18 @@ export SOURCE_DATE_EPOCH ?= 0
 
 SAMPLES := $(wildcard samples/*.step)
 
-.PHONY: demo test test-long regress fuzz lint bench bench-batch docs samples smooth wheel clean
+.PHONY: demo example test test-long regress fuzz lint bench bench-batch docs samples smooth wheel clean
 
 demo: $(VENV)/ready
 	@mkdir -p build
 	@echo 'mracad smooth samples/panel.step --scale 25mm -o build/panel.smooth.step -o build/panel.smooth.stl'
 	@$(BIN)/mracad smooth samples/panel.step --scale 25mm --overwrite -o build/panel.smooth.step -o build/panel.smooth.stl
 	@echo 'The result lies in build/panel.smooth.step (and .stl); compare it with samples/panel.step.'
+
+example: $(VENV)/ready
+	@mkdir -p build
+	$(BIN)/mracad run samples/example/recipe.toml samples/panel.step --overwrite -o build/example.step -o build/example.stl
+	@echo 'The result lies in build/example.step (and .stl); samples/example/recipe.toml says how it was made.'
 
 test: $(VENV)/dev
 	$(BIN)/python -m pytest -n 2
@@ -49,6 +55,7 @@ lint: $(VENV)/dev
 bench: $(VENV)/dev
 	$(BIN)/python benchmarks/transform.py
 	$(BIN)/python benchmarks/command.py
+	$(BIN)/python benchmarks/features.py
 
 # Batches: what workers gain, kills, a lost cluster worker; some minutes
 bench-batch: $(VENV)/dev

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from mracad.audit.continuity import seams
     from mracad.audit.deviation import deviations
+    from mracad.edit.features import move, repeat, transfer
     from mracad.edit.smooth import smooth
     from mracad.errors import MracadError
     from mracad.job import run
@@ -26,29 +27,35 @@ if TYPE_CHECKING:
     from mracad.occ.check import check
     from mracad.occ.files import read, write
     from mracad.occ.view import view as snapshot
-    from mracad.options import Smooth
+    from mracad.options import Move, Repeat, Smooth, Transfer
 
 __version__ = "0.1.0"
 
 _HOMES = {
     "Displacement": "model",
     "Model": "model",
+    "Move": "options",
     "MracadError": "errors",
+    "Repeat": "options",
     "Smooth": "options",
+    "Transfer": "options",
     "apply": "occ.apply",
     "check": "occ.check",
     "deviations": "audit.deviation",
+    "move": "edit.features",
     "read": "occ.files",
+    "repeat": "edit.features",
     "run": "job",
     "seams": "audit.continuity",
     "smooth": "edit.smooth",
     "snapshot": "occ.view:view",
+    "transfer": "edit.features",
     "write": "occ.files",
 }
 
 __all__ = [
-    "Displacement", "Model", "MracadError", "Smooth", "apply", "check", "deviations", "read", "run", "seams", "smooth",
-    "snapshot", "write",
+    "Displacement", "Model", "Move", "MracadError", "Repeat", "Smooth", "Transfer", "apply", "check", "deviations",
+    "move", "read", "repeat", "run", "seams", "smooth", "snapshot", "transfer", "write",
 ]  # fmt: skip
 
 

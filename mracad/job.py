@@ -199,7 +199,7 @@ def run(
     document : Document
         Changed in place unless ``apply`` is false.
     edit : callable
-        ``edit(model, options, faces=…, held=…, progress=…) -> Edit``.
+        ``edit(model, options, *models, faces=…, held=…, progress=…) -> Edit``, ``models`` those that the options name.
     options : Selection
         The edit's options, selectors among them.
     apply : bool
@@ -214,8 +214,7 @@ def run(
     from mracad.occ.apply import apply as put
     from mracad.occ.apply import restore
     from mracad.occ.check import check
-    from mracad.occ.instance import isolate
-    from mracad.occ.select import select_cq
+    from mracad.occ.files import read
     from mracad.occ.view import view
 
     def stage(name: str) -> Callable[[int, int], None]:
@@ -223,30 +222,13 @@ def run(
 
     start = time.perf_counter()
     stage("looking at faces")(0, 1)
-    own = isolate(document, options.instance) if options.instance else None
-    model = view(document)
-
-    def cadquery(expression: str) -> set[int]:
-        return select_cq(document, expression)
-
-    nurbs = [face.index for face in model.faces if face.kind in NURBS]
-    if own is not None:
-        copies = {own[face] for face in own if own[face] != face}
-        nurbs = [face for face in nurbs if face not in copies]
-    chosen = select(model, options.faces, nurbs, cadquery).faces if options.faces else frozenset(nurbs)
-    held = select(model, options.hold, nurbs, cadquery).faces if options.hold else frozenset()
-    if own is not None:
-        chosen, held = (frozenset(own[face] for face in faces & own.keys()) for faces in (chosen, held))
-        if options.faces and not chosen:
-            raise UsageError(f"no selected face is in '{options.instance}'", "leave out --faces, or select others")
-    convertible = {i for i in chosen - held if model.faces[i].surface is None}
-    if convertible:
-        model = view(document, convert=convertible)
+    model, chosen, held = looked_at(document, options.faces, options.hold, options.instance)
+    others = [view(read(file)) for file in options.models()]
     before: list[SeamMeasure] = []
     valid_before: Validity | None = None
     spoiled: dict[int, str] = {}
     while True:
-        result = edit(model, options, faces=chosen, held=held | spoiled.keys(), progress=stage("editing"))
+        result = edit(model, options, *others, faces=chosen, held=held | spoiled.keys(), progress=stage("editing"))
         result = _named(result, spoiled)
         _refuse_if_stuck(model, result)
         if valid_before is None:
@@ -286,6 +268,37 @@ def run(
         valid_after,
         time.perf_counter() - start,
     )
+
+
+def looked_at(
+    document: Document, faces: Sequence[str], hold: Sequence[str], instance: str | None = None
+) -> tuple[Model, frozenset[int], frozenset[int]]:
+    """The view of a document for an edit, the faces that selectors name (all NURBS faces by default), and those held.
+
+    Selected faces that are not NURBS are seen as such.  An ``instance`` is made a part of its own first.
+    """
+    from mracad.occ.instance import isolate
+    from mracad.occ.select import select_cq
+    from mracad.occ.view import view
+
+    own = isolate(document, instance) if instance else None
+    model = view(document)
+
+    def cadquery(expression: str) -> set[int]:
+        return select_cq(document, expression)
+
+    nurbs = [face.index for face in model.faces if face.kind in NURBS]
+    if own is not None:
+        copies = {own[face] for face in own if own[face] != face}
+        nurbs = [face for face in nurbs if face not in copies]
+    chosen = select(model, faces, nurbs, cadquery).faces if faces else frozenset(nurbs)
+    held = select(model, hold, nurbs, cadquery).faces if hold else frozenset()
+    if own is not None:
+        chosen, held = (frozenset(own[face] for face in each & own.keys()) for each in (chosen, held))
+        if faces and not chosen:
+            raise UsageError(f"no selected face is in '{instance}'", "leave out --faces, or select others")
+    convertible = {i for i in chosen - held if model.faces[i].surface is None}
+    return (view(document, convert=convertible) if convertible else model), chosen, held
 
 
 def _refuse_if_stuck(model: Model, result: Edit) -> None:

@@ -292,6 +292,7 @@ def options(struct: type[Given], values: Mapping[str, Any], place: Callable[[str
     plain: dict[str, Any] = {}
     for key, value in values.items():
         name = key.replace("-", "_")
+        name = f"{name}_" if f"{name}_" in kinds else name
         if typing.get_origin(kinds.get(name)) is tuple and isinstance(value, str):
             value = [value]
         elif name in in_mm and isinstance(value, int | float) and not isinstance(value, bool):

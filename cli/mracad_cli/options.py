@@ -20,7 +20,8 @@ SHORT = {"faces": "SEL", "instance": "PATH", "hold": "SEL", "max_angle": "DEG", 
 
 
 def of(struct: type[Struct], without: str = "") -> Callable[[Command], Command]:
-    """Add one option for each field of a struct but one, its own before the inherited ones, under the same names."""
+    """Add one option for each field of a struct, its own before the inherited ones, under the same names; not for
+    those whose names stand, between blanks, in ``without``."""
 
     def decorate(command: Command) -> Command:
         hints, kinds = typing.get_type_hints(struct, include_extras=True), plain_types(struct)
@@ -28,7 +29,7 @@ def of(struct: type[Struct], without: str = "") -> Callable[[Command], Command]:
         shared = len(structs.fields(base)) if base is not None and base is not Struct else 0
         fields = structs.fields(struct)
         for field in reversed(fields[shared:] + fields[:shared]):
-            if field.name == without:
+            if field.name in without.split():
                 continue
             meta = next(m for m in hints[field.name].__metadata__ if isinstance(m, Meta) and m.description)
             command = _option(field.name, meta.description or "", kinds[field.name], field.default)(command)
@@ -41,7 +42,7 @@ def _option(name: str, help: str, kind: Any, default: Any) -> Callable[[Command]
     flag = f"--{dashed(name)}"
     settings: dict[str, Any] = {"help": help, "metavar": SHORT.get(name), "default": default}
     if kind is bool:
-        return click.option(flag, is_flag=True, help=help, default=default)
+        return click.option(name, flag, is_flag=True, help=help, default=default)
     if kind is Length:
         settings |= {"metavar": "LENGTH"}
     if typing.get_origin(kind) is tuple:
@@ -51,7 +52,7 @@ def _option(name: str, help: str, kind: Any, default: Any) -> Callable[[Command]
         settings |= {"type": click.Choice(typing.get_args(kind))}
     else:
         settings |= {"type": kind if kind in (int, float) else str}
-    return click.option(flag, **settings, show_default=default not in (None, ()))
+    return click.option(name, flag, **settings, show_default=default not in (None, (), ""))
 
 
 def apply(*decorators: Callable[[Command], Command]) -> Callable[[Command], Command]:

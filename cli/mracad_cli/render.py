@@ -89,6 +89,8 @@ def edit_lines(report: Report, options: Selection, end: str) -> list[str]:
         lines.append(f"deviation: max {mm(worst.largest)} on #{worst.face + 1}, mean {mm(mean)}")
     else:
         lines.append("deviation: none")
+    if edit.copies:
+        lines.append(copies_line(report))
     smooth = report.smooth_seams()
     old, new = summary(report.before, smooth), summary(report.after, smooth)
     lines.append(seam_line(new, old))
@@ -101,6 +103,29 @@ def edit_lines(report: Report, options: Selection, end: str) -> list[str]:
         lines[-1] += f"; {edge_words(edit.edges)}"
     lines.append(f"valid: {verdict(report.valid_after.valid)} (was {verdict(report.valid_before.valid)}); {end}")
     return lines
+
+
+def copies_line(report: Report) -> str:
+    """What became of the copies of a feature."""
+    copies, (before, after) = report.edit.copies, control_points(report)
+    worst = max(copies, key=lambda c: c.deviation)
+    exact = sum(c.exact for c in copies)
+    text = f"copies: {len(copies)}" + (f", {exact} exact" if exact else "")
+    text += f", off the ideal by ≤ {mm(worst.deviation)} ({worst.place})"
+    lost = max(copies, key=lambda c: c.lost)
+    if lost.lost > 1e-9:
+        text += f"; constraints took ≤ {mm(lost.lost)} ({lost.place})"
+    return f"{text}; control points: {after}" + (f" (were {before})" if after != before else "")
+
+
+def control_points(report: Report) -> tuple[int, int]:
+    """Control points of all NURBS faces before and after."""
+    before = after = 0
+    for surface in report.model.surfaces:
+        net, offset = surface.net, report.edit.displacement.offsets.get(surface.index)
+        before += net.u.count * net.v.count
+        after += net.u.count * net.v.count if offset is None else offset.poles.shape[0] * offset.poles.shape[1]
+    return before, after
 
 
 def edge_words(edges: tuple[Treatment, ...]) -> str:
@@ -166,6 +191,8 @@ def report(value: Report) -> dict[str, Any]:
         "counts": dict(Counter(o.status for o in value.edit.outcomes)),
         "faces": [outcome(o) for o in value.edit.outcomes],
         "edges": [{**plain(e), "edge": e.edge + 1, "faces": [i + 1 for i in e.faces]} for e in value.edit.edges],
+        "copies": [{**plain(c), "faces": [i + 1 for i in c.faces]} for c in value.edit.copies],
+        "control_points": dict(zip(("before", "after"), control_points(value), strict=True)),
         "notes": list(value.edit.notes),
         "deviation": [{**plain(d), "face": d.face + 1} for d in value.deviations],
         "seams": {

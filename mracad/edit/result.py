@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from mracad.constraint.seam import Treatment
+from mracad.feature.copies import Copy
 from mracad.model import Displacement
 
 Status = Literal["edited", "unchanged", "stuck", "held", "unselected", "analytic"]
@@ -58,12 +59,14 @@ class FaceOutcome:
 
 @dataclass(frozen=True, eq=False)
 class Edit:
-    """A displacement, the outcome for each face of the model in face order, and what was done about each edge."""
+    """A displacement, the outcome for each face of the model in face order, what was done about each edge, and what
+    became of each copy of a feature."""
 
     displacement: Displacement
     outcomes: tuple[FaceOutcome, ...]
     notes: tuple[str, ...] = field(default=())
     edges: tuple[Treatment, ...] = field(default=())
+    copies: tuple[Copy, ...] = field(default=())
 
     def faces(self, *status: Status) -> list[FaceOutcome]:
         """Outcomes with one of the given statuses."""

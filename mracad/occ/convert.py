@@ -8,7 +8,7 @@ from OCP.BRep import BRep_Builder, BRep_Tool
 from OCP.BRepBuilderAPI import BRepBuilderAPI_Copy, BRepBuilderAPI_NurbsConvert
 from OCP.BRepCheck import BRepCheck_Analyzer
 from OCP.BRepLib import BRepLib
-from OCP.Geom import Geom_Surface
+from OCP.Geom import Geom_BSplineSurface, Geom_Surface
 from OCP.Geom2d import Geom2d_Curve
 from OCP.TopAbs import TopAbs_FORWARD, TopAbs_REVERSED
 from OCP.TopLoc import TopLoc_Location
@@ -18,6 +18,7 @@ from mracad.errors import EditError
 from mracad.occ.document import Conversion, Document
 from mracad.occ.topology import edge_uses
 
+_LEAST = 3  # degree in both directions: a straight one would be edited as facets
 _SLACK = 1e-4  # memory units by which an edge's tolerance may grow in any conversion: offsets are approximated
 
 
@@ -46,6 +47,8 @@ def conversion(document: Document, index: int) -> Conversion:
             raise EditError(f"face #{index + 1} cannot be converted to NURBS", "leave it out of the selection")
         converted = TopoDS.Face_s(converter.ModifiedShape(copied))
         surface = BRep_Tool.Surface_s(converted, TopLoc_Location())
+        if isinstance(surface, Geom_BSplineSurface):
+            surface.IncreaseDegree(max(surface.UDegree(), _LEAST), max(surface.VDegree(), _LEAST))
         edges = list(edge_uses(copied))
         twins = [TopoDS.Edge_s(converter.ModifiedShape(edge).Oriented(edge.Orientation())) for edge in edges]
         tolerances = [BRep_Tool.Tolerance_s(edge) for edge in edges]

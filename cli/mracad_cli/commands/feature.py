@@ -1,0 +1,83 @@
+"""Find detail features in a model, or save one to a file for use on others."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import click
+
+from mracad.errors import UsageError
+from mracad.options import Repeat, Selection
+from mracad_cli import options
+from mracad_cli.files import check_target, read
+
+
+@click.group(help=__doc__)
+def command() -> None:
+    pass
+
+
+@command.command("list")
+@options.apply(options.reading, options.of(Selection, "hold keep edges"), options.printing)
+def list_(source: str, input_unit: str | None, faces: tuple[str, ...], as_json: bool) -> None:
+    """Propose features: places where the detail of a face stands out, with size, height and scales."""
+    from mracad import job
+    from mracad.feature.find import found
+    from mracad_cli.render import mm, plain
+
+    model, chosen, _ = job.looked_at(read(source, input_unit), faces, ())
+    features = found(model, chosen)
+    if as_json:
+        body = [{**plain(f), "face": f.face + 1, "feature": f.text} for f in features]
+        print(json.dumps({"file": model.name, "features": body}, ensure_ascii=False))
+        return
+    for f in features:
+        scales = f"{mm(f.scales[0])} to {mm(f.scales[1])}"
+        print(f"{f.text} on #{f.face + 1}: {mm(f.height)} high, {mm(f.size)} across, scales {scales}")
+    if not features:
+        print(f"{model.name}: nothing stands out")
+
+
+@command.command()
+@options.apply(
+    options.reading,
+    click.option("--feature", required=True, help="near:X,Y,Z,radius:R (mm) or #3@u0:u1,v0:v1."),
+    options.of(Repeat, " ".join(f for f in Repeat.__struct_fields__ if f not in ("faces", "taper", "base", "band"))),
+    click.option(
+        "-o", "--output", "output", metavar="F.feature", required=True, type=click.Path(), help="File to write."
+    ),
+    options.overwrite,
+    options.printing,
+)
+def extract(
+    source: str, input_unit: str | None, feature: str, output: str, overwrite: bool, as_json: bool, **given: Any
+) -> None:
+    """Save a feature to a file: a library of details that mracad repeat and mracad transfer lay elsewhere."""
+    from mracad import job
+    from mracad.edit.features import extract as taken
+    from mracad.feature.detail import save
+    from mracad.output import put
+    from mracad.recipe import options as options_of
+    from mracad_cli.render import mm
+
+    path = Path(output)
+    if path.suffix != ".feature":
+        raise UsageError(f"cannot write {path}: unknown ending {path.suffix!r}", "end it in .feature")
+    check_target(path, overwrite)
+    chosen_options = options_of(Repeat, {**given, "feature": feature, "at": ("0,0,0",)})
+    model, chosen, _ = job.looked_at(read(source, input_unit), chosen_options.faces, ())
+    found = taken(model, chosen_options, chosen)
+    put(save(found), path)
+    body = {
+        "file": model.name,
+        "radius": found.radius,
+        "reach": found.reach,
+        "height": found.height,
+        "written": path.name,
+    }
+    if as_json:
+        print(json.dumps(body, ensure_ascii=False))
+    else:
+        print(f"{model.name}: {mm(found.height)} high, {mm(2 * found.radius)} across; wrote {path.name}")

@@ -1,0 +1,219 @@
+"""Detail features: move one, repeat it, carry it from another model (METHOD: a feature is a displacement).
+
+A feature is told from what it stands above (:mod:`mracad.feature.detail`), tabulated in geodesic coordinates of its
+place, and laid on other places (:mod:`mracad.feature.copies`); seams between edited faces hold.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from mracad.constraint.seam import Treatment
+from mracad.edit.result import Edit, FaceOutcome
+from mracad.errors import EditError, UsageError
+from mracad.feature.character import at_scale, laid_on
+from mracad.feature.copies import Copies, Laid
+from mracad.feature.detail import Feature, above_surroundings, between_levels, load
+from mracad.feature.ground import Ground, axes
+from mracad.feature.pattern import along, grid, listed, polar, scattered
+from mracad.feature.place import Place, face_number, place, sheet_of, standing, window
+from mracad.model import Displacement, Model
+from mracad.options import Featured, Move, Repeat, Single, Transfer, band_of, length
+
+Array = np.ndarray
+
+FACE = "write a face as #3, or its name"
+
+
+def move(
+    model: Model,
+    options: Move,
+    *,
+    faces: Collection[int] | None = None,
+    held: Collection[int] = (),
+    progress: Callable[[int, int], None] | None = None,
+) -> Edit:
+    """Move a feature; parameters as for :func:`mracad.edit.smooth.smooth`.
+
+    Raises
+    ------
+    EditError
+        For a place or a window off the faces, or a feature that does not fit where it is or is to go.
+    """
+    chosen = _chosen(model, faces, held)
+    feature = extract(model, options, chosen)
+    assert feature.origin is not None
+    removed = {i: -offset for i, offset in feature.origin.offsets.items()}
+    ground = _cleared(model, chosen, feature)
+    laid = _laid(ground, feature, [_target(ground, options.to, options)], options, "add", removed)
+    return _edit(model, laid, chosen, held)
+
+
+def repeat(
+    model: Model,
+    options: Repeat,
+    *,
+    faces: Collection[int] | None = None,
+    held: Collection[int] = (),
+    progress: Callable[[int, int], None] | None = None,
+) -> Edit:
+    """Lay copies of a feature; parameters and errors as for :func:`move`."""
+    chosen = _chosen(model, faces, held)
+    feature = extract(model, options, chosen)
+    ground = _cleared(model, chosen, feature)
+    laid = _laid(ground, feature, _places(ground, feature, options), options, options.overlap, {})
+    return _edit(model, laid, chosen, held)
+
+
+def transfer(
+    model: Model,
+    options: Transfer,
+    source: Model,
+    *,
+    faces: Collection[int] | None = None,
+    held: Collection[int] = (),
+    progress: Callable[[int, int], None] | None = None,
+) -> Edit:
+    """Carry the detail of a face, or a feature, of another model onto this one.
+
+    Parameters
+    ----------
+    source : Model
+        The other one; the rest, and errors, as for :func:`move`.
+    """
+    chosen = _chosen(model, faces, held)
+    ground = Ground(model, chosen)
+    every = {f.index for f in source.faces if f.surface is not None}
+    if _is_window(options.from_):
+        feature = extract(source, options, every, options.from_)
+        feature = replace(feature, origin=None)
+        laid = _laid(ground, feature, [_target(ground, options.to, options)], options, "add", {})
+        return _edit(model, laid, chosen, held)
+    if options.band is None:
+        raise UsageError("band: the detail of a face needs one", "give --band 0mm:20mm")
+    one = sheet_of(Ground(source, every), face_number(source, options.from_, "from", FACE), "from")
+    two = sheet_of(ground, face_number(model, options.to, "to", FACE), "to")
+    width = None if options.taper is None else length(options.taper, model.diagonal, "taper")
+    return _edit(model, laid_on(model, two, one, band_of(options.band, source.diagonal), options, width), chosen, held)
+
+
+def _is_window(text: str) -> bool:
+    """Whether a text names a feature, and not a face."""
+    return text.startswith("near:") or "@" in text or text.endswith(".feature")
+
+
+def _target(ground: Ground, text: str, options: Featured) -> Place:
+    found = place(ground, text, "place")
+    return replace(found, rotate=math.radians(options.rotate), size=options.size, height=options.height)
+
+
+def extract(model: Model, options: Featured, chosen: Collection[int], text: str = "") -> Feature:
+    """The feature that options name: from a file, or from a window of the model."""
+    text = text or (options.feature if isinstance(options, Single) else "")
+    if text.endswith(".feature"):
+        return load(text)
+    if not chosen:
+        raise EditError(f"{model.name}: there is no NURBS face to edit", "select faces with --faces")
+    ground = Ground(model, chosen)
+    taper = None if options.taper is None else length(options.taper, model.diagonal, "taper")
+    area = window(ground, text, taper)
+    label = f"feature {text}"
+    if options.base == "surroundings":
+        return above_surroundings(ground, area, area.width, options.keep, label, text)
+    low, high = band_of(options.band or "", model.diagonal)
+    coarse = {i: at_scale(model.surfaces[i].net, high) for i in ground.sheets}
+    fine = {i: at_scale(model.surfaces[i].net, low) if low else model.surfaces[i].net.poles for i in ground.sheets}
+    bands = {i: fine[i] - coarse[i] for i in ground.sheets}
+    return between_levels(Ground(model, chosen, coarse), bands, area, area.width, options.keep, label, text)
+
+
+def _chosen(model: Model, faces: Collection[int] | None, held: Collection[int]) -> set[int]:
+    every = range(len(model.faces)) if faces is None else faces
+    return {i for i in every if model.faces[i].surface is not None} - set(held)
+
+
+def _cleared(model: Model, chosen: Collection[int], feature: Feature) -> Ground:
+    """The ground without the feature."""
+    if feature.origin is None:
+        return Ground(model, chosen)
+    poles = {i: model.surfaces[i].net.poles - offset for i, offset in feature.origin.offsets.items()}
+    return Ground(model, chosen, poles)
+
+
+def _places(ground: Ground, feature: Feature, options: Repeat) -> list[Place]:
+    """All places, each with what turns and scales the copy there."""
+    found = listed(ground, options.at)
+    if options.grid or options.polar:
+        own = feature.origin is not None and not found
+        if own and feature.origin is not None:
+            frame = feature.origin.axes
+            origin = ground.standing(feature.origin.feet.surface, feature.origin.feet.uv, np.zeros(1)).points[0]
+        elif found:
+            foot = standing(ground, found[:1], feature.reach)
+            origin, frame = foot.points[0], axes(foot.normals, foot.along)[0]
+        else:
+            raise EditError("a feature from a file has no place of its own to begin at", "give --at, too")
+        if options.grid:
+            pattern = grid(ground, options.grid, origin, frame, own)
+        else:
+            pattern = polar(options.polar or "", origin, frame, own)
+        first = found[0] if found else None
+        if first is not None:
+            pattern = [replace(p, rotate=first.rotate, size=first.size, height=first.height) for p in pattern]
+        found = pattern + found[1:]
+    if options.along:
+        found = found + along(ground, options.along)
+    turn = math.radians(options.rotate)
+    found = [
+        replace(p, rotate=p.rotate + turn, size=p.size * options.size, height=p.height * options.height) for p in found
+    ]
+    if options.jitter is not None or options.spin:
+        jitter = 0.0 if options.jitter is None else length(options.jitter, ground.model.diagonal, "jitter")
+        feet = standing(ground, found, feature.reach)
+        found = scattered(found, feet, jitter, math.radians(options.spin), options.seed)
+    return found
+
+
+def _laid(
+    ground: Ground,
+    feature: Feature,
+    places: Sequence[Place],
+    options: Featured,
+    overlap: str,
+    removed: Mapping[int, Array],
+) -> Laid:
+    feet = standing(ground, places, feature.reach)
+    copies = Copies(ground, feature, places, feet, overlap, options.mirror)
+    return copies.laid(options.keep, options.edges == "coupled", options.clip, removed)
+
+
+def _edit(model: Model, laid: Laid, chosen: Collection[int], held: Collection[int]) -> Edit:
+    """The edit with an outcome for every face."""
+    outcomes = []
+    touched = {f for copy in laid.copies for f in copy.faces}
+    for face in model.faces:
+        offset = None if face.surface is None else laid.offsets.get(face.surface)
+        points = 0 if face.surface is None else int(np.prod(model.surfaces[face.surface].net.poles.shape[:2]))
+        inserted = 0 if offset is None else len(offset.u_knots) + len(offset.v_knots)
+        moved = 0.0 if offset is None else float(np.linalg.norm(offset.poles, axis=-1).max())
+        if face.surface is None:
+            outcomes.append(FaceOutcome(face.index, "analytic", f"{face.kind}, not a NURBS face"))
+        elif face.index in held:
+            outcomes.append(FaceOutcome(face.index, "held", "held"))
+        elif face.index not in chosen:
+            outcomes.append(FaceOutcome(face.index, "unselected", "not selected"))
+        elif offset is None or (
+            len(model.surfaces[face.surface].faces) > 1 and face.index not in touched and not moved
+        ):
+            outcomes.append(FaceOutcome(face.index, "unchanged", "no copy there", points=points))
+        else:
+            outcomes.append(FaceOutcome(face.index, "edited", moved=moved, points=points, inserted=inserted))
+    edges = tuple(
+        Treatment(e, tuple(s.face for s in model.edges[e].sides), "coupled" if e in laid.moving else "frozen", why)
+        for e, why in sorted({**laid.frozen, **dict.fromkeys(laid.moving, "")}.items())
+    )
+    return Edit(Displacement(laid.offsets), tuple(outcomes), edges=edges, copies=laid.copies)

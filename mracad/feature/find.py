@@ -1,0 +1,140 @@
+"""Features that a model proposes: places where the detail of a face stands out from what is usual on it.
+
+On each surface the detail finer than a scale (a projection, as for smoothing) is looked at for scales that double.  A
+place stands out where that detail is much larger than its median, on a small part of the face; the smallest scale at
+which it is nearly all there counts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mracad.bspline.net import Net
+from mracad.feature.ground import Sheet
+from mracad.model import Model
+from mracad.wavelet.ladder import arc_lengths, ladder_for_scale
+from mracad.wavelet.project import projection
+
+Array = np.ndarray
+
+USUAL = 8.0
+"""Detail stands out that is so many times the median."""
+
+RIM = 0.1
+"""A feature ends where its detail falls below this share of its height."""
+
+LARGEST = 0.2
+"""Share of a face that one feature may cover."""
+
+GROWS = 1.25
+"""A larger scale counts where the feature is so many times as high there."""
+
+LOBE, FAR = 0.15, 4.0
+"""What is lower than this share of a feature within so many times its largest scale is a side lobe of it."""
+
+LEAST = 1e-4
+"""mm: what is lower is no feature."""
+
+
+@dataclass(frozen=True)
+class Found:
+    """A proposed feature.
+
+    Attributes
+    ----------
+    face : int
+    place : (float, float, float)
+        Its middle, mm.
+    size, height : float
+        Across and high, mm.
+    scales : (float, float)
+        Wavelengths between which most of it lies, mm.
+    """
+
+    face: int
+    place: tuple[float, float, float]
+    size: float
+    height: float
+    scales: tuple[float, float]
+
+    @property
+    def text(self) -> str:
+        """It as ``--feature`` takes it, twice as wide as it is at its rim: what lies around it must be flat there."""
+        x, y, z = (f"{value:.6g}" for value in np.round(self.place, 6) + 0.0)
+        return f"near:{x},{y},{z},radius:{self.size:.4g}"
+
+
+def found(model: Model, faces: Collection[int]) -> list[Found]:
+    """Features of faces, the highest first."""
+    result = []
+    for surface in model.surfaces:
+        own = [i for i in surface.faces if i in faces]
+        if own:
+            result += _on(Sheet(model, surface.index, own))
+    return sorted(result, key=lambda f: -f.height)
+
+
+def _on(sheet: Sheet) -> list[Found]:
+    """Features of one surface."""
+    from scipy.ndimage import label
+
+    net = sheet.net
+    lengths = [arc_lengths(net, axis) for axis in (0, 1)]
+    us, vs = net.u.greville(), net.v.greville()
+    points, su, sv = net.grid(us, vs, 1)
+    normals = sheet.sign * np.cross(su, sv)
+    normals /= np.maximum(np.linalg.norm(normals, axis=-1, keepdims=True), 1e-300)
+    uv = np.stack(np.meshgrid(us, vs, indexing="ij"), axis=-1).reshape(-1, 2)
+    seen = sheet.covers(uv).reshape(points.shape[:2])
+    if seen.sum() < 64:
+        return []
+    area = np.linalg.norm(np.cross(su, sv), axis=-1) * np.outer(np.gradient(us), np.gradient(vs))
+    scale = 4 * min(float(np.median(x)) for x in lengths)
+    kept: list[Found] = []
+    while scale < max(float(x.sum()) for x in lengths) / 2:
+        height = (np.asarray(_detail(net, lengths, scale).grid(us, vs)) * normals).sum(axis=-1)
+        size = np.where(seen, np.abs(height), 0.0)
+        usual = max(USUAL * float(np.median(size[seen])), LEAST)
+        regions, count = label(size > usual, np.ones((3, 3)))
+        for k in range(1, count + 1):
+            peak = np.unravel_index(np.where(regions == k, size, 0.0).argmax(), size.shape)
+            rim, _ = label(size > max(RIM * size[peak], usual / USUAL), np.ones((3, 3)))
+            own = rim == rim[peak]
+            if area[own].sum() > LARGEST * area[seen].sum() or own.sum() < 9:
+                continue
+            weight = size[own] ** 2 * area[own]
+            middle = (points[own] * weight[:, None]).sum(axis=0) / weight.sum()
+            place = points[own][np.linalg.norm(points[own] - middle, axis=1).argmin()]
+            across = 2 * float(np.linalg.norm(points[own] - place, axis=1).max())
+            face = next((f.index for f in sheet.faces), 0)
+            new = Found(face, tuple(float(x) for x in place), across, float(size[peak]), (scale / 2, scale))  # type: ignore[arg-type]
+            kept = _merged(kept, new)
+        scale *= 2
+    return [f for f in kept if not any(_lobe(f, g) for g in kept)]
+
+
+def _lobe(f: Found, g: Found) -> bool:
+    """Whether ``f`` is but a side lobe of ``g``."""
+    return f.height < LOBE * g.height and bool(np.linalg.norm(np.subtract(f.place, g.place)) < FAR * g.scales[1])
+
+
+def _detail(net: Net, lengths: list[Array], scale: float) -> Net:
+    """What of a surface is finer than a scale, as offsets."""
+    poles = net.poles
+    for axis, kv in enumerate((net.u, net.v)):
+        poles = projection(ladder_for_scale(kv, lengths[axis], scale), kv).apply(poles, axis=axis)
+    return Net(net.u, net.v, net.poles - poles, net.weights)
+
+
+def _merged(kept: list[Found], new: Found) -> list[Found]:
+    """The list with a feature seen at a larger scale: instead of those it covers where it is higher by far."""
+    near = [f for f in kept if np.linalg.norm(np.subtract(f.place, new.place)) < (f.size + new.size) / 4]
+    if not near:
+        return [*kept, new]
+    if new.height < GROWS * max(f.height for f in near):
+        return kept
+    least = min(f.scales[0] for f in near)
+    return [f for f in kept if f not in near] + [replace(new, scales=(least, new.scales[1]))]

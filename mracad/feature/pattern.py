@@ -1,0 +1,186 @@
+"""Patterns: the places of copies from the words for them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from mracad.errors import EditError, UsageError
+from mracad.feature.ground import Feet, Ground, axes
+from mracad.feature.place import Place, numbers, place, table
+from mracad.model import Model
+
+Array = np.ndarray
+
+GRID = "write it as NxM,DX,DY: 4x3,25,25"
+POLAR = "write it as N,x|y|z or N,X,Y,Z,DX,DY,DZ: 6,z"
+ALONG = "write it as EDGE,N or EDGE,N,OFFSET: edge#4,10,15"
+
+STRIDES = 4
+"""Steps from one place of a grid to the next."""
+
+AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+
+
+def listed(ground: Ground, words: Sequence[str]) -> list[Place]:
+    """Places from ``--at``; raises UsageError, EditError and FileError."""
+    found = []
+    for word in words:
+        if word.startswith("@"):
+            for name, row in table(word[1:]):
+                rotate, size, height = (row[3:] + [0.0, 1.0, 1.0][len(row) - 3 :])[:3]
+                label = f"{name} ({','.join(f'{x:g}' for x in row[:3])})"
+                found.append(Place(label, np.array(row[:3]), None, None, np.radians(rotate), size, height))
+        else:
+            found.append(place(ground, word, f"place {len(found) + 1}"))
+    return found
+
+
+def grid(ground: Ground, text: str, origin: Array, frame: Array, own: bool) -> list[Place]:
+    """A grid that follows the ground along the axes of a frame (rows); the first place is left out where the feature
+    is there already."""
+    match = re.fullmatch(r"\s*(\d+)\s*[xX]\s*(\d+)\s*,(.*)", text)
+    if not match or 0 in (int(match[1]), int(match[2])):
+        raise UsageError(f"grid: {text!r} is not right", GRID)
+    dx, dy = numbers(match[3], "grid", GRID, (2,))
+    rows = [(origin[None], frame[None])]
+    for _ in range(int(match[1]) - 1):
+        rows.append(_walked(ground, *rows[-1], 0, dx))
+    columns = [(np.concatenate([p for p, _ in rows]), np.concatenate([f for _, f in rows]))]
+    for _ in range(int(match[2]) - 1):
+        columns.append(_walked(ground, *columns[-1], 1, dy))
+    return [
+        Place(f"place {i + 1},{j + 1} of the grid", points[i], direction=frames[i, 0])
+        for i in range(int(match[1]))
+        for j, (points, frames) in enumerate(columns)
+        if i or j or not own
+    ]
+
+
+def _walked(ground: Ground, points: Array, frames: Array, axis: int, distance: float) -> tuple[Array, Array]:
+    """Points and frames (rows x, y, normal) after a walk over the ground; straight on where it ends."""
+    on = np.ones(len(points), bool)
+    for _ in range(STRIDES):
+        ahead = points + distance / STRIDES * frames[:, axis]
+        feet = ground.feet(ahead)
+        way = ahead - feet.points
+        sideways = np.linalg.norm(way - (way * feet.normals).sum(axis=1, keepdims=True) * feet.normals, axis=1)
+        on &= sideways <= 1e-3 * abs(distance)
+        points = np.where(on[:, None], feet.points, ahead)
+        frames = np.where(on[:, None, None], axes(feet.normals, frames[:, 0]), frames)
+    return points, frames
+
+
+def polar(text: str, origin: Array, frame: Array, own: bool) -> list[Place]:
+    """Places around an axis; the first one is left out where the feature is there already."""
+    count, _, rest = text.partition(",")
+    if not count.strip().isdigit() or int(count) < 1:
+        raise UsageError(f"polar: {text!r} is not right", POLAR)
+    if rest.strip().lower() in AXES:
+        centre, axis = np.zeros(3), np.array(AXES[rest.strip().lower()])
+    else:
+        six = np.array(numbers(rest, "polar", POLAR, (6,)))
+        centre, axis = six[:3], six[3:]
+    size = float(np.linalg.norm(axis))
+    if size == 0:
+        raise UsageError(f"polar: {text!r} has no direction", POLAR)
+    found = []
+    for k in range(1 if own else 0, int(count)):
+        turn = _rotation(axis / size, 2 * np.pi * k / int(count))
+        label = f"place {k + 1} of {int(count)} around the axis"
+        found.append(Place(label, centre + turn @ (origin - centre), direction=turn @ frame[0]))
+    return found
+
+
+def along(ground: Ground, text: str) -> list[Place]:
+    """Places along an edge, in the middles of equal parts of it."""
+    name, _, rest = text.partition(",")
+    number = name.strip().removeprefix("edge#").removeprefix("#")
+    model = ground.model
+    if not number.isdigit() or not 1 <= int(number) <= len(model.edges):
+        raise UsageError(f"along: {name!r}: the model has edges edge#1 to edge#{len(model.edges)}", ALONG)
+    values = numbers(rest, "along", ALONG, (1, 2))
+    count, offset = int(values[0]), values[1] if len(values) > 1 else 0.0
+    if count < 1 or count != values[0]:
+        raise UsageError(f"along: {rest!r} is not right", ALONG)
+    edge = model.edges[int(number) - 1]
+    side = next((s for s in edge.sides if s.face in ground.chosen and s.uv is not None), None)
+    if side is None or edge.degenerate:
+        raise EditError(f"along: edge#{number} bounds no face to edit", "select one of its faces with --faces")
+    points, tangents = _even(edge.points, edge.tangents, count)
+    inward = _inward(model, ground, edge.index, points, tangents) if offset else np.zeros_like(points)
+    return [
+        Place(f"place {k + 1} along edge#{number}", points[k] + offset * inward[k], direction=tangents[k])
+        for k in range(count)
+    ]
+
+
+def _even(points: Array, tangents: Array, count: int) -> tuple[Array, Array]:
+    """Points and unit tangents in the middles of equal parts of a curve, from Hermite arcs between its samples."""
+    chord = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    t = np.linspace(0, 1, 33)
+    h = [2 * t**3 - 3 * t**2 + 1, t**3 - 2 * t**2 + t, -2 * t**3 + 3 * t**2, t**3 - t**2]
+    fine = np.concatenate(
+        [
+            h[0][:, None] * p + h[1][:, None] * c * v + h[2][:, None] * q + h[3][:, None] * c * w
+            for p, q, v, w, c in zip(points[:-1], points[1:], tangents[:-1], tangents[1:], chord, strict=True)
+        ]
+    )
+    # the samples of an edge stop short of its ends
+    ends = _ends(points, tangents)
+    fine = np.concatenate([ends[:1], fine, ends[1:]])
+    length = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(fine, axis=0), axis=1)))
+    at = length[-1] * (np.arange(count) + 0.5) / count
+    found = np.stack([np.interp(at, length, fine[:, k]) for k in range(3)], axis=1)
+    step = 1e-3 * length[-1]
+    ahead, behind = (np.stack([np.interp(at + s, length, fine[:, k]) for k in range(3)], axis=1) for s in (step, -step))
+    way = ahead - behind
+    return found, way / np.linalg.norm(way, axis=1, keepdims=True)
+
+
+def _ends(points: Array, tangents: Array) -> Array:
+    """The ends of an edge, a little beyond its first and last (Chebyshev) samples."""
+    place = 0.5 - 0.5 * np.cos(np.pi * (np.arange(len(points)) + 0.5) / len(points))
+    share = place[0] / (place[1] - place[0])
+    first = points[0] - share * np.linalg.norm(points[1] - points[0]) * tangents[0]
+    last = points[-1] + share * np.linalg.norm(points[-1] - points[-2]) * tangents[-1]
+    return np.stack([first, last])
+
+
+def _inward(model: Model, ground: Ground, edge: int, points: Array, tangents: Array) -> Array:
+    """Directions into the first selected face at an edge: the side of the tangent on which a small step stays on it."""
+    feet = ground.feet(points)
+    way = np.cross(feet.normals, tangents)
+    own = next(s.face for s in model.edges[edge].sides if s.face in ground.chosen)
+    surface = model.faces[own].surface
+    size = 1e-2 * float(np.linalg.norm(np.ptp(points, axis=0)) or 1.0)
+    middle = len(points) // 2
+    for sign in (1.0, -1.0):
+        at = ground.feet(points[middle : middle + 1] + sign * size * way[middle : middle + 1])
+        face = ground.faces(at.surface, at.uv)[0]
+        if face == own and surface == at.surface[0] and at.apart[0] < 0.2 * size:
+            return sign * way
+    return way
+
+
+def scattered(places: Sequence[Place], feet: Feet, jitter: float, spin: float, seed: int) -> list[Place]:
+    """Places moved at random by up to ``jitter`` (mm) along the ground and turned by up to ``spin`` (radians)."""
+    rng = np.random.default_rng(seed)
+    frames = axes(feet.normals, feet.along)
+    radius = jitter * np.sqrt(rng.random(len(places)))
+    angle = 2 * np.pi * rng.random(len(places))
+    turn = spin * (2 * rng.random(len(places)) - 1)
+    way = np.cos(angle)[:, None] * frames[:, 0] + np.sin(angle)[:, None] * frames[:, 1]
+    return [
+        replace(p, point=feet.points[i] + radius[i] * way[i], face=None, uv=None, rotate=p.rotate + turn[i])
+        for i, p in enumerate(places)
+    ]
+
+
+def _rotation(axis: Array, angle: float) -> Array:
+    x, y, z = axis
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.asarray(np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross)

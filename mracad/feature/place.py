@@ -1,0 +1,262 @@
+"""The words for places and windows, and what they mean on a model."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mracad.bspline.net import Net
+from mracad.errors import EditError, FileError, UsageError
+from mracad.feature.ground import Feet, Ground, Sheet, inside
+from mracad.model import Model
+
+Array = np.ndarray
+
+PLACE = "write a place as X,Y,Z in millimetres or #FACE@u,v"
+WINDOW = "write a feature as near:X,Y,Z,radius:R (mm), #FACE@u0:u1,v0:v1 or the name of a .feature file"
+
+_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+
+
+def numbers(text: str, what: str, hint: str, counts: Sequence[int]) -> list[float]:
+    """Finite numbers between commas; raises UsageError."""
+    parts = [part.strip() for part in text.split(",")]
+    if len(parts) not in counts or not all(re.fullmatch(_NUMBER, part) for part in parts):
+        raise UsageError(f"{what}: {text!r} is not right", hint)
+    return [float(part) for part in parts]
+
+
+def face_number(model: Model, text: str, what: str, hint: str) -> int:
+    """A face by its number ``#3`` or its name; raises UsageError."""
+    if text.startswith("#"):
+        if not text[1:].isdigit() or not 1 <= int(text[1:]) <= len(model.faces):
+            raise UsageError(f"{what}: {text!r}: the model has faces #1 to #{len(model.faces)}", hint)
+        return int(text[1:]) - 1
+    found = [face.index for face in model.faces if text and text in (face.name, face.product)]
+    if len(found) != 1:
+        raise UsageError(f"{what}: {len(found) or 'no'} faces are called {text!r}", hint)
+    return found[0]
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """A place as it was given.
+
+    Attributes
+    ----------
+    label : str
+        It in messages.
+    point : ndarray (3,)
+        In space, mm; for parameters the point there.
+    face : int or None
+        Given by parameters ``uv`` on this face.
+    rotate, size, height : float
+        Of the copy there: an angle (radians) and factors.
+    direction : ndarray (3,) or None
+        Of the copy's x; None for S_u.
+    """
+
+    label: str
+    point: Array
+    face: int | None = None
+    uv: Array | None = None
+    rotate: float = 0.0
+    size: float = 1.0
+    height: float = 1.0
+    direction: Array | None = None
+
+
+def place(ground: Ground, text: str, label: str) -> Place:
+    """A place from ``X,Y,Z``, ``near:X,Y,Z`` or ``#3@u,v``; raises UsageError and EditError."""
+    label = f"{label} ({text})"
+    if "@" in text:
+        name, _, rest = text.partition("@")
+        face = face_number(ground.model, name, label, PLACE)
+        uv = np.array(numbers(rest, label, PLACE, (2,)))
+        sheet = sheet_of(ground, face, label)
+        if not _within(sheet, uv) or not inside(ground.model.faces[face], sheet, uv[None])[0]:
+            raise EditError(f"{label} is off the face: {_domain(sheet)}", "give parameters inside the face")
+        return Place(label, np.asarray(sheet.net.evaluate(uv[None]))[0], face, uv)
+    return Place(label, np.array(numbers(text.removeprefix("near:"), label, PLACE, (3,))))
+
+
+def table(path: str) -> list[tuple[str, list[float]]]:
+    """The rows of a CSV file: x, y, z and as the file goes on rotate (degrees), size, height; with their names.
+
+    A first line that begins with a letter is its heading; empty lines and those that begin with # do not count.
+
+    Raises
+    ------
+    FileError
+        When it cannot be read, or for a bad line.
+    """
+    try:
+        with open(path, encoding="utf-8") as file:
+            lines = file.read().splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        why = error.strerror if isinstance(error, OSError) else "it is not UTF-8 text"
+        raise FileError(f"cannot read '{path}': {why}", "give the path of a CSV file with columns x,y,z") from error
+    name = path.replace("\\", "/").rpartition("/")[2]
+    rows: list[tuple[str, list[float]]] = []
+    for number, line in enumerate(lines, 1):
+        if not line.strip() or line.lstrip().startswith("#") or (not rows and re.match(r"\s*[\"A-Za-z]", line)):
+            continue
+        where = f"{name}:{number}"
+        try:
+            row = numbers(line, where, "", (3, 4, 5, 6))
+        except UsageError as error:
+            hint = "write x,y,z or x,y,z,rotate,size,height, with numbers in millimetres and degrees"
+            raise FileError(f"{where}: {line.strip()!r} is not a place", hint) from error
+        if any(factor <= 0 for factor in row[4:5]):
+            raise FileError(f"{where}: size {row[4]:g} is not greater than zero", "give a factor such as 1")
+        rows.append((where, row))
+    if not rows:
+        raise FileError(f"'{path}' names no places", "write lines x,y,z")
+    return rows
+
+
+def sheet_of(ground: Ground, face: int, label: str) -> Sheet:
+    """The sheet of a face; raises EditError where the face does not belong to the ground."""
+    surface = ground.model.faces[face].surface
+    if face not in ground.chosen or surface is None:
+        kind = ground.model.faces[face].kind
+        raise EditError(
+            f"{label}: #{face + 1} ({kind}) is not among the faces to edit", f"select it with --faces '#{face + 1}'"
+        )
+    return ground.sheets[surface]
+
+
+def standing(ground: Ground, places: Sequence[Place], far: float) -> Feet:
+    """Where places stand; raises EditError for one that is farther than ``far`` (mm) from the ground."""
+    points = np.array([p.point for p in places]).reshape(-1, 3)
+    feet = ground.feet(points)
+    surface, uv, apart = feet.surface.copy(), feet.uv.copy(), feet.apart.copy()
+    for i, p in enumerate(places):
+        if p.face is not None and p.uv is not None:
+            surface[i], uv[i], apart[i] = ground.model.faces[p.face].surface, p.uv, 0.0
+    feet = ground.standing(surface, uv, apart)
+    way = points - feet.points
+    sideways = np.linalg.norm(way - (way * feet.normals).sum(axis=1, keepdims=True) * feet.normals, axis=1)
+    on = np.isfinite(apart) & (ground.faces(surface, uv) >= 0)
+    given = np.array([p.face is not None for p in places], bool)
+    bad = ~on | ~(given | ((apart <= far) & (sideways <= 1e-3 * far)))
+    if bad.any():
+        i = int(np.flatnonzero(bad)[0])
+        off = f"{apart[i]:.3g} mm off" if on[i] else "off"
+        raise EditError(
+            f"{places[i].label} is {off} the faces to edit",
+            "give a point on one of them, or select others with --faces",
+        )
+    return feet
+
+
+def _within(sheet: Sheet, uv: Array) -> bool:
+    low, high = sheet.domain
+    return bool((((uv >= low) & (uv <= high)) | sheet.periodic).all())
+
+
+def _domain(sheet: Sheet) -> str:
+    u, v = sheet.knots
+    return f"u goes from {u.domain[0]:g} to {u.domain[1]:g}, v from {v.domain[0]:g} to {v.domain[1]:g}"
+
+
+@dataclass(frozen=True, eq=False)
+class Window:
+    """Which part of the ground a feature covers: a geodesic disc, or a rectangle in parameters.
+
+    Attributes
+    ----------
+    feet : Feet
+        Its middle.
+    point : ndarray (3,)
+    radius : float
+        Of a disc, mm; half the diagonal of a rectangle.
+    box : ndarray (2, 2) or None
+        Least and largest parameters of a rectangle.
+    sheet : Sheet or None
+        Its surface.
+    width : float
+        Of the taper, mm.
+    """
+
+    feet: Feet
+    point: Array
+    radius: float
+    width: float
+    box: Array | None = None
+    sheet: Sheet | None = None
+
+    def reach(self, width: float) -> float:
+        """How far the window reaches with a taper, mm."""
+        return self.radius + width
+
+    def share(self, sheet: Sheet, points: Array, xy: Array, width: float) -> Array:
+        """How far into the taper Greville points (flat indices) of a sheet lie: below 0 inside, 1 and more beyond."""
+        if self.box is None:
+            beyond = np.linalg.norm(xy, axis=1) - self.radius
+        elif sheet is not self.sheet:
+            return np.full(len(points), np.inf)
+        else:
+            beyond = _beyond(sheet.net, self.box)[points]
+        return np.asarray(beyond / width if width else np.where(beyond > 0, np.inf, 0.0))
+
+
+def _beyond(net: Net, box: Array) -> Array:
+    """Distance (mm, along the parameter lines) of the Greville points from a rectangle, ``(nu nv,)``; 0 inside."""
+    apart = []
+    middle = box.mean(axis=0)
+    for axis, kv in enumerate((net.u, net.v)):
+        at = kv.greville()
+        ends = np.stack([np.full(len(at), middle[0]), np.full(len(at), middle[1])], axis=1)
+        ends[:, axis] = np.clip(at, *box[:, axis])
+        line = np.concatenate([at, box[:, axis]])
+        order = np.argsort(line)
+        uv = np.tile(middle, (len(line), 1))
+        uv[:, axis] = line[order]
+        length = np.zeros(len(line))
+        steps = np.linalg.norm(np.diff(np.asarray(net.evaluate(uv)), axis=0), axis=1)
+        length[order] = np.append(0.0, np.cumsum(steps))
+        own, low, high = length[:-2], length[-2], length[-1]
+        apart.append(np.maximum(np.maximum(low - own, own - high), 0.0))
+    return np.hypot(apart[0][:, None], apart[1]).ravel()
+
+
+def window(ground: Ground, text: str, taper: float | None) -> Window:
+    """A window from ``near:X,Y,Z,radius:R`` or ``#3@u0:u1,v0:v1``; raises UsageError and EditError.
+
+    ``taper`` (mm) is a quarter of the radius, or of the shorter side of a rectangle, by default.
+    """
+    label = f"feature {text}"
+    disc = re.fullmatch(rf"near:(.*),\s*radius:\s*({_NUMBER})\s*(?:mm)?", text)
+    if disc:
+        radius = float(disc[2])
+        if not (0 < radius < np.inf):
+            raise UsageError(f"{label}: radius {radius:g} is not greater than zero", WINDOW)
+        given = place(ground, disc[1], label.partition(",radius")[0])
+        feet = standing(ground, [given], radius)
+        return Window(feet, given.point, radius, radius / 4 if taper is None else taper)
+    box = re.fullmatch(rf"(.+)@({_NUMBER}):({_NUMBER}),({_NUMBER}):({_NUMBER})", text.replace(" ", ""))
+    if not box:
+        raise UsageError(f"{label}: this is not a window", WINDOW)
+    face = face_number(ground.model, box[1], label, WINDOW)
+    sheet = sheet_of(ground, face, label)
+    (u0, u1, v0, v1) = (float(x) for x in box.groups()[1:])
+    corners = np.array([[u0, v0], [u1, v1]])
+    if not (u0 < u1 and v0 < v1):
+        raise UsageError(f"{label}: the window is empty", WINDOW)
+    if not all(_within(sheet, corner) for corner in corners):
+        raise EditError(f"{label}: the window is outside the face: {_domain(sheet)}", "give parameters inside the face")
+    middle = corners.mean(axis=0)
+    if not inside(ground.model.faces[face], sheet, middle[None])[0]:
+        raise EditError(f"{label}: the middle of the window is outside the face", "move it onto the face")
+    surface = ground.model.faces[face].surface
+    feet = ground.standing(np.array([surface]), middle[None], np.zeros(1))
+    edge = np.array([[u0, v0], [u1, v0], [u1, v1], [u0, v1]])
+    points = np.asarray(sheet.net.evaluate(edge))
+    sides = np.linalg.norm(points - np.roll(points, 1, axis=0), axis=1)
+    radius = float(np.linalg.norm(points - feet.points[0], axis=1).max())
+    width = float(sides.min()) / 4 if taper is None else taper
+    return Window(feet, feet.points[0], radius, width, corners, sheet)

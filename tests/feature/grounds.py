@@ -1,0 +1,136 @@
+"""Grounds with known geometry for features to lie on, as STEP files, and the closed form of a bump on them."""
+
+import numpy as np
+
+from mracad.bspline.interpolate import interpolated as at_greville
+from mracad.bspline.knots import KnotVector
+from mracad.bspline.net import Net
+from mracad.wavelet.ladder import arc_lengths
+from samples import make
+from tests.edit.models import fitted
+from tests.edit.panels import interpolated
+from tests.occ import shapes
+
+HEIGHT, SIGMA = 2.0, 4.0
+
+
+def bump(r, height=HEIGHT, sigma=SIGMA):
+    """The height of a bump at a geodesic distance from its middle, mm."""
+    return height * np.exp(-((r / sigma) ** 2) / 2)
+
+
+def plane(side=200.0, centre=(50.0, 50.0), height=HEIGHT):
+    """A plane of 1 mm bicubic spans with one bump."""
+    k = KnotVector.clamped(np.linspace(0.0, side, int(side) + 1), 3)
+    return fitted(
+        k, k, lambda x, y: bump(np.hypot(x - centre[0], y - centre[1]), height), u_of=lambda t: t, v_of=lambda t: t
+    )
+
+
+def uneven(side=200.0, degrees=(2, 3), origin=(0.0, 0.0, 0.0), seed=1):
+    """A bare plane over other knots of spans up to a sixth of the side; x and y are not the parameters."""
+    rng = np.random.default_rng(seed)
+    knots = []
+    for degree in degrees:
+        steps = np.cumsum(rng.uniform(0.3, 3.0, 12))
+        knots.append(KnotVector.clamped(np.r_[0.0, steps / steps[-1]], degree))
+    u, v = knots
+    x, y = np.meshgrid(side * u.greville(), side * v.greville(), indexing="ij")
+    return Net(u, v, np.stack([x, y, 0 * x], axis=-1) + np.array(origin))
+
+
+_ARC = np.sqrt(0.5)
+
+
+def _quarter():
+    """Poles (cos, sin) and weights of a quarter of a circle."""
+    return np.array([[1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]), np.array([1.0, _ARC, 1.0])
+
+
+def cylinder(radius, length, origin=(0.0, 0.0, 0.0)):
+    """A quarter of a cylinder about y through the origin, outside up: rational quadratic times quadratic, one span."""
+    arc, weights = _quarter()
+    k = KnotVector.clamped([0.0, 1.0], 2)
+    heights = np.array([0.0, length / 2, length])
+    poles = np.zeros((3, 3, 3))
+    poles[..., 0], poles[..., 2] = radius * arc[::-1, 0][:, None], radius * arc[::-1, 1][:, None]
+    poles[..., 1] = heights
+    return Net(k, k, poles + np.array(origin), np.repeat(weights[:, None], 3, axis=1))
+
+
+def sphere(radius, origin=(0.0, 0.0, 0.0)):
+    """An eighth of a sphere, rational biquadratic with a pole at the top."""
+    arc, weights = _quarter()
+    k = KnotVector.clamped([0.0, 1.0], 2)
+    poles = np.zeros((3, 3, 3))
+    for j in range(3):
+        poles[:, j, 0], poles[:, j, 1] = radius * arc[j, 0] * arc[:, 0], radius * arc[j, 0] * arc[:, 1]
+        poles[:, j, 2] = radius * arc[j, 1]
+    return Net(k, k, poles + np.array(origin), np.outer(weights, weights))
+
+
+def save(path, *nets):
+    """Faces on nets, in one STEP file."""
+    faces = []
+    for net in nets:
+        degrees = (net.u.degree, net.v.degree)
+        weights = () if net.weights is None else (net.weights,)
+        faces.append(shapes.face_on(make.surface(net.poles, net.u.knots, net.v.knots, degrees, *weights)))
+    return shapes.save(shapes.compound(*faces) if len(faces) > 1 else faces[0], path)
+
+
+def rhombi(side=60.0, spans=30, bend=0.0, degree=3, turns=("", "", "")):
+    """Three rhombi around the origin, on z = bend (x² + y²) / 2, as one shell: a corner of three patches.
+
+    ``turns``: per patch, ``x`` where its parameters are swapped.
+    """
+    corner = [side * np.array([np.cos(a), np.sin(a)]) for a in np.radians([90, 210, 330])]
+    k = KnotVector.clamped(np.linspace(0.0, 1.0, spans + 1), degree)
+    lift = lambda p: np.r_[p, bend * (p @ p) / 2]  # noqa: E731
+    hub = make.vertex(lift(np.zeros(2)))
+    rim = [make.vertex(lift(c)) for c in corner]
+    tips = [make.vertex(lift(corner[i] + corner[(i + 1) % 3])) for i in range(3)]
+
+    u, v = np.meshgrid(k.greville(), k.greville(), indexing="ij")
+    nets = []
+    for i in range(3):
+        p, q = corner[i], corner[(i + 1) % 3]
+        x, y = (u * p[axis] + v * q[axis] for axis in (0, 1))
+        paraboloid = lambda s, t, p=p, q=q: bend / 2 * sum((s * p[k] + t * q[k]) ** 2 for k in (0, 1))  # noqa: E731
+        nets.append(Net(k, k, np.stack([x, y, _interpolated(k, paraboloid)], axis=-1)))
+    spokes = [make.edge(make.curve(nets[i].poles[:, 0], k.knots, degree), (hub, rim[i]), (0.0, 1.0)) for i in range(3)]
+    faces = []
+    for i, n in enumerate(nets):
+        far = [
+            make.edge(make.curve(n.poles[-1], k.knots, degree), (rim[i], tips[i]), (0.0, 1.0)),
+            make.edge(make.curve(n.poles[:, -1], k.knots, degree), (rim[(i + 1) % 3], tips[i]), (0.0, 1.0)),
+        ]
+        way = (lambda a, b: (b, a)) if turns[i] == "x" else (lambda a, b: (a, b))
+        loop = [
+            make.Side(spokes[i], make.line2d(way(0.0, 0.0), way(1, 0))),
+            make.Side(far[0], make.line2d(way(1.0, 0.0), way(0, 1))),
+            make.Side(far[1], make.line2d(way(0.0, 1.0), way(1, 0)), False),
+            make.Side(spokes[(i + 1) % 3], make.line2d(way(0.0, 0.0), way(0, 1)), False),
+        ]
+        poles = n.poles.swapaxes(0, 1) if turns[i] == "x" else n.poles
+        face = make.face(make.surface(poles, k.knots, k.knots, (degree, degree)), [loop], outward=turns[i] != "x")
+        faces.append(face)
+    return make.single(make.shell(faces), "rhombi")
+
+
+def _interpolated(k, function):
+    """Poles of the spline over k × k that takes the values of a function at the Greville points."""
+    at = k.greville()
+    return interpolated(k, at, interpolated(k, at, function(*np.meshgrid(at, at, indexing="ij"))).T).T
+
+
+def bumped(net, span, distance, normal):
+    """A net refined to spans of about ``span`` mm, with a bump along normals; both are functions of points."""
+    lengths = [arc_lengths(net, axis).sum() for axis in (0, 1)]
+    extra = [np.linspace(*k.domain, int(x / span) + 1)[1:-1] for k, x in zip((net.u, net.v), lengths, strict=True)]
+    fine = net.refined(*extra)
+    at = fine.u.greville(), fine.v.greville()
+    points = fine.grid(*at)
+    weight = Net(fine.u, fine.v, fine.weights[..., None]).grid(*at)
+    delta = at_greville(fine.u, fine.v, weight * bump(distance(points))[..., None] * normal(points))
+    return Net(fine.u, fine.v, fine.poles + delta / fine.weights[..., None], fine.weights)
