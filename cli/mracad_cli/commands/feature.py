@@ -20,7 +20,7 @@ def command() -> None:
 
 
 @command.command("list")
-@options.apply(options.reading, options.of(Selection, "hold keep edges"), options.printing)
+@options.apply(options.reading, options.of(Selection, "instance hold keep edges"), options.printing)
 def list_(source: str, input_unit: str | None, faces: tuple[str, ...], as_json: bool) -> None:
     """Propose features: places where the detail of a face stands out, with size, height and scales."""
     from mracad import job
