@@ -81,15 +81,17 @@ def _finding(finding: Finding) -> dict[str, Any]:
 
 
 def _finite(value: Any) -> Any:
-    """Values in which whatever is not finite is None, and face indices are numbers as on the command line."""
+    """Values in which whatever is not finite is None, and faces and edges have numbers as on the command line."""
     if isinstance(value, dict):
-        return {
-            key: item + 1 if key in {"ref", "new"} and "there" in value else _finite(item)
-            for key, item in value.items()
-        }
+        counted = {"ref", "new"} if "there" in value else {"edge", "faces"} if "edge" in value else set()
+        return {key: _numbered(item) if key in counted else _finite(item) for key, item in value.items()}
     if isinstance(value, list):
         return [_finite(item) for item in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def _numbered(index: int | list[int]) -> int | list[int]:
+    return [i + 1 for i in index] if isinstance(index, list) else index + 1
 
 
 def _lines(verdict: Verdict, failed: Sequence[Layer]) -> list[str]:

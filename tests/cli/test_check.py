@@ -199,3 +199,11 @@ def test_a_face_that_cannot_be_loaded_is_named(mracad, samples, tmp_path):
     (finding,) = layers["load"]["findings"]
     number = re.fullmatch(r"face not loaded: #(\d+): Surface has not been created", finding["text"])[1]
     assert b"#%s = ADVANCED_FACE" % number.encode() in text
+
+
+def test_seams_have_the_same_numbers_as_in_info(mracad, samples):
+    info = json.loads(mracad("info", samples / "panel.step", "--json").out)
+    layers = {x["name"]: x for x in json.loads(mracad("check", samples / "panel.step", "--json").out)["layers"]}
+    found = layers["seams"]["figures"]["each"]
+    assert [(s["edge"], s["faces"]) for s in found] == [(s["edge"], s["faces"]) for s in info["seams"]["each"]]
+    assert all({"gap", "angle", "bend", "relative_bend", "where"} <= s.keys() for s in found)
