@@ -83,7 +83,9 @@ def _finding(finding: Finding) -> dict[str, Any]:
 def _finite(value: Any) -> Any:
     """Values in which whatever is not finite is None, and faces and edges have numbers as on the command line."""
     if isinstance(value, dict):
-        counted = {"ref", "new"} if "there" in value else {"edge", "faces"} if "faces" in value else set()
+        counted = (
+            {"ref", "new"} if "there" in value else {"edge", "faces"} if isinstance(value.get("faces"), list) else set()
+        )
         return {key: _numbered(item) if key in counted else _finite(item) for key, item in value.items()}
     if isinstance(value, list):
         return [_finite(item) for item in value]
