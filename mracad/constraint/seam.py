@@ -23,6 +23,7 @@ from mracad.constraint.frozen import CONTINUITY, ISO, local_span
 from mracad.model import Edge, Face, Model, Side
 
 Array = np.ndarray
+_Jet = tuple[Array, ...]
 
 TRIMMED, UNEVEN, VARYING = "trimmed", "parameters differ along the seam", "ratio varies along the seam"
 """Reasons for which a seam cannot move exactly, though it may to a tolerance."""
@@ -263,10 +264,11 @@ def _seam(
         knots = (net.u, net.v)[a.axis]
         if knots.periodic and abs(abs(a.at - b.at) - knots.period) <= ISO * knots.period:
             return ""
-    joint = _joint(model, a, b, wishes)
+    found = jets(model, a, _SAMPLES, 2), jets(model, b, _SAMPLES, 2)
+    joint = _joint(model, (a, b), found, wishes)
     if isinstance(joint, str):
         return joint
-    return Seam(edges[0].index, edges[1].index, a, b, joint, *opening(model, a, b))
+    return Seam(edges[0].index, edges[1].index, a, b, joint, *_opening(model, (a, b), found))
 
 
 def border(model: Model, edge: Edge, side: Side, use: int) -> Border | None:
@@ -342,10 +344,13 @@ def jets(model: Model, border: Border, share: Array, order: int) -> tuple[Array,
 
 def opening(model: Model, a: Border, b: Border) -> tuple[float, float]:
     """Largest distance (mm) and angle between the outward normals of two borders at equal fractions."""
-    s, sn, st = jets(model, a, _SAMPLES, 1)
-    t, tn, tt = jets(model, b, _SAMPLES, 1)
-    angle = between(_outward(model, a, sn, st), _outward(model, b, tn, tt))
-    return float(np.linalg.norm(s - t, axis=1).max()), float(angle.max())
+    return _opening(model, (a, b), (jets(model, a, _SAMPLES, 1), jets(model, b, _SAMPLES, 1)))
+
+
+def _opening(model: Model, borders: tuple[Border, Border], found: tuple[_Jet, _Jet]) -> tuple[float, float]:
+    normals = [_outward(model, border, *jet[1:3]) for border, jet in zip(borders, found, strict=True)]
+    apart = np.linalg.norm(found[0][0] - found[1][0], axis=1)
+    return float(apart.max()), float(between(*normals).max())
 
 
 def _outward(model: Model, border: Border, across: Array, along: Array) -> Array:
@@ -359,10 +364,9 @@ def between(one: Array, two: Array) -> Array:
     return np.arctan2(np.linalg.norm(np.cross(one, two), axis=1), (one * two).sum(axis=1))
 
 
-def _joint(model: Model, a: Border, b: Border, wishes: Wishes) -> Joint | str:
+def _joint(model: Model, borders: tuple[Border, Border], found: tuple[_Jet, _Jet], wishes: Wishes) -> Joint | str:
     """The joint between two borders, or why it cannot be kept."""
-    s, sn, st, snn = jets(model, a, _SAMPLES, 2)
-    t, tn, tt, tnn = jets(model, b, _SAMPLES, 2)
+    (a, b), ((s, sn, st, snn), (t, tn, tt, tnn)) = borders, found
     length = np.linalg.norm(st, axis=1).mean()
     slip = np.abs(((s - t) * st).sum(axis=1) / np.maximum(np.linalg.norm(st, axis=1), 1e-12 * length)).max()
     if slip > max(SLIP, 1e-5 * length):
