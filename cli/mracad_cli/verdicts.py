@@ -84,7 +84,11 @@ def _finite(value: Any) -> Any:
     """Values in which whatever is not finite is None, and faces and edges have numbers as on the command line."""
     if isinstance(value, dict):
         counted = (
-            {"ref", "new"} if "there" in value else {"edge", "faces"} if isinstance(value.get("faces"), list) else set()
+            {"ref", "new"}
+            if "there" in value
+            else {"edge", "faces"}
+            if isinstance(value.get("faces"), list | tuple)
+            else set()
         )
         return {key: _numbered(item) if key in counted else _finite(item) for key, item in value.items()}
     if isinstance(value, list):
@@ -92,8 +96,8 @@ def _finite(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def _numbered(index: int | list[int]) -> int | list[int]:
-    return [i + 1 for i in index] if isinstance(index, list) else index + 1
+def _numbered(index: int | Sequence[int]) -> int | list[int]:
+    return index + 1 if isinstance(index, int) else [i + 1 for i in index]
 
 
 def _lines(verdict: Verdict, failed: Sequence[Layer]) -> list[str]:
