@@ -124,14 +124,16 @@ class Pool(Executor):
             tell: Callable[[], object] = bool
             if not self._stopped and task.future.set_running_or_notify_cancel():
                 if worker and worker.lost():
-                    worker = self._retired(worker)
+                    self._retired(worker)
+                    worker = None
                 try:
                     worker = worker or self._started()
                     tell = partial(task.future.set_result, worker.call(self._seconds, task.payload))
                 except BaseException as error:
                     tell = partial(task.future.set_exception, error)
                 if worker and (worker.lost() or worker.memory() > self._memory / 2):
-                    worker = self._retired(worker)
+                    self._retired(worker)
+                    worker = None
             else:
                 task.future.cancel()
             with self._lock:

@@ -169,3 +169,19 @@ def test_a_wrong_recipe_is_refused_before_anything_is_read(tmp_path):
     code, out, err = batch(recipe(tmp_path, '[[step]]\nuse = "smoth"\n'), tmp_path / "no.step", "-O", tmp_path / "out")
     assert (code, out) == (2, "") and "recipe.toml:2" in err and "'smooth'" in err
     assert not (tmp_path / "out").exists()
+
+
+def test_outputs_keep_the_format_of_their_inputs_or_get_another(tmp_path):
+    folder = tmp_path / "in"
+    folder.mkdir()
+    for name in ("a.igs", "b.BREP", "c.stp"):
+        (folder / name).write_text("sham")
+    out = tmp_path / "out"
+    kept = {item.output: item.format for item in find([str(folder)], out)}
+    assert kept == {"a.igs": "iges", "b.BREP": "brep", "c.stp": "step"}
+    assert [(i.output, i.format) for i in find([str(folder)], out, "glb")] == [
+        ("a.glb", "glb"), ("b.glb", "glb"), ("c.glb", "glb"),
+    ]  # fmt: skip
+    (folder / "a.stp").write_text("sham")
+    with pytest.raises(UsageError, match="both"):
+        find([str(folder)], out, "glb")
