@@ -219,3 +219,19 @@ def test_workers_end_with_a_killed_batch_and_an_interrupted_one_says_so(tmp_path
         _, err = process.communicate(timeout=40)
         assert len(workers) == 2 and not psutil.wait_procs(workers, timeout=20)[1]
     assert process.returncode == 130 and "interrupted after 0 of 4 files; run it again" in err
+
+
+def test_outputs_keep_the_format_of_their_inputs_or_get_another(tmp_path):
+    folder = tmp_path / "in"
+    folder.mkdir()
+    for name in ("a.igs", "b.BREP", "c.stp"):
+        (folder / name).write_text("sham")
+    out = tmp_path / "out"
+    kept = {item.output: item.format for item in find([str(folder)], out)}
+    assert kept == {"a.igs": "iges", "b.BREP": "brep", "c.stp": "step"}
+    assert [(i.output, i.format) for i in find([str(folder)], out, "glb")] == [
+        ("a.glb", "glb"), ("b.glb", "glb"), ("c.glb", "glb"),
+    ]  # fmt: skip
+    (folder / "a.stp").write_text("sham")
+    with pytest.raises(UsageError, match="both"):
+        find([str(folder)], out, "glb")

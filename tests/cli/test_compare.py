@@ -166,3 +166,15 @@ def test_nearest_points_are_exact_on_every_kind_of_net(samples):
         height = 1e-4 * model.diagonal
         off = distances(net, net.evaluate(uv) + height * net.normals(uv))
         assert np.abs(off - height).max() < 1e-9 * height
+
+
+def test_wrong_units_are_corrected_on_either_side(mracad, samples, tmp_path):
+    good, wrong = samples / "bottle.step", tmp_path / "bottle.step"
+    text = good.read_bytes()
+    assert b"SI_UNIT(.MILLI.,.METRE.)" in text
+    wrong.write_bytes(text.replace(b"SI_UNIT(.MILLI.,.METRE.)", b"SI_UNIT($,.METRE.)"))
+    limit = ("--max-deviation", "1e-9mm")
+    assert mracad("compare", good, wrong, *limit).code == 1
+    assert mracad("compare", good, wrong, "--input-unit", "mm", *limit).code == 0
+    assert mracad("compare", wrong, good, "--reference-unit", "mm", *limit).code == 0
+    assert mracad("compare", wrong, good, "--reference-unit", "parsec").code == 2

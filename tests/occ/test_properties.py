@@ -73,7 +73,7 @@ def test_what_moved_is_measured_again_in_inches(samples):
 
 
 def test_what_did_not_move_keeps_what_the_file_says(samples):
-    document = occ.read(samples / "trimmed.step")
+    document = occ.read(samples / "bottle.step")
     state(document, factor=2.0)
     (said,) = stated(document).values()
     (kept,) = stated(again(document)).values()
