@@ -269,10 +269,10 @@ class _Surroundings:
         self._spline = RectBivariateSpline(side, side, (heights - level).reshape(CELLS + 1, -1))
         self._reach = reach
         origin = centre + reach * level * frame[2]
-        within = np.linalg.norm(ab, axis=1) <= CLOSE
+        within = np.flatnonzero(np.linalg.norm(ab, axis=1) <= CLOSE)[::8]
         graph_points = origin + reach * np.c_[ab, heights - level][within] @ frame
         self.chart = charts(
-            origin[None], frame[None], np.array([CLOSE * reach]), graph_points[None], np.ones((1, within.sum()), bool)
+            origin[None], frame[None], np.array([CLOSE * reach]), graph_points[None], np.ones((1, len(within)), bool)
         )
 
     def feet(self, local: Array) -> Array:
