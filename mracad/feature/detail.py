@@ -64,7 +64,7 @@ class Origin:
     offsets : dict of int to ndarray (nu, nv, 3)
         In each surface's own frame, mm.
     feet : Feet
-        Its place.
+        Its place on the ground without it.
     axes : ndarray (3, 3)
         Its frame there.
     """
@@ -368,7 +368,7 @@ def _made(
         offsets[index] = np.where(free[..., None], offsets[index], 0.0)
     spacing = _spacing(ground, windows, reach)
     table = _table(ground, chart, reach, spacing, offsets, windows)
-    origin = Origin(offsets, window.feet, chart.axes[0])
+    origin = Origin(offsets, ground.feet(chart.origin), chart.axes[0])
     return Feature(window.radius, reach, spacing, table, named, origin)
 
 

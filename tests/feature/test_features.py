@@ -88,6 +88,16 @@ def test_copies_whole_spans_away_are_exact(plane, tmp_path):
     assert report["control_points"]["before"] == report["control_points"]["after"]
 
 
+@pytest.mark.parametrize("height", ["0", "1.4"])
+def test_a_place_beside_the_knots_is_moved_exactly_too(height):
+    """The point that names the feature may lie off it: its place is on the ground below."""
+    from tests.edit.models import sheet
+
+    flat = sheet(grounds.plane(100.0, (30.3, 31.7)))
+    edit = repeat(flat, Repeat(feature=f"near:30.3,31.7,{height},radius:18", at=("68.3,66.7,0",)))
+    assert [copy.exact for copy in edit.copies] == [True]
+
+
 def test_copies_anywhere_match_the_closed_form(feature, tmp_path):
     """On planes, a cylinder and a sphere of other knots and degrees, turned, at arbitrary places."""
     radius = 40.0
