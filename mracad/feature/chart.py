@@ -87,12 +87,6 @@ class Charts:
         """a, b and height (mm) of points ``(q, 3)``, each in one of the charts."""
         return np.einsum("qij,qj->qi", self.axes[which], points - self.origin[which])
 
-    def height(self, local: Array, which: Array) -> Array:
-        """Height of the graph, mm."""
-        reach = self.reach[which]
-        rows = monomials(local[:, 0] / reach, local[:, 1] / reach, DEGREE)
-        return reach * np.einsum("qt,qt->q", rows, self.graph[which])
-
     def coordinates(self, local: Array, which: Array) -> Array:
         """Normal coordinates x, y (mm) of points given by a and b."""
         reach = self.reach[which]

@@ -40,6 +40,9 @@ FIRST = 4.0
 SPARE = 1.5
 """Spans are not divided that are at most so many times as wide as those that held the feature."""
 
+UNEVEN = 1.4
+"""By how much a span may be wider somewhere than on average."""
+
 ROUNDS, PIECES = 5, 6
 """Times that spans are divided, and into how many pieces at most each time."""
 
@@ -354,8 +357,11 @@ class Copies:
         some = self.touched[:, number] & ~self.matched
         if not some.any():
             return extra
+        widest = [float(arc_lengths(sheet.net, axis).max()) for axis in (0, 1)]
+        if all(UNEVEN * x <= SPARE * self._least(kv) for x, kv in zip(widest, sheet.knots, strict=True)):
+            return extra
         limit = np.array([FACETTED if k.degree == 1 else MISSED for k in sheet.knots]) * self.height
-        extra = self._first(sheet, some)
+        extra = self._first(sheet, some, max(widest))
         for _ in range(ROUNDS):
             knots = self._spans(sheet, extra)
             if knots[0].count * knots[1].count > MOST:
@@ -386,13 +392,16 @@ class Copies:
         kv = knots[axis]
         speed = np.zeros(kv.spans)
         np.maximum.at(speed, span, np.linalg.norm(sheet.evaluate(uv)[1 + axis], axis=1))
-        least = self.feature.spacing * float(self.sizes.min()) * (1.0 if kv.degree > 2 else 0.5)
+        least = self._least(kv)
         width = speed * np.diff(kv.breaks)
         return np.where(width > SPARE * least, np.ceil(width / least), 1.0)
 
-    def _first(self, sheet: Sheet, some: Array) -> tuple[Array, Array]:
+    def _least(self, kv: KnotVector) -> float:
+        """Width of the spans that hold the smallest copy at this degree, mm."""
+        return self.feature.spacing * float(self.sizes.min()) * (1.0 if kv.degree > 2 else 0.5)
+
+    def _first(self, sheet: Sheet, some: Array, longest: float) -> tuple[Array, Array]:
         """Knots that make spans under copies no longer than a share of their reach."""
-        longest = max(float(arc_lengths(sheet.net, axis).max()) for axis in (0, 1))
         if 2 * longest <= float(self.reach[some].min()) / FIRST:
             return np.empty(0), np.empty(0)
         us, vs = (np.unique(np.r_[k.breaks, np.linspace(*k.domain, 160)]) for k in sheet.knots)

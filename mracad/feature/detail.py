@@ -64,7 +64,7 @@ class Origin:
     offsets : dict of int to ndarray (nu, nv, 3)
         In each surface's own frame, mm.
     feet : Feet
-        Its place.
+        Its place on the ground without it.
     axes : ndarray (3, 3)
         Its frame there.
     """
@@ -269,10 +269,10 @@ class _Surroundings:
         self._spline = RectBivariateSpline(side, side, (heights - level).reshape(CELLS + 1, -1))
         self._reach = reach
         origin = centre + reach * level * frame[2]
-        within = np.linalg.norm(ab, axis=1) <= CLOSE
+        within = np.flatnonzero(np.linalg.norm(ab, axis=1) <= CLOSE)[::8]
         graph_points = origin + reach * np.c_[ab, heights - level][within] @ frame
         self.chart = charts(
-            origin[None], frame[None], np.array([CLOSE * reach]), graph_points[None], np.ones((1, within.sum()), bool)
+            origin[None], frame[None], np.array([CLOSE * reach]), graph_points[None], np.ones((1, len(within)), bool)
         )
 
     def feet(self, local: Array) -> Array:
@@ -368,7 +368,7 @@ def _made(
         offsets[index] = np.where(free[..., None], offsets[index], 0.0)
     spacing = _spacing(ground, windows, reach)
     table = _table(ground, chart, reach, spacing, offsets, windows)
-    origin = Origin(offsets, window.feet, chart.axes[0])
+    origin = Origin(offsets, ground.feet(chart.origin), chart.axes[0])
     return Feature(window.radius, reach, spacing, table, named, origin)
 
 

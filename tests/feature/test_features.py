@@ -12,7 +12,7 @@ from OCP.gp import gp_Ax2, gp_Dir, gp_Pnt
 from mracad.audit.continuity import seams
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.net import Net
-from mracad.edit.features import extract
+from mracad.edit.features import extract, repeat
 from mracad.occ.step import read_step, write_step
 from mracad.occ.view import view
 from mracad.options import Repeat
@@ -55,7 +55,7 @@ def square(net, count=300):
 
 @pytest.fixture(scope="module")
 def plane(tmp_path_factory):
-    return grounds.save(tmp_path_factory.mktemp("plane") / "plane.step", grounds.plane(200.0))
+    return grounds.save(tmp_path_factory.mktemp("plane") / "plane.step", grounds.plane(180.0))
 
 
 @pytest.fixture(scope="module")
@@ -72,7 +72,7 @@ def feature(plane, tmp_path_factory):
 
 def test_copies_whole_spans_away_are_exact(plane, tmp_path):
     """Twelve places, windows apart or overlapping: the sum of the source's own offsets, moved."""
-    ways = [(x, y) for x in (0, 51, 103) for y in (0, 50, 99, 101)]
+    ways = [(x, y) for x in (0, 51, 98) for y in (0, 50, 99, 101)]
     places = [word((50 + x, 50 + y, 0)) for x, y in ways if x or y] + [word((77, 66, 0))]
     before, after, report = repeated(plane, tmp_path / "out.step", *(w for p in places for w in ("--at", p)))
     own = extract(before, Repeat(feature=FEATURE, at=("0,0,0",)), {0}).origin.offsets[0]
@@ -85,6 +85,16 @@ def test_copies_whole_spans_away_are_exact(plane, tmp_path):
     assert len(report["copies"]) == 12 and all(c["exact"] for c in report["copies"])
     assert np.abs(off).max() <= 1e-9
     assert report["control_points"]["before"] == report["control_points"]["after"]
+
+
+@pytest.mark.parametrize("height", ["0", "1.4"])
+def test_a_place_beside_the_knots_is_moved_exactly_too(height):
+    """The point that names the feature may lie off it: its place is on the ground below."""
+    from tests.edit.models import sheet
+
+    flat = sheet(grounds.plane(100.0, (30.3, 31.7)))
+    edit = repeat(flat, Repeat(feature=f"near:30.3,31.7,{height},radius:18", at=("68.3,66.7,0",)))
+    assert [copy.exact for copy in edit.copies] == [True]
 
 
 def test_copies_anywhere_match_the_closed_form(feature, tmp_path):
@@ -279,15 +289,15 @@ def test_holes_and_edges_refuse_copies_or_take_their_part(feature, tmp_path, cap
 
 
 ERRORS = [
-    (["--at", "80,50,60"], 4, "place 1 (80,50,60) is 60 mm off"),
-    (["--at", "210,50,0"], 4, "place 1 (210,50,0) is 10 mm off"),
+    (["--at", "60,50,60"], 4, "place 1 (60,50,60) is 60 mm off"),
+    (["--at", "110,50,0"], 4, "place 1 (110,50,0) is 10 mm off"),
     (["--at", "#1@500,2"], 4, "place 1 (#1@500,2) is off the face"),
     (["--at", "#4@1,2"], 2, "place 1 (#4@1,2): '#4'"),
     (["--at", "1,2"], 2, "place 1 (1,2): '1,2' is not right"),
-    (["--at", "195,50,0"], 4, "place 1 (195,50,0): edges or holes"),
-    (["--at", "100,100,0", "--feature", "near:50,50,0,radius:90"], 4, "larger than its face"),
-    (["--at", "100,100,0", "--feature", "#1@20:220,20:50"], 4, "outside the face"),
-    (["--at", "100,100,0", "--feature", "near:150,150,0,radius:10"], 4, "nothing stands out"),
+    (["--at", "95,50,0"], 4, "place 1 (95,50,0): edges or holes"),
+    (["--at", "60,60,0", "--feature", "near:25,25,0,radius:60"], 4, "larger than its face"),
+    (["--at", "60,60,0", "--feature", "#1@20:120,20:50"], 4, "outside the face"),
+    (["--at", "60,60,0", "--feature", "near:70,70,0,radius:10"], 4, "nothing stands out"),
     (["--at", "@bad.csv"], 3, "bad.csv:3: '30,forty,0'"),
     (["--at", "@none.csv"], 3, "none.csv"),
     (["--at", "1,1,1", "--feature", "none.feature"], 3, "none.feature"),
@@ -298,11 +308,11 @@ ERRORS = [
 
 
 @pytest.mark.parametrize(("arguments", "code", "words"), ERRORS)
-def test_errors_name_the_place(plane, tmp_path, monkeypatch, capsys, arguments, code, words):
+def test_errors_name_the_place(small, tmp_path, monkeypatch, capsys, arguments, code, words):
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "bad.csv").write_text("x,y,z\n100,100,0\n30,forty,0\n")
-    extra = [] if "--feature" in arguments else ["--feature", FEATURE]
-    run("repeat", plane, "-o", "out.step", *extra, *arguments, code=code)
+    (tmp_path / "bad.csv").write_text("x,y,z\n60,60,0\n30,forty,0\n")
+    extra = [] if "--feature" in arguments else ["--feature", "near:25,25,0,radius:17"]
+    run("repeat", small, "-o", "out.step", *extra, *arguments, code=code)
     message = capsys.readouterr().err.strip()
     assert words in message and message.count("\n") == 0
     assert not (tmp_path / "out.step").exists()
@@ -346,28 +356,27 @@ def test_overlapping_copies(small, tmp_path):
     assert found["replace"].max() < 1.01 * HEIGHT < found["add"].max()
 
 
-def test_patterns(small, tmp_path):
+def test_patterns(small):
     """A grid and a polar pattern that begin at the feature, one along an edge, and places moved at random."""
+    ground = model(small)
 
-    def at(*arguments):
-        report = tmp_path / "report.json"
-        settings = ["--feature", "near:25,25,0,radius:14", "--taper", "4mm", "--report", report, "--overwrite"]
-        run("repeat", small, "-o", tmp_path / "out.step", "--dry-run", *settings, *arguments)
-        return np.array([c["at"] for c in json.loads(report.read_text())["copies"]])
+    def at(**options):
+        edit = repeat(ground, Repeat(feature="near:25,25,0,radius:14", taper="4mm", **options))
+        return np.array([copy.at for copy in edit.copies])
 
-    grid = at("--grid", "3x2,25,50")
+    grid = at(grid="3x2,25,50")
     wanted = [(25 + 25 * i, 25 + 50 * j, 0) for i in range(3) for j in range(2) if i or j]
     assert np.abs(grid - wanted).max() < 1e-5
-    polar = at("--polar", "4,50,50,0,0,0,1")
+    polar = at(polar="4,50,50,0,0,0,1")
     assert np.abs(polar - [(75, 25, 0), (75, 75, 0), (25, 75, 0)]).max() < 1e-5
-    along = at("--along", "edge#1,3,20", "--size", "0.8")
-    edge = model(small).edges[0]
+    along = at(along="edge#1,3,20", size=0.8)
+    edge = ground.edges[0]
     apart = (along - edge.points[12]) @ np.cross(edge.tangents[12], [0, 0, 1])
     assert len(along) == 3 and np.abs(np.abs(apart) - 20).max() < 1e-3
     assert np.abs(np.linalg.norm(np.diff(along, axis=0), axis=1) - 100 / 3).max() < 0.05
-    first, again = (at("--at", "50,50,0", "--jitter", "3mm", "--spin", 90, "--seed", 5) for _ in range(2))
+    first, again = (at(at=("50,50,0",), jitter="3mm", spin=90.0, seed=5) for _ in range(2))
     assert (first == again).all() and 0 < np.linalg.norm(first - [50, 50, 0]) <= 3
-    other = at("--at", "50,50,0", "--jitter", "3mm", "--seed", 6)
+    other = at(at=("50,50,0",), jitter="3mm", seed=6)
     assert np.linalg.norm(first - other) > 1e-3
 
 
@@ -378,12 +387,12 @@ def test_features_are_found(plane, capsys):
     assert 0.8 * HEIGHT < found["height"] < 1.1 * HEIGHT and 2 * SIGMA < found["size"] < 6 * SIGMA
 
 
-def test_transfer_of_a_feature_between_units(plane, tmp_path):
+def test_transfer_of_a_feature_between_units(small, tmp_path):
     k = KnotVector.clamped(np.linspace(0.0, 120.0, 61), 3)
     flat = shapes.face_on(make.surface(fitted(k, k, lambda x, y: 0 * x, size=1.0).poles, k.knots, k.knots))
     inch = shapes.save(flat, tmp_path / "inch.step", "INCH")
     target = tmp_path / "out.step"
-    run("transfer", plane, inch, "-o", target, "--from", FEATURE, "--to", "61.2,58.3,0")
+    run("transfer", small, inch, "-o", target, "--from", "near:25,25,0,radius:17", "--to", "61.2,58.3,0")
     old, new = model(inch).surfaces[0].net, model(target).surfaces[0].net
     points, moved = old.evaluate(square(old)), new.evaluate(square(old))
     wanted = bump(np.hypot(points[:, 0] - 61.2, points[:, 1] - 58.3))
