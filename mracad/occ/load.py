@@ -16,12 +16,12 @@ class Text(io.BytesIO):
     Attributes
     ----------
     name : str
-        Of the file, without folder.
+        Of the file, without folder; signs that are not Unicode, which the kernel does not take, are replaced.
     """
 
     def __init__(self, data: bytes, name: str) -> None:
         super().__init__(data)
-        self.name = name
+        self.name = name.encode(errors="replace").decode()
 
 
 def load(source: str | os.PathLike | BinaryIO) -> Text:
@@ -32,8 +32,7 @@ def load(source: str | os.PathLike | BinaryIO) -> Text:
         return Text(source.read(), Path(str(getattr(source, "name", "stdin"))).name.strip("<>"))
     path = Path(source)
     try:
-        # the kernel takes no name that is not Unicode
-        return Text(path.read_bytes(), path.name.encode(errors="replace").decode())
+        return Text(path.read_bytes(), path.name)
     except OSError as error:
         reason = {IsADirectoryError: "it is a folder", FileNotFoundError: "there is no such file"}
         why = reason.get(type(error), error.strerror or str(error))
