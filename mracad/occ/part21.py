@@ -10,6 +10,7 @@ UNNAMED = b"mracad unnamed product"
 
 _STYLES = b" = MECHANICAL_DESIGN_GEOMETRIC_PRESENTATION_REPRESENTATION("
 _ENTITY = re.compile(rb"#(\d+) = (?:[^';]|'[^']*')*;\n")
+_COUNTED = re.compile(rb" = (?:PRODUCT|NEXT_ASSEMBLY_USAGE_OCCURRENCE)\([^;]*;")  # broken where the count was long
 _REFERENCE = re.compile(rb"'[^']*'|#(\d+)")
 _PMI = {  # each begins with a word, for which the text is searched fast
     "dimensions": (rb"DIMENSIONAL_(?:SIZE|LOCATION)\w*\s*\(", rb"ANGULAR_(?:SIZE|LOCATION)\w*\s*\("),
@@ -38,7 +39,7 @@ def tidy(text: bytes) -> bytes:
     """Take out of a STEP file what differs from process to process, and what says nothing.
 
     What the kernel counts through the life of the process is counted from 1, groups of styles come in the order of
-    the parts they colour, reals have no trailing zeros and points no line breaks.
+    the parts they colour, reals have no trailing zeros, points and what has a count no line breaks.
     """
     pieces = text.split(b"'")  # every second one is within quotes
     products = usages = 0
@@ -50,6 +51,7 @@ def tidy(text: bytes) -> bytes:
             usages += 1
             pieces[i + 1] = b"%d" % usages
     plain = re.sub(rb"\n {4}(?=[-.0-9])", b"", b"'".join(pieces[::2]))
+    plain = _COUNTED.sub(lambda found: re.sub(rb"\n *", b"", found[0]), plain)
     pieces[::2] = b"".join(re.split(rb"(\.(?:[0-9]*[1-9])?)0+(?=[,)E])", plain)).split(b"'")
     return _styles_in_order(b"'".join(pieces))
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import os
 import random
+import signal
 import subprocess
 import sys
 import time
@@ -92,7 +93,8 @@ def outputs(folder: Path) -> dict[str, bytes]:
 
 
 def _without_privileges() -> None:
-    """Let permissions hold for the superuser, too (Linux: CAP_DAC_OVERRIDE, CAP_DAC_READ_SEARCH)."""
+    """Let interrupts count, and permissions for the superuser too (Linux: CAP_DAC_OVERRIDE, CAP_DAC_READ_SEARCH)."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     if sys.platform == "linux" and os.geteuid() == 0:
         for capability in (1, 2):
             ctypes.CDLL(None).prctl(24, capability, 0, 0, 0)

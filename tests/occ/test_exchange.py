@@ -165,8 +165,9 @@ def test_same_bytes_every_time_and_in_every_process(tmp_path):
     subprocess.run([sys.executable, "-c", script, str(source), *targets], check=True)
     first, second = ((tmp_path / folder / "out.step").read_bytes() for folder in ("one", "two"))
     assert first == second
-    occ.write_step(occ.read_step(source), tmp_path / "out.step", options_text="smooth --scale 5")
-    assert (tmp_path / "out.step").read_bytes() == first
+    for _ in range(30):  # the kernel's own counts grow by digits
+        occ.write_step(occ.read_step(source), tmp_path / "out.step", options_text="smooth --scale 5")
+        assert (tmp_path / "out.step").read_bytes() == first
     assert b"smooth --scale 5" in first and b"1970-01-01T00:00:00" in first
     assert str(tmp_path).encode() not in first and b"Open CASCADE STEP translator" not in first
 
