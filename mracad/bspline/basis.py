@@ -8,6 +8,9 @@ import numpy as np
 
 from mracad.bspline.knots import Array, KnotVector, Side
 
+SHORT = 64
+"""Most parameters for which values are kept."""
+
 
 def basis(kv: KnotVector, x: Array, derivative: int = 0, side: Side = "right") -> tuple[Array, Array]:
     """The functions that are not zero at ``x``, or their derivatives.
@@ -33,7 +36,23 @@ def basis(kv: KnotVector, x: Array, derivative: int = 0, side: Side = "right") -
     de Boor, *A Practical Guide to Splines*, ch. X: every term of the recursion is non-negative, hence stable at any
     degree.
     """
-    span, offset = kv.locate(np.atleast_1d(np.asarray(x, dtype=float)), side)
+    at = np.atleast_1d(np.asarray(x, dtype=float))
+    if at.ndim == 1 and len(at) <= SHORT:
+        return _remembered(kv, at.tobytes(), derivative, side)
+    return _computed(kv, at, derivative, side)
+
+
+@lru_cache(maxsize=4096)
+def _remembered(kv: KnotVector, at: bytes, derivative: int, side: Side) -> tuple[Array, Array]:
+    """Few places are often asked for again: the samples of a seam before and after an edit."""
+    first, values = _computed(kv, np.frombuffer(at), derivative, side)
+    for array in (first, values):
+        array.setflags(write=False)
+    return first, values
+
+
+def _computed(kv: KnotVector, at: Array, derivative: int, side: Side) -> tuple[Array, Array]:
+    span, offset = kv.locate(at, side)
     return span - kv.degree, local_values(kv, span, offset, derivative).T
 
 
