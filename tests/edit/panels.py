@@ -217,3 +217,36 @@ def pair(left, right):
         on = make.surface(net.poles, net.u.knots, net.v.knots, (net.u.degree, net.v.degree))
         faces.append(make.face(on, [loop]))
     return make.single(make.shell([faces[0].Reversed(), faces[1]]), "pair")
+
+
+def junction(noisy):
+    """Half of the panel as one patch and two quarters beside it, as a document: a T-junction."""
+    quarters = cut(noisy, (2, 2))
+    v = noisy.v
+    fine = noisy.over(noisy.u.refined(np.repeat(SIZE, noisy.u.degree - 1)), v)
+    rows, u = _piece(fine.u, 0)
+    nets = {
+        (0, 0, 1, 2): Net(u, v, fine.poles[rows]),
+        (1, 0, 2, 1): quarters[1, 0].net,
+        (1, 1, 2, 2): quarters[1, 1].net,
+    }
+    corners = {(i, j): make.vertex(noisy.evaluate([(SIZE * i, SIZE * j)])[0]) for i in range(3) for j in range(3)}
+    edges, faces = {}, []
+    for (i0, j0, i1, j1), net in nets.items():
+        right = [(i1, j) for j in ([j0, 1, j1] if j1 - j0 == 2 and i1 == 1 else [j0, j1])]
+        ring = [(i0, j0), *right, (i0, j1), (i0, j0)]
+        loop = []
+        for start, stop in zip(ring, ring[1:], strict=False):
+            low, high = sorted((start, stop))
+            if (low, high) not in edges:
+                short = high[0] - low[0] + high[1] - low[1] == 1
+                beside = (
+                    quarters[min(low[0], 1), min(low[1], 1)] if short else Patch(net, "", ((0, SIZE), (0, 2 * SIZE)))
+                )
+                edges[low, high] = make.edge(_boundary(beside, low, high), (corners[low], corners[high]), (0.0, 1.0))
+            ends = SIZE * np.array([low, high], float)
+            path = make.curve(ends, np.array([0.0, 0.0, 1.0, 1.0]), 1)
+            loop.append(make.Side(edges[low, high], path, start < stop))
+        on = make.surface(net.poles, net.u.knots, net.v.knots, (net.u.degree, net.v.degree))
+        faces.append(make.face(on, [loop]))
+    return make.single(make.shell(faces), "junction")

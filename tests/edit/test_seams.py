@@ -204,3 +204,12 @@ def test_defects_are_carried_or_mended(sewn):
         assert all(a.angle <= 1.05 * b.angle + steeper for b, a in zip(before, now, strict=True))
         inner = [np.median([getattr(m, name) for m in now]) for name in ("mean_gap", "mean_angle")]
         print(f"sewn {sewn}, {options}: mean gap {inner[0]:.1e} mm, mean angle {inner[1]:.1e}°")
+
+
+def test_a_t_junction_moves():
+    _, noisy = panels.whole(16, 0.1, patches=(2, 2))
+    document = panels.junction(noisy)
+    report = job.run(document, smooth, Smooth(scale="16mm"))
+    gap, angle = holds(view(document))
+    assert coupled(report) == 3 and report.valid_after.valid
+    assert gap <= 1e-9 and angle <= 1e-5
