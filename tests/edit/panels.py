@@ -1,6 +1,7 @@
 """Panels of patches with known truth, as documents: cut from one surface, then given other knots, degrees, senses."""
 
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -236,7 +237,7 @@ def junction(noisy):
         right = [(i1, j) for j in ([j0, 1, j1] if j1 - j0 == 2 and i1 == 1 else [j0, j1])]
         ring = [(i0, j0), *right, (i0, j1), (i0, j0)]
         loop = []
-        for start, stop in zip(ring, ring[1:], strict=False):
+        for start, stop in pairwise(ring):
             low, high = sorted((start, stop))
             if (low, high) not in edges:
                 short = high[0] - low[0] + high[1] - low[1] == 1
