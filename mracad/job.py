@@ -312,12 +312,16 @@ def _refuse_if_stuck(model: Model, result: Edit) -> None:
 
 
 def _torn(before: list[SeamMeasure], after: list[SeamMeasure], edit: Edit) -> set[int]:
-    """Faces of seams that an edit would open, or that were smooth and would not be, without having moved them."""
-    moved = {t.edge for t in edit.edges if t.how != "frozen"}
+    """Faces of seams that an edit would open, or that were smooth and would not be; against its own intent."""
+    intent = {treatment.edge: treatment.how for treatment in edit.edges}
     return {
         face
         for old, new in zip(before, after, strict=True)
-        if old.edge not in moved and (new.gap > old.gap + WIDER or (old.smooth and new.angle > old.angle + STEEPER))
+        if intent.get(old.edge) != "mended"
+        and (
+            (new.gap > old.gap + WIDER and intent.get(old.edge) != "to tolerance")
+            or (old.smooth and new.angle > old.angle + STEEPER)
+        )
         for face in old.faces
     }
 

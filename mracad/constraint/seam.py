@@ -161,7 +161,8 @@ class Treatment:
         Index in ``Model.edges``.
     faces : tuple of int
         Faces that meet there.
-    how : {"coupled", "to tolerance", "frozen"}
+    how : {"coupled", "to tolerance", "mended", "frozen"}
+        ``mended``: it moves as a coupled one does, and its gap or tilt is pulled shut.
     reason : str
         Why it is frozen.
     freedom : int
@@ -175,7 +176,9 @@ class Treatment:
     freedom: int = 0
 
 
-def seams(model: Model, movable: Collection[int], wishes: Wishes) -> tuple[list[Seam], set[int], dict[int, str]]:
+def seams(
+    model: Model, movable: Collection[int], wishes: Wishes
+) -> tuple[list[Seam], dict[int, tuple[Border, Border]], dict[int, str]]:
     """Seams that can move exactly.
 
     Parameters
@@ -188,13 +191,13 @@ def seams(model: Model, movable: Collection[int], wishes: Wishes) -> tuple[list[
     Returns
     -------
     found : list of Seam
-    smooth : set of int
-        Closing edges inside a periodic direction, which its spline space keeps smooth by itself.
+    closing : dict of int to (Border, Border)
+        Closing edges inside a periodic direction, which its spline space keeps as smooth as its knots say by itself.
     frozen : dict of int to str
         Every other edge of a movable face, and why it does not move.
     """
     found: list[Seam] = []
-    closing: set[int] = set()
+    closing: dict[int, tuple[Border, Border]] = {}
     frozen: dict[int, str] = {}
     for edge in model.edges:
         if not any(side.face in movable for side in edge.sides):
@@ -209,10 +212,10 @@ def seams(model: Model, movable: Collection[int], wishes: Wishes) -> tuple[list[
             result = _seam(model, movable, wishes, (edge, edge), edge.sides)
             if isinstance(result, Seam):
                 found.append(result)
-            elif result:
+            elif isinstance(result, str):
                 frozen[edge.index] = result
             else:
-                closing.add(edge.index)
+                closing[edge.index] = result
     for edge, one, two in coinciding(model):
         other = _twin(model, edge, two.face)
         if edge.index not in frozen or (other and other.index not in frozen):
@@ -223,7 +226,7 @@ def seams(model: Model, movable: Collection[int], wishes: Wishes) -> tuple[list[
         if isinstance(result, Seam):
             found.append(result)
             del frozen[result.edge], frozen[result.twin]
-        else:
+        elif isinstance(result, str):
             frozen[edge.index] = result
     return found, closing, frozen
 
@@ -241,8 +244,8 @@ def _twin(model: Model, edge: Edge, face: int) -> Edge | None:
 
 def _seam(
     model: Model, movable: Collection[int], wishes: Wishes, edges: tuple[Edge, Edge], sides: Sequence[Side]
-) -> Seam | str:
-    """The seam, why there is none, or ``""`` where a periodic space closes it."""
+) -> Seam | str | tuple[Border, Border]:
+    """The seam, why there is none, or its borders where a periodic space closes it."""
     for side in sides:
         face = model.faces[side.face]
         if face.surface is None:
@@ -263,7 +266,7 @@ def _seam(
         net = model.surfaces[a.surface].net
         knots = (net.u, net.v)[a.axis]
         if knots.periodic and abs(abs(a.at - b.at) - knots.period) <= ISO * knots.period:
-            return ""
+            return a, b
     found = jets(model, a, _SAMPLES, 2), jets(model, b, _SAMPLES, 2)
     joint = _joint(model, (a, b), found, wishes)
     if isinstance(joint, str):

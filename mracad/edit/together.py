@@ -43,6 +43,7 @@ CLUSTER = 1e-6, 1e-4
 
 CROWDED = "knots of the two sides nearly meet"
 ENTANGLED = "poles of a face there cannot move one by one"
+FOLDED = "would kink where a face closes on itself"
 STUCK = "a face there has no free poles"
 
 LEAST = 0.5
@@ -91,7 +92,7 @@ class Together:
     Attributes
     ----------
     found : list of Seam
-    closing : set of int
+    closing : dict of int to (Border, Border)
         Closing edges that need no condition.
     frozen : dict of int to str
     """
@@ -112,7 +113,7 @@ class Together:
         self.mending = options.close_gaps or options.fit_g1 is not None
         self.trimmed: list[TrimmedSeam] = []
         self.found: list[Seam] = []
-        self.closing: set[int] = set()
+        self.closing: dict[int, tuple[Border, Border]] = {}
         self.frozen: dict[int, str] = {}
         if options.edges == "coupled":
             self.found, self.closing, self.frozen = seams(model, movable, self.wishes)
@@ -138,7 +139,7 @@ class Together:
     def moving(self) -> set[int]:
         """Edges that move."""
         exact = {edge for seam in self.found for edge in (seam.edge, seam.twin)}
-        return self.closing | exact | {seam.edge for seam in self.trimmed}
+        return set(self.closing) | exact | {seam.edge for seam in self.trimmed}
 
     def treatments(self) -> tuple[Treatment, ...]:
         """What was done about each edge of a movable face, in edge order."""
@@ -150,7 +151,8 @@ class Together:
                 return Treatment(edge, faces, "frozen", self.frozen[edge])
             if edge in loose:
                 return Treatment(edge, faces, "to tolerance")
-            return Treatment(edge, faces, "coupled", freedom=self.freedom.get(edge, 0))
+            mended = self.mending and edge not in self.closing
+            return Treatment(edge, faces, "mended" if mended else "coupled", freedom=self.freedom.get(edge, 0))
 
         return tuple(of(edge) for edge in sorted(self.moving | set(self.frozen)))
 
@@ -355,7 +357,10 @@ class Together:
             # what is far off spoils its neighbours: try again without it before judging them
             limit = math.sqrt(max(worst.values()))
             return {edge: f"{TRIMMED}: not within the tolerance" for edge, x in worst.items() if x >= limit}
-        result = {}
+        result: dict[int, str] = {}
+        for a, b in self.closing.values():
+            if a.surface in moved and opening(after, a, b)[1] > opening(self.model, a, b)[1] + STEEPER:
+                result |= {s.edge: FOLDED for s in self._every() if a.surface in (s.a.surface, s.b.surface)}
         for seam in self.found:
             gap, angle = opening(after, seam.a, seam.b)
             wider = MENDED * seam.gap + self.gap if self.mending else WIDER

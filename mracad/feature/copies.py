@@ -279,7 +279,7 @@ class Copies:
         while True:
             if joined:
                 extra = self._refined(joined, extra)
-            moving = closing | {e for s, _ in joined for e in (s.edge, s.twin)}
+            moving = set(closing) | {e for s, _ in joined for e in (s.edge, s.twin)}
             offsets, before = self._offsets(extra, [s for s, _ in joined], moving, keep, removed)
             broken = self._broken([s for s, _ in joined], offsets)
             if not broken:
@@ -296,7 +296,7 @@ class Copies:
                     "move it away from them, make it smaller with --size, or let them take it with --clip",
                 )
         used = {i: o for i, o in offsets.items() if np.any(o.poles)}
-        return Laid(used, tuple(copies), frozen, frozenset(moving - closing))
+        return Laid(used, tuple(copies), frozen, frozenset(moving - set(closing)))
 
     def _stretch(self, seam: Seam, removed: Mapping[int, Array]) -> tuple[float, float] | None:
         """Fractions of a seam between which copies, or what is removed, move it."""

@@ -63,7 +63,7 @@ def error(model, patches, clean):
 
 
 def coupled(report):
-    return sum(t.how == "coupled" for t in report.edit.edges)
+    return sum(t.how in ("coupled", "mended") for t in report.edit.edges)
 
 
 def holds(model):
