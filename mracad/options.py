@@ -378,11 +378,11 @@ class Repeat(Single, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
 
 class Transfer(Featured, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Carry the detail of a face, or a feature, of another STEP file onto this one; units may differ."""
+    """Carry the detail of a face, or a feature, of another file onto this one; units may differ."""
 
     function: ClassVar[str] = "mracad.edit.features:transfer"
 
-    source: Annotated[str, Meta(description="The STEP file that the detail is taken from.")] = ""
+    source: Annotated[str, Meta(description="The file that the detail is taken from.")] = ""
     from_: Annotated[
         str,
         Meta(

@@ -30,9 +30,8 @@ _Spaces = dict[Direction, Coarse]
 WIDER = 1e-6
 """A seam may end up with so much more of a gap, mm; otherwise it is frozen."""
 
-STEEPER, SHARE = math.radians(0.008), 0.0
-"""A seam that was smooth may end up with so much more of an angle, and so much of that it had (a tilt that is carried
-turns with the faces); otherwise it is frozen."""
+STEEPER = math.radians(0.008)
+"""A seam that was smooth may end up with so much more of an angle; otherwise it is frozen."""
 
 MENDED, BENT = 0.1, math.radians(0.1)
 """The same where defects are mended: beside points that stay, the shares that gap and angle may gain are these and the
@@ -350,7 +349,7 @@ class Together:
             gap, angle = parted(after, loose.a, loose.b)
             excess = gap / max(loose.gap, self.gap)
             if loose.order:
-                excess = max(excess, angle / ((1 + SHARE) * loose.angle + STEEPER))
+                excess = max(excess, angle / (loose.angle + STEEPER))
             if excess > 1:
                 worst[loose.edge] = excess
         if worst:
@@ -366,7 +365,7 @@ class Together:
             wider = MENDED * seam.gap + self.gap if self.mending else WIDER
             if gap > seam.gap + wider:
                 result[seam.edge] = "would gape"
-            elif seam.joint.order and angle > (1 + SHARE) * seam.angle + (BENT if self.mending else STEEPER):
+            elif seam.joint.order and angle > seam.angle + (BENT if self.mending else STEEPER):
                 result[seam.edge] = "would kink"
         return result
 

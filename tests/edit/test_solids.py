@@ -69,3 +69,13 @@ def test_solids_stay_solid_and_smooth(samples, tmp_path, source, scale, moving):
             assert after.angle <= before.angle + 0.01
     occ.write(document, tmp_path / "out.stl")
     assert is_watertight(corners(tmp_path / "out.stl"))
+
+
+def test_a_face_that_closes_on_itself_gets_no_kink_there():
+    path = cadquery.Workplane("XY").spline([(0, 0), (20, 5), (40, 30), (60, 20)])
+    solid = cadquery.Workplane("YZ").circle(4).sweep(path).val().wrapped
+    document = make.single(BRepBuilderAPI_NurbsConvert(solid, True).Shape(), "pipe")
+    report = job.run(document, smooth, Smooth(level=1))
+    closing = [(a, b) for a, b in zip(report.before, report.after, strict=True) if a.faces[0] == a.faces[1]]
+    assert closing and report.edit.faces("edited") and report.valid_after.valid
+    assert all(after.angle <= before.angle + 0.01 for before, after in closing)
