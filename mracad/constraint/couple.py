@@ -20,7 +20,7 @@ A condition is a spline along the seam; it vanishes when it does at as many poin
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -32,8 +32,9 @@ from mracad.bspline.knots import KnotVector
 from mracad.bspline.knots import Side as Limit
 from mracad.bspline.net import Net
 from mracad.bspline.refine import refinement
+from mracad.constraint.definite import definite
 from mracad.constraint.seam import Border, Seam
-from mracad.constraint.trimmed import TrimmedSeam, collocation, sites
+from mracad.constraint.trimmed import TrimmedSeam, coarse_sites, collocation
 from mracad.wavelet.filters import wavelets
 from mracad.wavelet.project import projection
 
@@ -48,8 +49,8 @@ FLOOR = 1e-7
 DEPENDENT = 1e-8
 """Singular values below this fraction of the largest count as zero."""
 
-CHEAP, CHEAP_STEPS = 1e-4, 3
-"""The same for conditions that need to hold only as far as that is cheap, and how often they are improved."""
+IMPROVED = 20
+"""Most steps in which the conditions are fulfilled."""
 
 FILTERS = 3
 """How often the part in nearly dependent conditions, where the joints of a vertex contradict each other a little, is
@@ -230,13 +231,10 @@ class Restoration:
     diagonal : ndarray (points,)
         d, positive.
     free : ndarray of bool (points,), optional
-    loose : int
-        How many of the last conditions are to hold only as far as that is cheap.
     """
 
-    def __init__(self, matrix: Any, diagonal: Array, free: Array | None = None, loose: int = 0) -> None:
-        from scipy.sparse import diags_array
-        from scipy.sparse.linalg import splu
+    def __init__(self, matrix: Any, diagonal: Array, free: Array | None = None) -> None:
+        from scipy.sparse import diags_array, eye_array
 
         inverse = 1.0 / diagonal if free is None else np.where(free, 1.0 / diagonal, 0.0)
         size = np.sqrt(np.maximum(matrix.power(2) @ inverse, 0.0))
@@ -246,23 +244,23 @@ class Restoration:
         self.rows = diags_array(self.scale).tocsr() @ matrix[self.used]
         self.back = (self.rows @ diags_array(inverse).tocsr()).T.tocsr()
         self.normal = (self.rows @ self.back).tocsr()
-        eye = diags_array(np.where(self.used < matrix.shape[0] - loose, FLOOR, CHEAP))
-        self.factor = splu((self.normal + eye).tocsc(), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
+        eye = FLOOR * eye_array(len(self.used), format="csr")
+        self.inverse = definite(self.normal + eye)
 
     def solve(self, residual: Array) -> Array:
         """λ with ``(L D⁻¹ Lᵀ) λ = r`` in the scaled rows, nearly; nothing of it in the dependent conditions."""
-        return self.factor.solve(self.attainable(residual))
+        return self.inverse(self.attainable(residual))
 
     def attainable(self, residual: Array) -> Array:
         """The part of a residual that control points can answer for: nothing in (nearly) dependent conditions."""
-        return self.normal @ self.factor.solve(residual)
+        return self.normal @ self.inverse(residual)
 
-    def change(self, wanted: Array, steps: int = 20) -> Array:
-        """c ``(points, 3)`` for ``r`` (conditions, 3); a few ``steps`` leave what is costly."""
+    def change(self, wanted: Array) -> Array:
+        """c ``(points, 3)`` for ``r`` (conditions, 3)."""
         right = self.scale[:, None] * wanted[self.used]
         c = np.zeros((self.back.shape[0], right.shape[1]))
         least = np.abs(right).max(initial=0.0)
-        for _ in range(steps):
+        for _ in range(IMPROVED):
             residual = right - self.rows @ c
             worst = np.abs(residual).max(initial=0.0)
             if worst == 0.0 or (worst > 0.5 * least and c.any()):
@@ -282,7 +280,7 @@ class Coupling:
     seams : sequence of Seam
         Those that hold exactly.
     trimmed : sequence of TrimmedSeam
-        Those that hold to a tolerance.
+        Those that hold to a tolerance; the coarse spaces meet them at a few points only.
     """
 
     def __init__(
@@ -292,11 +290,14 @@ class Coupling:
         self.nets = {i: p.net for i, p in patches.items()}
         spaces = {i: (p.net.u, p.net.v) for i, p in patches.items()}
         self.fine = Conditions(self.nets, seams, spaces)
-        shares = [sites(seam, spaces, dense=True) for seam in trimmed]
-        self.loose, self.orders = collocation(self.nets, self.nets, trimmed, shares)
         self.diagonal = np.concatenate(
             [p.weight * np.outer(*(_lumped(k) for k in (p.net.u, p.net.v))).ravel() for p in patches.values()]
         )
+
+    def over(self, nets: Mapping[int, Net]) -> Coupling:
+        """The same for surfaces with more knots."""
+        patches = {i: replace(p, net=nets[i]) for i, p in self.patches.items()}
+        return Coupling(patches, self.seams, self.trimmed)
 
     @cached_property
     def restoration(self) -> Restoration:
@@ -346,7 +347,7 @@ class Coupling:
         return self.split(self._restored(delta, None, 1.0))
 
     def _conditioned(self, start: dict[int, Array], g: Array) -> dict[int, Array]:
-        """y from y₀, on the coarse nets; trimmed seams are shut and keep the tilt of g."""
+        """y from y₀, on the coarse nets; trimmed seams keep the gap and the tilt of g."""
         from scipy.sparse import block_diag, vstack
 
         spaces = [_Space(p) for p in self.patches.values()]
@@ -389,10 +390,10 @@ class Coupling:
         return {i: x.reshape(shapes[i]) for i, x in zip(shapes, np.split(y, ends), strict=True)}
 
     def _coarse_trimmed(self, g: Array) -> tuple[Any, Array]:
-        """Conditions of trimmed seams on the coarse nets and their right-hand sides."""
-        shares = [sites(seam, {i: p.base for i, p in self.patches.items()}, dense=False) for seam in self.trimmed]
-        fine, orders = collocation(self.nets, self.nets, self.trimmed, shares)
-        wanted = np.where(orders[:, None] == 1, fine @ g, 0.0)
+        """Conditions of trimmed seams on the coarse nets and their right-hand sides: what is open stays open."""
+        shares = [coarse_sites(seam, {i: p.base for i, p in self.patches.items()}) for seam in self.trimmed]
+        fine, _ = collocation(self.nets, self.nets, self.trimmed, shares)
+        wanted = fine @ g
         if self.rational:
             return fine @ self._refinement(fine), wanted
         return collocation(self._coarse_nets(), self.nets, self.trimmed, shares)[0], wanted
@@ -462,16 +463,9 @@ class Coupling:
 
     def _restored(self, delta: Array, free: Array | None, amount: float) -> Array:
         """δ changed on free points so that its conditions hold."""
-        from scipy.sparse import vstack
 
         mending = self.mending if free is None else np.where(free[:, None], self.mending, 0.0)
         exact = amount * (self.fine.matrix @ mending)
-        if self.trimmed:
-            both = vstack([self.fine.matrix, self.loose], format="csr")
-            shut = np.where(self.orders[:, None] == 0, -(self.loose @ self.centred), 0.0)
-            goal = np.concatenate([exact, amount * shut])
-            cheap = Restoration(both, self.diagonal, free, self.loose.shape[0])
-            delta = delta - cheap.change(both @ delta - goal, CHEAP_STEPS)
         fix = self.restoration if free is None else Restoration(self.fine.matrix, self.diagonal, free)
         return delta - fix.change(self.fine.matrix @ delta - exact)
 
@@ -489,7 +483,6 @@ class _Space:
 
     def __init__(self, patch: Patch) -> None:
         from scipy.sparse import eye_array, hstack, kron
-        from scipy.sparse.linalg import splu
 
         self.patch = patch
         grams = [gram(k) for k in patch.lifted]
@@ -505,8 +498,8 @@ class _Space:
         parts = [kron(in_u, in_v), kron(in_u[:, near_u], more_v), kron(more_u, in_v[:, near_v])]
         self.lift = hstack(parts, format="csr")
         self.gram = patch.weight * kron(*(g.tocsr() for g in grams), format="csr")
-        whole = (self.lift.T @ self.gram @ self.lift).tocsc()
-        self.inverses = [splu(whole, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}).solve]
+        whole = self.lift.T @ self.gram @ self.lift
+        self.inverses = [definite(whole)]
         self.diagonal = whole.diagonal()
 
     def solve(self, b: Array) -> Array:
@@ -527,9 +520,7 @@ class _Space:
 def _inverse(matrix: Gram) -> Callable[[Array], Array]:
     """The inverse of a Gram matrix as a function of right-hand sides ``(n, k)``."""
     if matrix.shape[0] > DENSE:
-        from scipy.sparse.linalg import splu
-
-        return splu(matrix.tocsr().tocsc()).solve
+        return definite(matrix.tocsr())
     inverse = np.linalg.inv(matrix.toarray())
     return (0.5 * (inverse + inverse.T)).__matmul__
 

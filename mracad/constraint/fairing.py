@@ -29,6 +29,7 @@ import numpy as np
 
 from mracad.bspline.gram import Gram, gram
 from mracad.bspline.knots import KnotVector
+from mracad.constraint.definite import definite
 
 Array = np.ndarray
 
@@ -149,7 +150,7 @@ class Fairing:
         origin = target.mean(axis=(0, 1))
         known = np.where(mask, target - origin, given - origin)
         wanted = _both(self.mass[0].__matmul__, self.mass[1].__matmul__, target - origin)
-        residual = (wanted - self._apply(known)) * mask
+        residual = (wanted - self.apply(known)) * mask
         change = np.zeros_like(known)
         direction = precondition(residual)
         rho = (residual * direction).sum()
@@ -157,7 +158,7 @@ class Fairing:
         for _ in range(MOST_STEPS):
             if rho <= RESIDUAL**2 * start or rho == 0.0:
                 break
-            image = self._apply(direction) * mask
+            image = self.apply(direction) * mask
             step = rho / (direction * image).sum()
             change += step * direction
             residual -= step * image
@@ -166,7 +167,17 @@ class Fairing:
             direction = preconditioned + rho / previous * direction
         return np.where(mask, target + change, given)
 
-    def _apply(self, net: Array) -> Array:
+    def matrix(self, points: Array) -> Any:
+        """(A_u ⊗ A_v) for some control points, a mask (nu, nv), as a sparse matrix."""
+        from scipy.sparse import csr_array, kron
+
+        frame = [np.flatnonzero(points.any(axis=1)), np.flatnonzero(points.any(axis=0))]
+        parts = [csr_array(a)[lines][:, lines] for a, lines in zip(self.stiff, frame, strict=True)]
+        inside = np.flatnonzero(points[np.ix_(*frame)])
+        return kron(*parts, format="csr")[inside][:, inside]
+
+    def apply(self, net: Array) -> Array:
+        """(A_u ⊗ A_v) times a net (nu, nv, k)."""
         return _both(self.stiff[0].__matmul__, self.stiff[1].__matmul__, net)
 
 
@@ -189,10 +200,7 @@ def _inverse(matrix: Any, keep: Array) -> Callable[[Array], Array]:
     part = matrix[np.ix_(keep, keep)]
     if isinstance(part, np.ndarray):
         return np.linalg.inv(part).__matmul__
-    from scipy.sparse.linalg import splu
-
-    solve: Callable[[Array], Array] = splu(part.tocsc()).solve
-    return solve
+    return definite(part)
 
 
 def _both(along_u: Any, along_v: Any, net: Array) -> Array:

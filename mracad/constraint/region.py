@@ -50,7 +50,7 @@ def region(net: Net, curves: Sequence[Curve]) -> Region:
     if not curves:
         return Region(np.ones((net.u.spans, net.v.spans), bool), ())
     boxes, chords, owners = _pieces(net, curves)
-    crossed = tuple(_mark(net, boxes[owners == i]) for i in range(len(curves)))
+    crossed = tuple(meeting(net, boxes[owners == i]) for i in range(len(curves)))
     return Region(np.logical_or.reduce(crossed) | _covered(net, chords), crossed)
 
 
@@ -167,8 +167,8 @@ def _cell_ranges(knots: KnotVector, low: Array, high: Array) -> tuple[Array, Arr
     return first, np.minimum(last, first + cells - 1)
 
 
-def _mark(net: Net, boxes: Array) -> Array:
-    """Cells met by boxes ``(q, 2, 2)`` (low, high corner)."""
+def meeting(net: Net, boxes: Array) -> Array:
+    """Cells ``(cells_u, cells_v)`` met by boxes ``(q, 2, 2)`` (low, high corner)."""
     cells = (len(net.u.breaks) - 1, len(net.v.breaks) - 1)
     first_u, last_u = _cell_ranges(net.u, boxes[:, 0, 0], boxes[:, 1, 0])
     first_v, last_v = _cell_ranges(net.v, boxes[:, 0, 1], boxes[:, 1, 1])

@@ -3,11 +3,12 @@
 On such a seam no two spline spaces match.  Its conditions on a displacement δ are asked at points of the two curves in
 the parameter planes that belong together:
 
-    G0   δ_b = δ_a,        G1   D_c δ_b = D_c δ_a,
+    G0   δ_b = δ_a,      G1   D_c δ_b = D_c δ_a,      G2   D_c² δ_b + D_z δ_b = D_c² δ_a,
 
 D_c the derivative in the direction of the conormal c of the input (the unit vector in the tangent plane of side a,
-across the edge).  The coarse spaces meet them at about as many points as the coarser of the two has spans along the
-seam; what is left between is taken away on the fine nets, as far as that is cheap.
+across the edge), z the direction that makes the second derivatives of the input differ along the normal only.  The
+coarse spaces meet them at about as many points as the coarser of the two has spans along the seam; on the fine nets
+they are shut to the tolerance (:mod:`mracad.constraint.shut`).
 """
 
 from __future__ import annotations
@@ -20,12 +21,21 @@ import numpy as np
 
 from mracad.bspline.basis import basis
 from mracad.bspline.knots import KnotVector
-from mracad.bspline.net import Curve, Net
+from mracad.bspline.net import Curve, Net, curvature
 from mracad.constraint.frozen import CONTINUITY
 from mracad.constraint.seam import CREASE, Wishes, between
 from mracad.model import Edge, Face, Model, Side
 
 Array = np.ndarray
+
+SAMPLES = 1025
+"""Points of a trace between which it counts as straight in search of crossings."""
+
+NEAR = 1e-9
+"""Crossings closer than this fraction of the edge are one."""
+
+GAUSS = 4
+"""Conditions in each piece of a seam between crossings."""
 
 _SHARES = 0.5 - 0.5 * np.cos(np.pi * (np.arange(65) + 0.5) / 65)
 
@@ -62,18 +72,35 @@ class TrimmedSeam:
 
     Attributes
     ----------
-    order : {0, 1}
+    order : {0, 1, 2}
         Cross derivatives that the seam keeps.
-    gap, angle : float
-        Of the input, as :func:`parted` measures them.
+    share : ndarray (q,)
+        Fractions of the edge at which it is judged.
+    opening : ndarray (3, q)
+        Gap, angle and curvature jump of the input there, as :func:`parted` measures them.
     """
 
     edge: int
     a: Trace
     b: Trace
     order: int
-    gap: float
-    angle: float
+    share: Array
+    opening: Array
+
+    def excess(self, model: Model, allowed: Sequence[float], more: Sequence[float]) -> Array:
+        """Opening ``(q,)`` after an edit, relative to what it may be, the worst of all that the seam keeps.
+
+        Parameters
+        ----------
+        model : Model
+            After the edit.
+        allowed, more : sequence of float
+            Gap (mm), angle and curvature jump (1/mm) that a seam may have whatever it had, and that it may have more
+            than it had at its worst.
+        """
+        now, worst = parted(model, self.a, self.b, self.share), self.opening.max(axis=1)
+        limit = np.maximum(allowed, worst + more)
+        return (now / limit[:, None])[: self.order + 1].max(axis=0)
 
 
 def trimmed(model: Model, edge: Edge, sides: Sequence[Side], wishes: Wishes) -> TrimmedSeam | str:
@@ -84,13 +111,15 @@ def trimmed(model: Model, edge: Edge, sides: Sequence[Side], wishes: Wishes) -> 
     if sides[0].face == sides[1].face:
         return "a face that meets itself"
     a, b = (_trace(face, edge) for face in faces)
-    gap, angle = parted(model, a, b)
-    if not np.isfinite(angle):
+    spaces = {t.surface: (model.surfaces[t.surface].net.u, model.surfaces[t.surface].net.v) for t in (a, b)}
+    share = np.sort(np.concatenate([_SHARES, fine_sites((a, b), spaces)[0]]))
+    opening = parted(model, a, b, share)
+    if not np.isfinite(opening[1]).all():
         return "degenerate along the seam"
-    order = CONTINUITY[wishes.keep] if angle <= CREASE else 0
-    if order > 1:
-        return "trimmed: no curvature is kept across it"
-    return TrimmedSeam(edge.index, a, b, order, gap, angle)
+    order = CONTINUITY[wishes.keep] if opening[1].max() <= CREASE else 0
+    if order == 2 and not np.isfinite(opening[2]).all():
+        return "no curvature along the seam"
+    return TrimmedSeam(edge.index, a, b, order, share, opening)
 
 
 def _trace(face: Face, edge: Edge) -> Trace:
@@ -98,33 +127,61 @@ def _trace(face: Face, edge: Edge) -> Trace:
     return Trace(face.index, face.surface, next(trim.curve for trim in face.trims if trim.edge == edge.index))
 
 
-def parted(model: Model, a: Trace, b: Trace) -> tuple[float, float]:
-    """Largest distance (mm, differences along the seam left out) and angle between the outward normals."""
-    points, normals = [], []
+def parted(model: Model, a: Trace, b: Trace, share: Array) -> Array:
+    """Gap (mm, what lies along the seam left out), angle between outward normals, curvature jump (1/mm): ``(3, q)``."""
+    points, normals, bends = [], [], []
     for trace in (a, b):
         face, net = model.faces[trace.face], model.surfaces[trace.surface].net
-        uv = trace.places(_SHARES)
-        points.append(net.evaluate(uv) @ face.frame[:3, :3].T + face.frame[:3, 3])
-        normals.append((-1 if face.reversed else 1) * net.normals(uv) @ face.frame[:3, :3].T)
-    way = np.gradient(points[0], axis=0)
-    way /= np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-300)
-    apart = points[0] - points[1]
-    apart -= (apart * way).sum(axis=1, keepdims=True) * way
-    return float(np.linalg.norm(apart, axis=1).max()), float(between(*normals).max())
+        s, *derivatives = (x @ face.frame[:3, :3].T for x in net.evaluate(trace.places(share), 2))
+        way = trace.way(share)
+        along = derivatives[0] * way[:, :1] + derivatives[1] * way[:, 1:]
+        sign = -1 if face.reversed else 1
+        points.append(s + face.frame[:3, 3])
+        normals.append(sign * np.cross(derivatives[0], derivatives[1]))
+        bends.append(sign * curvature(tuple(derivatives), np.cross(normals[-1], along)))
+    apart = across(points[0] - points[1], along)
+    angle = between(*normals)
+    angle[np.minimum(*(np.linalg.norm(n, axis=1) for n in normals)) == 0.0] = np.nan
+    return np.stack([np.linalg.norm(apart, axis=1), angle, np.abs(bends[0] - bends[1])])
 
 
-def sites(seam: TrimmedSeam, spaces: Mapping[int, tuple[KnotVector, KnotVector]], dense: bool) -> Array:
-    """Fractions of the edge at which conditions are asked.
+def across(vectors: Array, along: Array) -> Array:
+    """The part of vectors ``(q, 3)`` across directions ``along``."""
+    along = along / np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-300)
+    return vectors - (vectors * along).sum(axis=1, keepdims=True) * along
 
-    As many as the coarser side has spans, and three; or, ``dense``, twice as many as the finer one has.
-    """
-    share = np.linspace(0.0, 1.0, 400)
-    crossed = []
-    for trace in (seam.a, seam.b):
-        uv = trace.places(share)
-        cells = [np.searchsorted(k.breaks, k.wrap(x)) for k, x in zip(spaces[trace.surface], uv.T, strict=True)]
-        crossed.append(1 + sum(int(np.count_nonzero(np.diff(cell))) for cell in cells))
-    return np.linspace(0.0, 1.0, 2 * max(crossed) + 5 if dense else min(crossed) + 3)
+
+def crossings(trace: Trace, spaces: tuple[KnotVector, KnotVector]) -> Array:
+    """Fractions of the edge, 0 and 1 among them, at which a trace crosses the knot lines of a space."""
+    share = np.linspace(0.0, 1.0, SAMPLES)
+    found = [share[[0, -1]]]
+    for knots, x in zip(spaces, trace.places(share).T, strict=True):
+        lines = knots.breaks
+        if knots.periodic:
+            lines = np.unique(lines[None] + knots.period * np.arange(-2, 3)[:, None])
+        low, high = np.minimum(x[:-1], x[1:]), np.maximum(x[:-1], x[1:])
+        first, last = np.searchsorted(lines, low, "right"), np.searchsorted(lines, high, "left")
+        step = np.repeat(np.arange(len(low)), np.maximum(last - first, 0))
+        line = lines[first[step] + np.arange(len(step)) - np.searchsorted(step, step)]
+        inside = (line - x[step]) / (x[step + 1] - x[step])
+        found.append(share[step] + inside * (share[1] - share[0]))
+    every = np.sort(np.concatenate(found))
+    return every[np.append(True, np.diff(every) > NEAR)]
+
+
+def coarse_sites(seam: TrimmedSeam, spaces: Mapping[int, tuple[KnotVector, KnotVector]]) -> Array:
+    """Fractions at which conditions are asked of coarse spaces: the Greville points of cubics over the fewer spans."""
+    breaks = min((crossings(trace, spaces[trace.surface]) for trace in (seam.a, seam.b)), key=len)
+    return KnotVector.clamped(breaks, 3).greville()
+
+
+def fine_sites(traces: tuple[Trace, Trace], spaces: Mapping[int, tuple[KnotVector, KnotVector]]) -> tuple[Array, Array]:
+    """Fractions at which conditions are asked of fine spaces, and their weights: Gauss points of all spans."""
+    breaks = np.sort(np.concatenate([crossings(trace, spaces[trace.surface]) for trace in traces]))
+    breaks = breaks[np.append(True, np.diff(breaks) > NEAR)]
+    place, weight = np.polynomial.legendre.leggauss(GAUSS)
+    width = np.diff(breaks)[:, None]
+    return (breaks[:-1, None] + width * (place + 1) / 2).ravel(), (width * weight / 2).ravel()
 
 
 def collocation(
@@ -145,7 +202,7 @@ def collocation(
     -------
     matrix : scipy.sparse.csr_array
     order : ndarray (conditions,)
-        0 for G0, 1 for G1.
+        0 for G0, 1 for G1, 2 for G2.
     """
     from scipy.sparse import csr_array
 
@@ -154,12 +211,19 @@ def collocation(
     entries: list[tuple[Array, Array, Array]] = [(np.empty(0, int), np.empty(0, int), np.empty(0))]
     orders, count = [np.empty(0, int)], 0
     for seam, share in zip(seams, shares, strict=True):
-        ways = _conormals(ground, seam, share)
+        ways = _ways(ground, seam, share)
         for order in range(seam.order + 1):
             row = count + np.arange(len(share))
-            for trace, way, sign in zip((seam.b, seam.a), ways[::-1], (1.0, -1.0), strict=True):
+            for trace, (way, bend), sign in zip((seam.b, seam.a), ways[::-1], (1.0, -1.0), strict=True):
                 index, table = _jet(nets[trace.surface], trace.places(share), order)
-                value = table[0] if order == 0 else way[:, :1] * table[1] + way[:, 1:] * table[2]
+                x, y = way[:, :1], way[:, 1:]
+                if order == 0:
+                    value = table[0]
+                elif order == 1:
+                    value = x * table[1] + y * table[2]
+                else:
+                    value = x * x * table[3] + 2 * x * y * table[4] + y * y * table[5]
+                    value += bend[:, :1] * table[1] + bend[:, 1:] * table[2]
                 where = np.repeat(row, index.shape[1])
                 entries.append((where, first[trace.surface] + index.ravel(), sign * value.ravel()))
             orders.append(np.full(len(share), order))
@@ -168,15 +232,22 @@ def collocation(
     return csr_array((value, (row, column)), shape=(count, sum(sizes))), np.concatenate(orders)
 
 
-def _conormals(ground: Mapping[int, Net], seam: TrimmedSeam, share: Array) -> tuple[Array, Array]:
-    """Directions ``(q, 2)`` in the parameter planes of a and b that are the conormal in space."""
-    _, su, sv = ground[seam.a.surface].evaluate(seam.a.places(share), 1)
+def _ways(ground: Mapping[int, Net], seam: TrimmedSeam, share: Array) -> list[tuple[Array, Array]]:
+    """For a and b the directions c and z ``(q, 2)`` in the parameter planes."""
+    _, su, sv, *second = ground[seam.a.surface].evaluate(seam.a.places(share), 2)
     way = seam.a.way(share)
-    along = su * way[:, :1] + sv * way[:, 1:]
-    conormal = np.cross(np.cross(su, sv), along)
+    conormal = np.cross(np.cross(su, sv), su * way[:, :1] + sv * way[:, 1:])
     conormal /= np.maximum(np.linalg.norm(conormal, axis=1, keepdims=True), 1e-300)
-    _, tu, tv = ground[seam.b.surface].evaluate(seam.b.places(share), 1)
-    return _components(su, sv, conormal), _components(tu, tv, conormal)
+    _, tu, tv, *other = ground[seam.b.surface].evaluate(seam.b.places(share), 2)
+    ways = _components(su, sv, conormal), _components(tu, tv, conormal)
+    bends = [_twice(x, y) for x, y in zip(ways, (second, other), strict=True)]
+    return [(ways[0], np.zeros_like(way)), (ways[1], _components(tu, tv, bends[0] - bends[1]))]
+
+
+def _twice(way: Array, second: Sequence[Array]) -> Array:
+    """Second derivative in a direction, from those along u and v."""
+    x, y = way[:, :1], way[:, 1:]
+    return x * x * second[0] + 2 * x * y * second[1] + y * y * second[2]
 
 
 def _components(su: Array, sv: Array, vector: Array) -> Array:
@@ -187,7 +258,7 @@ def _components(su: Array, sv: Array, vector: Array) -> Array:
 
 
 def _jet(net: Net, uv: Array, order: int) -> tuple[Array, list[Array]]:
-    """Control points ``(q, k)`` and the rational basis functions there with their first derivatives."""
+    """Control points ``(q, k)``, and the rational basis functions there with their derivatives."""
     in_u = [basis(net.u, uv[:, 0], r) for r in range(order + 1)]
     in_v = [basis(net.v, uv[:, 1], r) for r in range(order + 1)]
     row = (in_u[0][0][:, None] + np.arange(net.u.degree + 1)) % net.u.count
@@ -195,11 +266,15 @@ def _jet(net: Net, uv: Array, order: int) -> tuple[Array, list[Array]]:
     index = (row[:, :, None] * net.v.count + column[:, None, :]).reshape(len(uv), -1)
     table = [
         (in_u[i][1][:, :, None] * in_v[j][1][:, None, :]).reshape(len(uv), -1)
-        for i, j in ((0, 0), (1, 0), (0, 1))[: 1 + 2 * order]
+        for i, j in ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))[: (1, 3, 6)[order]]
     ]
     if net.weights is None:
         return index, table
-    top = [value * net.weights.ravel()[index] for value in table]
+    weights = net.weights.ravel()[index]
+    top = [value * weights for value in table]
     w = [value.sum(axis=1, keepdims=True) for value in top]
-    whole = top[0] / w[0]
-    return index, [whole, *((t - x * whole) / w[0] for t, x in zip(top[1:], w[1:], strict=True))]
+    found = [top[0] / w[0]]
+    found += [(t - x * found[0]) / w[0] for t, x in zip(top[1:3], w[1:3], strict=True)]
+    for t, x, (i, j) in zip(top[3:], w[3:], ((1, 1), (1, 2), (2, 2)), strict=False):
+        found.append((t - w[i] * found[j] - w[j] * found[i] - x * found[0]) / w[0])
+    return index, found

@@ -1,14 +1,15 @@
 """Smoothing of surfaces whose common edges move with them.
 
 The target is the coupled projection (:mod:`mracad.constraint.couple`) in place of the projection of each surface by
-itself.  Points that some other edge freezes stay, and the seam conditions are restored where that broke them.
+itself.  Points that some other edge freezes stay, and the seam conditions are restored where that broke them.  Trimmed
+seams are then shut (:mod:`mracad.constraint.shut`); where one stays open, the spans under it are halved.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,13 +17,15 @@ from mracad.bspline.knots import KnotVector
 from mracad.bspline.net import Net
 from mracad.constraint.couple import Coupling, Patch
 from mracad.constraint.frozen import Separation, jet_support, separate
+from mracad.constraint.region import meeting
 from mracad.constraint.seam import TRIMMED, UNEVEN, VARYING, Border, Seam, Treatment, Wishes, opening, seams
+from mracad.constraint.shut import Sheet, shut
 from mracad.constraint.strip import Coarse, Direction, Line, Strip, line, members, strips
-from mracad.constraint.trimmed import TrimmedSeam, parted, trimmed
+from mracad.constraint.trimmed import TrimmedSeam, trimmed
 from mracad.edit.bound import OVERSHOOT, bounded, deviation
 from mracad.model import Model, Surface
 from mracad.options import Smooth, length
-from mracad.wavelet.ladder import ladder_for_scale, rungs_by_level
+from mracad.wavelet.ladder import arc_lengths, ladder_for_scale, rungs_by_level
 
 Array = np.ndarray
 _Spaces = dict[Direction, Coarse]
@@ -37,10 +40,23 @@ MENDED, BENT = 0.1, math.radians(0.1)
 """The same where defects are mended: beside points that stay, the shares that gap and angle may gain are these and the
 gap tolerance."""
 
+BUMPIER = 1e-3
+"""A trimmed seam that keeps G2 may end up with so much more of a curvature jump, over the wavelength of the edit."""
+
+HALVINGS = 4
+"""How often the spans under a trimmed seam that stays open are halved."""
+
+MOST_POINTS = 40_000
+"""Most control points to which a surface is refined for that."""
+
+SHORTEST = 1e-2
+"""Spans shorter than this, mm, are not halved."""
+
 CLUSTER = 1e-6, 1e-4
 """Knots closer than this fraction of the curve, or this in mm, are not set apart."""
 
 CROWDED = "knots of the two sides nearly meet"
+OPEN = f"{TRIMMED}: not within the tolerance"
 ENTANGLED = "poles of a face there cannot move one by one"
 FOLDED = "would kink where a face closes on itself"
 STUCK = "a face there has no free poles"
@@ -121,6 +137,7 @@ class Together:
             self._freeze({seam.edge: "nothing to smooth on either side" for seam in idle})
         self.freedom: dict[int, int] = {}
         self.inserted: dict[int, tuple[Array, Array]] = {}
+        self.scales: dict[int, float] = {}
 
     def _try_trimmed(self) -> None:
         """Let seams that cannot move exactly move to the gap tolerance."""
@@ -182,8 +199,13 @@ class Together:
                 couplings = [(weight, self._coupling(nets, coarse)) for weight, coarse in steps]
                 broken = self._locked(couplings[0][1])
             if not broken:
+                coupling = couplings[0][1]
                 moved = self._moved(couplings, separations, bound)
-                broken = self._overshot(moved) or self._broken(moved)
+                broken = self._overshot(moved, self._every())
+                if not broken and self.trimmed:
+                    moved = self._shut(moved, coupling, bound)
+                    broken = self._overshot(moved, self.trimmed)
+                broken = broken or self._broken(moved)
             if not broken:
                 return moved
             self._freeze(broken)
@@ -293,16 +315,82 @@ class Together:
             for i, delta in each.displacement().items():
                 change[i] = weight * delta + change.get(i, 0.0)
         free = {i: s.free for i, s in separations.items()}
-        amount = self.options.amount
-        offsets = coupling.held({i: amount * x for i, x in change.items()}, free, amount)
-        if bound is not None:
-            offsets = coupling.held({i: bounded(x, bound) for i, x in offsets.items()}, free, amount)
-            largest = max(float(np.linalg.norm(x, axis=-1).max()) for x in offsets.values())
-            offsets = {i: min(1.0, bound / max(largest, 1e-300)) * x for i, x in offsets.items()}
+        wanted = {i: self._wanted(x, bound) for i, x in change.items()}
+        offsets = _within(coupling.held(wanted, free, self.options.amount), bound)
         return {
             i: Moved(patch.net, self.inserted[i], separations[i], change[i], offsets[i])
             for i, patch in coupling.patches.items()
         }
+
+    def _wanted(self, change: Array, bound: float | None) -> Array:
+        """What is to be done of a change."""
+        wanted = self.options.amount * change
+        return wanted if bound is None else bounded(wanted, bound)
+
+    def _shut(self, moved: dict[int, Moved], coupling: Coupling, bound: float | None) -> dict[int, Moved]:
+        """The same with trimmed seams shut, as far as halving the spans under them serves."""
+        self.scales = {i: self._wavelength(patch, i) for i, patch in coupling.patches.items()}
+        amount = self.options.amount
+        for halving in range(HALVINGS + 1):
+            sheets = {
+                i: Sheet(m.net, self._wanted(m.change, bound), m.offset, m.separation.free, self.scales[i])
+                for i, m in moved.items()
+            }
+            allowed = self.gap, STEEPER, BUMPIER / min(self.scales.values())
+            offsets = shut(sheets, self.trimmed, coupling.fine.matrix, allowed, amount)
+            free = {i: m.separation.free for i, m in moved.items()}
+            offsets = _within(coupling.held(offsets, free, amount), bound)
+            moved = {i: replace(m, offset=offsets[i]) for i, m in moved.items()}
+            finer = self._halved(moved) if halving < HALVINGS else {}
+            if not finer:
+                break
+            moved |= finer
+            coupling = coupling.over({i: m.net for i, m in moved.items()})
+        return moved
+
+    def _wavelength(self, patch: Patch, surface: int) -> float:
+        """Shortest wavelength, mm, that the coarse space of a surface holds in a direction in which it is coarser."""
+        own = [self._knots((surface, axis)) for axis in (0, 1)]
+        spacing = [float(s.sum()) / (len(k.breaks) - 1) for s, k in zip(self.spans[surface], patch.base, strict=True)]
+        coarser = [x for x, k, base in zip(spacing, own, patch.base, strict=True) if k != base]
+        return math.sqrt(2) * min(coarser or spacing)
+
+    def _halved(self, moved: Mapping[int, Moved]) -> dict[int, Moved]:
+        """Surfaces with spans halved where trimmed seams stay open, or all along those for which points move too far.
+
+        Empty when there is nothing to halve.
+        """
+        after, far = self._after(moved), self._overshot(moved, self.trimmed)
+        cells: dict[int, Array] = {}
+        for seam in self.trimmed:
+            open_at = seam.share[(self._excess(seam, after) > 1.0) | (seam.edge in far)]
+            for trace in (seam.a, seam.b):
+                uv = trace.places(open_at)
+                met = meeting(moved[trace.surface].net, np.stack([uv, uv], axis=1))
+                cells[trace.surface] = met | cells.get(trace.surface, False)
+        result = {}
+        for i, met in cells.items():
+            net = moved[i].net
+            halves = [
+                ((k.breaks[:-1] + k.breaks[1:]) / 2)[met.any(axis=1 - axis) & (arc_lengths(net, axis) > SHORTEST)]
+                for axis, k in enumerate((net.u, net.v))
+            ]
+            points = math.prod(k.count + len(x) for k, x in zip((net.u, net.v), halves, strict=True))
+            if any(map(len, halves)) and points <= MOST_POINTS:
+                result[i] = self._finer(i, moved[i], halves)
+        return result
+
+    def _finer(self, surface: int, moved: Moved, halves: Sequence[Array]) -> Moved:
+        """A surface with more knots."""
+        net, u, v = moved.net, moved.net.u.refined(halves[0]), moved.net.v.refined(halves[1])
+        fine = net.over(u, v)
+
+        def over(offset: Array) -> Array:
+            return Net(net.u, net.v, net.poles + offset, net.weights).over(u, v).poles - fine.poles
+
+        inserted = np.sort(np.r_[moved.inserted[0], halves[0]]), np.sort(np.r_[moved.inserted[1], halves[1]])
+        separation = self._separated(self.model.surfaces[surface], fine, self.moving)
+        return Moved(fine, inserted, separation, over(moved.change), over(moved.offset))
 
     def _members(self, lines: list[tuple[Strip, Line]], coarse: list[KnotVector]) -> _Spaces:
         """Coarse knots and knots to insert of every direction."""
@@ -333,29 +421,34 @@ class Together:
             for lengths, knots in zip(self.spans[surface], (net.u, net.v), strict=True)
         )
 
-    def _overshot(self, moved: Mapping[int, Moved]) -> dict[int, str]:
-        """Seams of surfaces that deviate by more than smoothing them as a whole would."""
-        far = {i for i, m in moved.items() if deviation(m.net, m.offset) > OVERSHOOT * deviation(m.net, m.change)}
-        return {seam.edge: ENTANGLED for seam in self._every() if far & {seam.a.surface, seam.b.surface}}
+    def _overshot(self, moved: Mapping[int, Moved], seams: Sequence[Seam | TrimmedSeam]) -> dict[int, str]:
+        """Those of ``seams`` with a surface that deviates by more than smoothing it and its neighbours freely would."""
+        most = {i: deviation(m.net, m.change) for i, m in moved.items()}
+        allowed = dict(most)
+        for seam in seams:
+            for one, other in ((seam.a.surface, seam.b.surface), (seam.b.surface, seam.a.surface)):
+                allowed[one] = max(allowed[one], most[other])
+        far = {i for i, m in moved.items() if deviation(m.net, m.offset) > OVERSHOOT * allowed[i]}
+        return {seam.edge: ENTANGLED for seam in seams if far & {seam.a.surface, seam.b.surface}}
 
-    def _broken(self, moved: Mapping[int, Moved]) -> dict[int, str]:
-        """Seams that are wider or steeper than they may be, and what is wrong with them."""
+    def _after(self, moved: Mapping[int, Moved]) -> Model:
         surfaces = list(self.model.surfaces)
         for i, m in moved.items():
             surfaces[i] = Surface(i, Net(m.net.u, m.net.v, m.net.poles + m.offset, m.net.weights), surfaces[i].faces)
-        after = self.model.with_surfaces(surfaces)
-        worst: dict[int, float] = {}
-        for loose in self.trimmed:
-            gap, angle = parted(after, loose.a, loose.b)
-            excess = gap / max(loose.gap, self.gap)
-            if loose.order:
-                excess = max(excess, angle / (loose.angle + STEEPER))
-            if excess > 1:
-                worst[loose.edge] = excess
-        if worst:
+        return self.model.with_surfaces(surfaces)
+
+    def _excess(self, seam: TrimmedSeam, after: Model) -> Array:
+        scale = min(self.scales[seam.a.surface], self.scales[seam.b.surface])
+        return seam.excess(after, (self.gap, 0.0, 0.0), (0.0, STEEPER, BUMPIER / scale))
+
+    def _broken(self, moved: Mapping[int, Moved]) -> dict[int, str]:
+        """Seams that are wider or steeper than they may be, and what is wrong with them."""
+        after = self._after(moved)
+        excess = {seam.edge: self._excess(seam, after).max() for seam in self.trimmed}
+        worst = max(excess.values(), default=0.0)
+        if worst > 1.0:
             # what is far off spoils its neighbours: try again without it before judging them
-            limit = math.sqrt(max(worst.values()))
-            return {edge: f"{TRIMMED}: not within the tolerance" for edge, x in worst.items() if x >= limit}
+            return {edge: OPEN for edge, x in excess.items() if x >= math.sqrt(worst)}
         result: dict[int, str] = {}
         for a, b in self.closing.values():
             if a.surface in moved and opening(after, a, b)[1] > opening(self.model, a, b)[1] + STEEPER:
@@ -368,6 +461,14 @@ class Together:
             elif seam.joint.order and angle > seam.angle + (BENT if self.mending else STEEPER):
                 result[seam.edge] = "would kink"
         return result
+
+
+def _within(offsets: dict[int, Array], bound: float | None) -> dict[int, Array]:
+    """Offsets made smaller alike until none is longer than the bound."""
+    if bound is None:
+        return offsets
+    largest = max(float(np.linalg.norm(x, axis=-1).max()) for x in offsets.values())
+    return {i: min(1.0, bound / max(largest, 1e-300)) * x for i, x in offsets.items()}
 
 
 def _at_scale(line: Line, scale: float) -> KnotVector:
