@@ -392,11 +392,11 @@ class Coupling:
     def _coarse_trimmed(self, g: Array) -> tuple[Any, Array]:
         """Conditions of trimmed seams on the coarse nets and their right-hand sides: what is open stays open."""
         shares = [coarse_sites(seam, {i: p.base for i, p in self.patches.items()}) for seam in self.trimmed]
-        fine, _ = collocation(self.nets, self.nets, self.trimmed, shares)
+        fine = collocation(self.nets, self.nets, self.trimmed, shares)
         wanted = fine @ g
         if self.rational:
             return fine @ self._refinement(fine), wanted
-        return collocation(self._coarse_nets(), self.nets, self.trimmed, shares)[0], wanted
+        return collocation(self._coarse_nets(), self.nets, self.trimmed, shares), wanted
 
     @property
     def rational(self) -> bool:

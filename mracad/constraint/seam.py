@@ -25,7 +25,7 @@ from mracad.model import Edge, Face, Model, Side
 Array = np.ndarray
 _Jet = tuple[Array, ...]
 
-TRIMMED, UNEVEN, VARYING = "trimmed", "parameters differ along the seam", "ratio varies along the seam"
+TRIMMED, UNEVEN = "trimmed", "parameters differ along the seam"
 """Reasons for which a seam cannot move exactly, though it may to a tolerance."""
 
 CREASE = np.radians(1.0)
@@ -140,6 +140,8 @@ class Seam:
         The edge; twice, or the two free edges that coincide in an unsewn model.
     gap, angle : float
         Largest distance at equal fractions, mm, and angle between the outward normals.
+    loose : bool
+        Whether the joint keeps less than was asked for, no law being known for the rest.
     """
 
     edge: int
@@ -149,6 +151,7 @@ class Seam:
     joint: Joint
     gap: float
     angle: float
+    loose: bool = False
 
 
 @dataclass(frozen=True)
@@ -271,7 +274,9 @@ def _seam(
     joint = _joint(model, (a, b), found, wishes)
     if isinstance(joint, str):
         return joint
-    return Seam(edges[0].index, edges[1].index, a, b, joint, *_opening(model, (a, b), found))
+    gap, angle = _opening(model, (a, b), found)
+    wished = CONTINUITY[wishes.keep] if angle <= max(CREASE, wishes.fit) else 0
+    return Seam(edges[0].index, edges[1].index, a, b, joint, gap, angle, joint.order < wished)
 
 
 def border(model: Model, edge: Edge, side: Side, use: int) -> Border | None:
@@ -368,7 +373,7 @@ def between(one: Array, two: Array) -> Array:
 
 
 def _joint(model: Model, borders: tuple[Border, Border], found: tuple[_Jet, _Jet], wishes: Wishes) -> Joint | str:
-    """The joint between two borders, or why it cannot be kept."""
+    """The joint between two borders, as much of it as has a law; or why there is none."""
     (a, b), ((s, sn, st, snn), (t, tn, tt, tnn)) = borders, found
     length = np.linalg.norm(st, axis=1).mean()
     slip = np.abs(((s - t) * st).sum(axis=1) / np.maximum(np.linalg.norm(st, axis=1), 1e-12 * length)).max()
@@ -393,13 +398,13 @@ def _joint(model: Model, borders: tuple[Border, Border], found: tuple[_Jet, _Jet
             if missed <= limit:
                 joint = Joint(1, p, q, missed=missed, close=close, fit=fit)
                 return joint if order == 1 else _bent(joint, sn, st, snn, tnn)
-    return VARYING
+    return Joint(0, np.ones(1), np.empty(0), close=close)
 
 
-def _bent(joint: Joint, sn: Array, st: Array, snn: Array, tnn: Array) -> Joint | str:
-    """The joint with its second derivatives."""
+def _bent(joint: Joint, sn: Array, st: Array, snn: Array, tnn: Array) -> Joint:
+    """The joint with its second derivatives, where they have a law."""
     if joint.varying:
-        return "curvature joint varies along the seam"
+        return joint
     bend, shear = _components(sn, st, tnn - joint.across[0] ** 2 * snn)
     scale = np.linalg.norm(tnn, axis=1).max() + 1e-300
     fitted = [
@@ -407,7 +412,7 @@ def _bent(joint: Joint, sn: Array, st: Array, snn: Array, tnn: Array) -> Joint |
     ]
     off = sn * (bend - fitted[0])[:, None] + st * (shear - fitted[1])[:, None]
     if np.linalg.norm(off, axis=1).max() > CLOSE * scale:
-        return "curvature joint varies along the seam"
+        return joint
     return replace(joint, order=2, bend=fitted[0], shear=fitted[1])
 
 

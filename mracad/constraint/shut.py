@@ -104,7 +104,9 @@ def shut(
     nets = {i: sheet.net for i, sheet in sheets.items()}
     spaces = {i: (net.u, net.v) for i, net in nets.items()}
     places = [fine_sites((seam.a, seam.b), spaces) for seam in seams]
-    loose, orders = collocation(nets, nets, seams, [share for share, _ in places])
+    f = np.concatenate([net.poles.reshape(-1, 3) for net in nets.values()])
+    f = f - f.mean(axis=0)
+    loose = collocation(nets, nets, seams, [share for share, _ in places])
     scale = min(sheet.scale for sheet in sheets.values())
     curves = [nets[seam.a.surface].evaluate(seam.a.places(_EVENLY)) for seam in seams]
     weight = np.concatenate(
@@ -114,24 +116,28 @@ def shut(
             for order in range(seam.order + 1)
         ]
     )
+    defect, first = loose @ f, 0
+    for seam, (share, _) in zip(seams, places, strict=True):
+        gap, tilt, _ = (slice(first + k * len(share), first + (k + 1) * len(share)) for k in range(3))
+        along = _tangents(nets[seam.a.surface], seam.a, share)
+        defect[gap] -= (1.0 if seam.close else EASED) * amount * across(defect[gap], along)
+        if seam.fit:
+            defect[tilt] *= 1.0 - amount
+        first += (seam.order + 1) * len(share)
     traces = [trace for seam in seams for trace in (seam.a, seam.b)]
     masks = {
         i: sheet.near([t for t in traces if t.surface == i], np.concatenate(curves)) for i, sheet in sheets.items()
     }
     inside = np.flatnonzero(np.concatenate([mask.ravel() for mask in masks.values()]))
-    f = np.concatenate([net.poles.reshape(-1, 3) for net in nets.values()])
-    f = f - f.mean(axis=0)
     start = f + np.concatenate([sheet.offset.reshape(-1, 3) for sheet in sheets.values()])
     size = max(np.linalg.norm(sheet.wanted, axis=-1)[sheet.free].max(initial=0.0) for sheet in sheets.values())
+    size = max(size, tolerances[0], *(seam.opening[0].max() for seam in seams))
     form, pull = [], []
     for i, sheet in sheets.items():
         if masks[i].any():
             fairing = sheet.fairing()
             form.append(fairing.matrix(masks[i]) / (size * scale) ** 2)
             pull.append(fairing.apply(sheet.wanted - sheet.offset)[masks[i]] / (size * scale) ** 2)
-    defect = loose @ f
-    along = [_tangents(nets[s.a.surface], s.a, share) for s, (share, _) in zip(seams, places, strict=True)]
-    defect[orders == 0] -= EASED * amount * across(defect[orders == 0], np.concatenate(along))
     matrix = vstack([loose, exact], format="csr")
     missing = np.concatenate([defect, exact @ start]) - matrix @ start
     weights = diags_array(np.append(weight, np.full(exact.shape[0], STRICT * weight.max())))

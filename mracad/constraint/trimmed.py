@@ -23,8 +23,8 @@ from mracad.bspline.basis import basis
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.net import Curve, Net, curvature
 from mracad.constraint.frozen import CONTINUITY
-from mracad.constraint.seam import CREASE, Wishes, between
-from mracad.model import Edge, Face, Model, Side
+from mracad.constraint.seam import CREASE, Seam, Wishes, between
+from mracad.model import Edge, Face, Model
 
 Array = np.ndarray
 
@@ -78,6 +78,8 @@ class TrimmedSeam:
         Fractions of the edge at which it is judged.
     opening : ndarray (3, q)
         Gap, angle and curvature jump of the input there, as :func:`parted` measures them.
+    close, fit : bool
+        Whether the gap and the tilt of the input are to be pulled shut instead of carried.
     """
 
     edge: int
@@ -86,6 +88,8 @@ class TrimmedSeam:
     order: int
     share: Array
     opening: Array
+    close: bool
+    fit: bool
 
     def excess(self, model: Model, allowed: Sequence[float], more: Sequence[float]) -> Array:
         """Opening ``(q,)`` after an edit, relative to what it may be, the worst of all that the seam keeps.
@@ -103,23 +107,34 @@ class TrimmedSeam:
         return (now / limit[:, None])[: self.order + 1].max(axis=0)
 
 
-def trimmed(model: Model, edge: Edge, sides: Sequence[Side], wishes: Wishes) -> TrimmedSeam | str:
-    """The seam of an edge between two NURBS faces, or why it cannot move."""
-    faces = [model.faces[side.face] for side in sides]
-    if not np.allclose(faces[0].frame[:3, :3], faces[1].frame[:3, :3], rtol=0, atol=1e-12):
+def trimmed(model: Model, edge: Edge, wishes: Wishes) -> TrimmedSeam | str:
+    """The seam of an edge between two NURBS faces along their trim curves, or why it cannot move."""
+    faces = [model.faces[side.face] for side in edge.sides]
+    if not np.allclose(faces[0].frame, faces[1].frame, rtol=0, atol=1e-12):
         return "faces are placed differently"
-    if sides[0].face == sides[1].face:
+    if faces[0] is faces[1]:
         return "a face that meets itself"
-    a, b = (_trace(face, edge) for face in faces)
-    spaces = {t.surface: (model.surfaces[t.surface].net.u, model.surfaces[t.surface].net.v) for t in (a, b)}
-    share = np.sort(np.concatenate([_SHARES, fine_sites((a, b), spaces)[0]]))
-    opening = parted(model, a, b, share)
+    return _judged(model, edge.index, (_trace(faces[0], edge), _trace(faces[1], edge)), wishes)
+
+
+def beside(model: Model, seam: Seam, wishes: Wishes) -> TrimmedSeam | str:
+    """What the joint of a seam does not keep, to the tolerance."""
+    line = KnotVector.clamped([0.0, 1.0], 1)
+    a, b = (Trace(x.face, x.surface, Curve(line, x.places(np.array([0.0, 1.0])))) for x in (seam.a, seam.b))
+    return _judged(model, seam.edge, (a, b), wishes)
+
+
+def _judged(model: Model, edge: int, traces: tuple[Trace, Trace], wishes: Wishes) -> TrimmedSeam | str:
+    spaces = {t.surface: (model.surfaces[t.surface].net.u, model.surfaces[t.surface].net.v) for t in traces}
+    share = np.sort(np.concatenate([_SHARES, fine_sites(traces, spaces)[0]]))
+    opening = parted(model, *traces, share)
     if not np.isfinite(opening[1]).all():
         return "degenerate along the seam"
-    order = CONTINUITY[wishes.keep] if opening[1].max() <= CREASE else 0
+    angle = opening[1].max()
+    order = CONTINUITY[wishes.keep] if angle <= max(CREASE, wishes.fit) else 0
     if order == 2 and not np.isfinite(opening[2]).all():
         return "no curvature along the seam"
-    return TrimmedSeam(edge.index, a, b, order, share, opening)
+    return TrimmedSeam(edge, *traces, order, share, opening, wishes.close_gaps, order > 0 and bool(angle <= wishes.fit))
 
 
 def _trace(face: Face, edge: Edge) -> Trace:
@@ -186,7 +201,7 @@ def fine_sites(traces: tuple[Trace, Trace], spaces: Mapping[int, tuple[KnotVecto
 
 def collocation(
     nets: Mapping[int, Net], ground: Mapping[int, Net], seams: Sequence[TrimmedSeam], shares: Sequence[Array]
-) -> tuple[Any, Array]:
+) -> Any:
     """The conditions of trimmed seams on the control points of nets, laid out one after another.
 
     Parameters
@@ -200,16 +215,15 @@ def collocation(
 
     Returns
     -------
-    matrix : scipy.sparse.csr_array
-    order : ndarray (conditions,)
-        0 for G0, 1 for G1, 2 for G2.
+    scipy.sparse.csr_array (conditions, points)
+        For each seam in turn the conditions of order 0, then those of order 1 and 2 where it keeps them.
     """
     from scipy.sparse import csr_array
 
     sizes = [net.u.count * net.v.count for net in nets.values()]
     first = dict(zip(nets, np.cumsum([0, *sizes])[:-1].tolist(), strict=True))
     entries: list[tuple[Array, Array, Array]] = [(np.empty(0, int), np.empty(0, int), np.empty(0))]
-    orders, count = [np.empty(0, int)], 0
+    count = 0
     for seam, share in zip(seams, shares, strict=True):
         ways = _ways(ground, seam, share)
         for order in range(seam.order + 1):
@@ -226,10 +240,9 @@ def collocation(
                     value += bend[:, :1] * table[1] + bend[:, 1:] * table[2]
                 where = np.repeat(row, index.shape[1])
                 entries.append((where, first[trace.surface] + index.ravel(), sign * value.ravel()))
-            orders.append(np.full(len(share), order))
             count += len(share)
     row, column, value = (np.concatenate(x) for x in zip(*entries, strict=True))
-    return csr_array((value, (row, column)), shape=(count, sum(sizes))), np.concatenate(orders)
+    return csr_array((value, (row, column)), shape=(count, sum(sizes)))
 
 
 def _ways(ground: Mapping[int, Net], seam: TrimmedSeam, share: Array) -> list[tuple[Array, Array]]:

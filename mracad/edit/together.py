@@ -18,10 +18,10 @@ from mracad.bspline.net import Net
 from mracad.constraint.couple import Coupling, Patch
 from mracad.constraint.frozen import Separation, jet_support, separate
 from mracad.constraint.region import meeting
-from mracad.constraint.seam import TRIMMED, UNEVEN, VARYING, Border, Seam, Treatment, Wishes, opening, seams
+from mracad.constraint.seam import TRIMMED, UNEVEN, Border, Seam, Treatment, Wishes, opening, seams
 from mracad.constraint.shut import Sheet, shut
 from mracad.constraint.strip import Coarse, Direction, Line, Strip, line, members, strips
-from mracad.constraint.trimmed import TrimmedSeam, trimmed
+from mracad.constraint.trimmed import TrimmedSeam, beside, trimmed
 from mracad.edit.bound import OVERSHOOT, bounded, deviation
 from mracad.model import Model, Surface
 from mracad.options import Smooth, length
@@ -51,6 +51,9 @@ MOST_POINTS = 40_000
 
 SHORTEST = 1e-2
 """Spans shorter than this, mm, are not halved."""
+
+DEFECT = 1e-6, math.radians(1e-3)
+"""Gap, mm, and angle from which on a seam is worth mending."""
 
 CLUSTER = 1e-6, 1e-4
 """Knots closer than this fraction of the curve, or this in mm, are not set apart."""
@@ -133,7 +136,12 @@ class Together:
         if options.edges == "coupled":
             self.found, self.closing, self.frozen = seams(model, movable, self.wishes)
             self._try_trimmed()
-            idle = (seam for seam in self._every() if not {seam.a.surface, seam.b.surface} & set(coarser))
+            self._supplement()
+            idle = (
+                seam
+                for seam in self._every()
+                if not ({seam.a.surface, seam.b.surface} & set(coarser) or self._to_mend(seam))
+            )
             self._freeze({seam.edge: "nothing to smooth on either side" for seam in idle})
         self.freedom: dict[int, int] = {}
         self.inserted: dict[int, tuple[Array, Array]] = {}
@@ -143,13 +151,31 @@ class Together:
         """Let seams that cannot move exactly move to the gap tolerance."""
         for index, reason in list(self.frozen.items()):
             edge = self.model.edges[index]
-            if reason in (TRIMMED, UNEVEN, VARYING, CROWDED) and len(edge.sides) == 2:
-                seam = trimmed(self.model, edge, edge.sides, self.wishes)
+            if reason in (TRIMMED, UNEVEN, CROWDED) and len(edge.sides) == 2:
+                seam = trimmed(self.model, edge, self.wishes)
                 if isinstance(seam, TrimmedSeam):
                     self.trimmed.append(seam)
                     del self.frozen[index]
                 else:
                     self.frozen[index] = seam
+
+    def _supplement(self) -> None:
+        """Keep to the tolerance what the joints of seams do not keep by a law."""
+        for seam in [seam for seam in self.found if seam.loose]:
+            rest = beside(self.model, seam, self.wishes)
+            if isinstance(rest, TrimmedSeam):
+                self.trimmed.append(rest)
+            else:
+                self._freeze({seam.edge: rest})
+
+    @staticmethod
+    def _to_mend(seam: Seam | TrimmedSeam) -> bool:
+        """Whether a seam has a defect that is to be pulled shut."""
+        if isinstance(seam, Seam):
+            close, fit, gap, angle = seam.joint.close, seam.joint.fit, seam.gap, seam.angle
+        else:
+            close, fit, (gap, angle) = seam.close, seam.fit, seam.opening[:2].max(axis=1)
+        return bool((close and gap > DEFECT[0]) or (fit and angle > DEFECT[1]))
 
     @property
     def moving(self) -> set[int]:
@@ -165,9 +191,9 @@ class Together:
             faces = tuple(side.face for side in self.model.edges[edge].sides)
             if edge in self.frozen:
                 return Treatment(edge, faces, "frozen", self.frozen[edge])
-            if edge in loose:
-                return Treatment(edge, faces, "to tolerance")
             mended = self.mending and edge not in self.closing
+            if edge in loose and not mended:
+                return Treatment(edge, faces, "to tolerance")
             return Treatment(edge, faces, "mended" if mended else "coupled", freedom=self.freedom.get(edge, 0))
 
         return tuple(of(edge) for edge in sorted(self.moving | set(self.frozen)))
