@@ -1,0 +1,93 @@
+"""A noisy panel in two halves that meet along a wavy trim curve, each on a surface of its own."""
+
+import numpy as np
+
+from mracad.bspline.knots import KnotVector
+from mracad.bspline.net import Net
+from samples import make
+from tests.edit import panels
+
+SIZE = 200.0
+LOW, HIGH = 60.0, 150.0
+SHEAR = 0.25
+"""The right half lies on a surface whose parameters are u = x − SHEAR y and v = y."""
+
+
+def waist(y):
+    """x of the trim curve."""
+    return 85.0 + 0.15 * y + 8.0 * np.sin(2 * np.pi * y / SIZE)
+
+
+def surfaces(noise, spans):
+    """The clean panel, and the nets of both halves; the right one, with other knots, takes its heights from the left.
+
+    Parameters
+    ----------
+    noise : float
+        Standard deviation of the heights of the left net's control points, mm.
+    spans : (int, int)
+        Of the right net.
+    """
+    clean, left = panels.whole(16, noise, patches=(2, 2))
+    left.poles[..., :2] = clean.poles[..., :2]
+    return clean, left, _sheared(spans, lambda x, y: left.evaluate(np.stack([x, y], axis=1))[:, 2])
+
+
+def quiet(noise, spans, distance=25.0, seed=3):
+    """Nets of both halves of a cubic surface, which meet exactly; noise on the left only, and away from the seam."""
+
+    def height(x, y):
+        p, q = x / SIZE, y / SIZE
+        return 40 * (p**3 - 2 * p * q * q + q * q - p * p)
+
+    _, left = panels.whole(16, 0.0, patches=(2, 2))
+    u, v = left.u, left.v
+    x, y = left.poles[..., 0], left.poles[..., 1]
+    left.poles[..., 2] = _fitted(u, v, height(x, y))
+    rough = noise * np.random.default_rng(seed).standard_normal(x.shape)
+    left.poles[..., 2] += np.where(np.abs(x - waist(y)) < distance, 0.0, rough)
+    return left, _sheared(spans, height)
+
+
+def _sheared(spans, height):
+    u = KnotVector.clamped(np.linspace(LOW, HIGH, spans[0] + 1), 3)
+    v = KnotVector.clamped(np.linspace(0.0, SIZE, spans[1] + 1), 3)
+    places = np.stack(np.meshgrid(u.greville(), v.greville(), indexing="ij"), axis=-1)
+    places[..., 0] += SHEAR * places[..., 1]
+    heights = _fitted(u, v, height(*places.reshape(-1, 2).T).reshape(places.shape[:2]))
+    return Net(u, v, np.concatenate([places, heights[..., None]], axis=-1))
+
+
+def _fitted(u, v, heights):
+    heights = panels.interpolated(u, u.greville(), heights)
+    return panels.interpolated(v, v.greville(), heights.T).T
+
+
+def document(left, right):
+    """Both halves in one shell."""
+    knots = KnotVector.clamped(np.linspace(0.0, SIZE, 25), 3)
+    y = knots.greville()
+    x = panels.interpolated(knots, y, waist(y))
+    paths = [np.stack([x - shear * y, y], axis=1) for shear in (0.0, SHEAR)]
+    grounds = [make.surface(net.poles, net.u.knots, net.v.knots, (3, 3)) for net in (left, right)]
+    traces = [make.curve(path, knots.knots, 3) for path in paths]
+    curve = make.on_surface(grounds[0], traces[0], 0.0, SIZE, 400)
+    ends = [make.vertex(curve.poles[0]), make.vertex(curve.poles[-1])]
+    seam = make.edge(curve.geometry, tuple(ends), (0.0, SIZE), 1e-2)
+    faces = []
+    for net, ground, path, trace, far in zip(
+        (left, right), grounds, paths, traces, (left.u.domain[0], right.u.domain[1]), strict=True
+    ):
+        row = 0 if far == net.u.domain[0] else -1
+        corners = [make.vertex(net.poles[row, k]) for k in (0, -1)]
+        rails = []
+        for k, (low, high) in enumerate(sorted((far, path[-j][0])) for j in (0, 1)):
+            rail = make.curve(net.poles[:, -k], net.u.knots, 3)
+            pair = (corners[k], ends[k]) if row == 0 else (ends[k], corners[k])
+            rails.append(make.Side(make.edge(rail, pair, (low, high)), make.line2d((0.0, SIZE * k), (1, 0)), k == 0))
+        side = make.edge(make.curve(net.poles[row], net.v.knots, 3), tuple(corners), (0.0, SIZE))
+        outer = make.Side(side, make.line2d((far, 0.0), (0, 1)), row == -1)
+        inner = make.Side(seam, trace, row == 0)
+        loop = [rails[0], inner, rails[1], outer] if row == 0 else [rails[0], outer, rails[1], inner]
+        faces.append(make.face(ground, [loop]))
+    return make.single(make.shell(faces), "halves")
