@@ -237,7 +237,9 @@ def run(
             valid_before = check(document)
         valid_after = valid_before
         after = seams(result.displacement.applied(model)) if result.displacement.offsets else before
-        torn = {i for i in _torn(before, after, result) if model.faces[i].surface is not None} - spoiled.keys()
+        torn = {
+            i for i in _torn(before, after, result, options.keep) if model.faces[i].surface is not None
+        } - spoiled.keys()
         if torn:
             spoiled |= dict.fromkeys(torn, "its seams would not hold")
             continue
@@ -311,8 +313,11 @@ def _refuse_if_stuck(model: Model, result: Edit) -> None:
         )
 
 
-def _torn(before: list[SeamMeasure], after: list[SeamMeasure], edit: Edit) -> set[int]:
-    """Faces of seams that an edit would open, or that were smooth and would not be; against its own intent."""
+def _torn(before: list[SeamMeasure], after: list[SeamMeasure], edit: Edit, keep: str) -> set[int]:
+    """Faces of seams that an edit would open, or that were smooth and would not be; against its own intent.
+
+    Where only the position is to be kept a kink is no harm.
+    """
     intent = {treatment.edge: treatment.how for treatment in edit.edges}
     return {
         face
@@ -320,7 +325,7 @@ def _torn(before: list[SeamMeasure], after: list[SeamMeasure], edit: Edit) -> se
         if intent.get(old.edge) != "mended"
         and (
             (new.gap > old.gap + WIDER and intent.get(old.edge) != "to tolerance")
-            or (old.smooth and new.angle > old.angle + STEEPER)
+            or (keep != "g0" and old.smooth and new.angle > old.angle + STEEPER)
         )
         for face in old.faces
     }

@@ -17,6 +17,9 @@ Array = np.ndarray
 GAP = 1e-2
 """Distance, mm, within which free edges of different faces are taken for a seam (or 1e-6 of the diagonal)."""
 
+BEYOND = 0.2
+"""Share of the first and last steps by which an edge goes on beyond its samples."""
+
 
 def coinciding(model: Model, gap: float = GAP) -> list[tuple[Edge, Side, Side]]:
     """Seams of free edges within ``gap`` of each other: an edge, its side, and the other face's at the same places.
@@ -42,9 +45,9 @@ def coinciding(model: Model, gap: float = GAP) -> list[tuple[Edge, Side, Side]]:
 
 def _candidates(free: list[Edge], lines: list[Array], tolerance: float) -> Iterator[tuple[int, int]]:
     """Pairs (i, j) of edges of one part and different faces where ends and middle of i are near points of j."""
-    low = np.array([line.min(axis=0) for line in lines]) - tolerance
-    high = np.array([line.max(axis=0) for line in lines]) + tolerance
     reach = np.array([np.linalg.norm(np.diff(line, axis=0), axis=1).max() for line in lines]) + tolerance
+    low = np.array([line.min(axis=0) for line in lines]) - reach[:, None]
+    high = np.array([line.max(axis=0) for line in lines]) + reach[:, None]
     part, face = (np.array(x) for x in zip(*((e.part, e.sides[0].face) for e in free), strict=True))
     for i, line in enumerate(lines):
         probes = line[[0, len(line) // 2, -1]]
@@ -55,11 +58,18 @@ def _candidates(free: list[Edge], lines: list[Array], tolerance: float) -> Itera
                 yield i, int(j)
 
 
+def apart(edge: Edge, other: Edge) -> float:
+    """Largest distance of an edge's samples from another edge, mm."""
+    return float(np.linalg.norm(_carried(edge.points, other)[0], axis=1).max())
+
+
 def _carried(points: Array, edge: Edge) -> tuple[Array, Array | None]:
     """Offsets of ``points`` (k, 3) from an edge, and the parameters there on its face (None for a fixed side)."""
     start, chord = edge.points[:-1], np.diff(edge.points, axis=0)
     square = np.maximum((chord**2).sum(axis=1), np.finfo(float).tiny)
-    along = np.clip(((points[:, None] - start) * chord).sum(axis=2) / square, 0.0, 1.0)
+    low, high = np.zeros(len(chord)), np.ones(len(chord))
+    low[0], high[-1] = -BEYOND, 1.0 + BEYOND
+    along = np.clip(((points[:, None] - start) * chord).sum(axis=2) / square, low, high)
     off = ((points[:, None] - start - along[..., None] * chord) ** 2).sum(axis=2)
     segment = off.argmin(axis=1)
     s = along[np.arange(len(points)), segment][:, None]
@@ -67,7 +77,7 @@ def _carried(points: Array, edge: Edge) -> tuple[Array, Array | None]:
     apart = points - on
     tangent = chord[segment] / np.sqrt(square[segment])[:, None]
     shift = (apart * tangent).sum(axis=1, keepdims=True)
-    inner = ((s > 0) & (s < 1)).astype(float)
+    inner = ((s > low[segment][:, None]) & (s < high[segment][:, None])).astype(float)
     uv = edge.sides[0].uv
     return apart - inner * shift * tangent, None if uv is None else _hermite(uv, np.gradient(uv, axis=0), segment, s)
 

@@ -12,13 +12,13 @@ conditions on a displacement; what the input misses them by (gap, tilt) is then 
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from mracad.bspline.knots import Side as Limit
 from mracad.bspline.net import Net
-from mracad.constraint.coincide import GAP, coinciding
+from mracad.constraint.coincide import GAP, apart, coinciding
 from mracad.constraint.frozen import CONTINUITY, ISO, local_span
 from mracad.model import Edge, Face, Model, Side
 
@@ -27,6 +27,9 @@ _Jet = tuple[Array, ...]
 
 TRIMMED, UNEVEN = "trimmed", "parameters differ along the seam"
 """Reasons for which a seam cannot move exactly, though it may to a tolerance."""
+
+WHOLE = 1e-2
+"""Edges that coincide and differ by less than this in length coincide as a whole."""
 
 CREASE = np.radians(1.0)
 """A seam along which the normals differ by more anywhere is a crease: it keeps G0 only."""
@@ -179,10 +182,30 @@ class Treatment:
     freedom: int = 0
 
 
-def seams(
-    model: Model, movable: Collection[int], wishes: Wishes
-) -> tuple[list[Seam], dict[int, tuple[Border, Border]], dict[int, str]]:
-    """Seams that can move exactly.
+@dataclass(frozen=True, eq=False)
+class Seams:
+    """What is known of the edges of the faces that an edit may move.
+
+    Attributes
+    ----------
+    found : list of Seam
+        Those that can move exactly.
+    closing : dict of int to (Border, Border)
+        Closing edges inside a periodic direction, which its spline space keeps as smooth as its knots say by itself.
+    frozen : dict of int to str
+        Every other edge, and why it does not move.
+    twins : dict of int to int
+        Of the frozen ones, free edges that coincide with another one, as a whole.
+    """
+
+    found: list[Seam] = field(default_factory=list)
+    closing: dict[int, tuple[Border, Border]] = field(default_factory=dict)
+    frozen: dict[int, str] = field(default_factory=dict)
+    twins: dict[int, int] = field(default_factory=dict)
+
+
+def seams(model: Model, movable: Collection[int], wishes: Wishes) -> Seams:
+    """The seams of the faces that an edit may move.
 
     Parameters
     ----------
@@ -190,18 +213,9 @@ def seams(
     movable : collection of int
         Faces that the edit may move.
     wishes : Wishes
-
-    Returns
-    -------
-    found : list of Seam
-    closing : dict of int to (Border, Border)
-        Closing edges inside a periodic direction, which its spline space keeps as smooth as its knots say by itself.
-    frozen : dict of int to str
-        Every other edge of a movable face, and why it does not move.
     """
-    found: list[Seam] = []
-    closing: dict[int, tuple[Border, Border]] = {}
-    frozen: dict[int, str] = {}
+    result = Seams()
+    found, closing, frozen = result.found, result.closing, result.frozen
     for edge in model.edges:
         if not any(side.face in movable for side in edge.sides):
             continue
@@ -212,37 +226,51 @@ def seams(
         elif len(edge.sides) > 2:
             frozen[edge.index] = "more than two faces"
         else:
-            result = _seam(model, movable, wishes, (edge, edge), edge.sides)
-            if isinstance(result, Seam):
-                found.append(result)
-            elif isinstance(result, str):
-                frozen[edge.index] = result
+            seam = _seam(model, movable, wishes, (edge, edge), edge.sides)
+            if isinstance(seam, Seam):
+                found.append(seam)
+            elif isinstance(seam, str):
+                frozen[edge.index] = seam
             else:
-                closing[edge.index] = result
+                closing[edge.index] = seam
     for edge, one, two in coinciding(model):
         other = _twin(model, edge, two.face)
         if edge.index not in frozen or (other and other.index not in frozen):
             continue
-        result = "coincides with a part of another edge"
-        if other:
-            result = _seam(model, movable, wishes, (edge, other), (one, other.sides[0]))
-        if isinstance(result, Seam):
-            found.append(result)
-            del frozen[result.edge], frozen[result.twin]
-        elif isinstance(result, str):
-            frozen[edge.index] = result
-    return found, closing, frozen
+        if other is None:
+            frozen[edge.index] = "coincides with a part of another edge"
+            continue
+        seam = _seam(model, movable, wishes, (edge, other), (one, other.sides[0]))
+        if isinstance(seam, Seam):
+            found.append(seam)
+            del frozen[seam.edge], frozen[seam.twin]
+        elif isinstance(seam, str):
+            frozen[edge.index] = seam
+            result.twins[edge.index] = other.index
+    return result
 
 
 def _twin(model: Model, edge: Edge, face: int) -> Edge | None:
-    """The free edge of a face that coincides with another free edge as a whole."""
-    limit = max(GAP, 1e-6 * model.diagonal)
-    for other in model.edges:
-        if other.free and other.sides[0].face == face and other.points.shape == edge.points.shape:
-            apart = [np.abs(points - edge.points).max() for points in (other.points, other.points[::-1])]
-            if min(apart) <= limit:
-                return other
-    return None
+    """The free edge of a face that coincides with another free edge, known to lie on one of that face, as a whole."""
+    length = _length(edge)
+    others = [
+        other
+        for other in model.edges
+        if other.free and other.sides[0].face == face and abs(_length(other) - length) <= WHOLE * length
+    ]
+    nearest = min(others, key=lambda other: apart(edge, other), default=None)
+    return nearest if nearest and apart(edge, nearest) <= max(GAP, 1e-6 * model.diagonal) else None
+
+
+def runs_back(one: Array, other: Array) -> bool:
+    """Whether a curve that coincides with another one runs the other way; both are given by points."""
+    at = np.linspace(0, len(other) - 1, len(one)).round().astype(int)
+    ahead, behind = (np.linalg.norm(one - other[k], axis=1).mean() for k in (at, at[::-1]))
+    return bool(behind < ahead)
+
+
+def _length(edge: Edge) -> float:
+    return float(np.linalg.norm(np.diff(edge.points, axis=0), axis=1).sum())
 
 
 def _seam(
@@ -258,10 +286,8 @@ def _seam(
     a, b = (border(model, edge, side, use) for use, (edge, side) in enumerate(zip(edges, sides, strict=True)))
     if a is None or b is None:
         return TRIMMED
-    if edges[0] is not edges[1]:
-        apart = [np.abs(points - edges[0].points).max() for points in (edges[1].points, edges[1].points[::-1])]
-        if apart[1] < apart[0]:
-            b = replace(b, start=b.stop, stop=b.start)
+    if edges[0] is not edges[1] and runs_back(edges[0].points, edges[1].points):
+        b = replace(b, start=b.stop, stop=b.start)
     fa, fb = model.faces[a.face], model.faces[b.face]
     if not np.allclose(fa.frame[:3, :3], fb.frame[:3, :3], rtol=0, atol=1e-12):
         return "faces are placed differently"

@@ -14,7 +14,7 @@ they are shut to the tolerance (:mod:`mracad.constraint.shut`).
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -23,7 +23,7 @@ from mracad.bspline.basis import basis
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.net import Curve, Net, curvature
 from mracad.constraint.frozen import CONTINUITY
-from mracad.constraint.seam import CREASE, Seam, Wishes, between
+from mracad.constraint.seam import CREASE, UNEVEN, Seam, Wishes, between, runs_back
 from mracad.model import Edge, Face, Model
 
 Array = np.ndarray
@@ -37,6 +37,10 @@ NEAR = 1e-9
 GAUSS = 4
 """Conditions in each piece of a seam between crossings."""
 
+NEWTON = 6
+"""Steps in which the fractions of two edges that belong together are found."""
+
+_EVENLY = np.linspace(0.0, 1.0, SAMPLES)
 _SHARES = 0.5 - 0.5 * np.cos(np.pi * (np.arange(65) + 0.5) / 65)
 
 
@@ -49,21 +53,28 @@ class Trace:
     face, surface : int
     curve : Curve
         In the parameter plane, over the edge's range.
+    law : (ndarray, ndarray), optional
+        Fractions of the seam and the fractions of the curve that belong to them, where these are not the same.
     """
 
     face: int
     surface: int
     curve: Curve
+    law: tuple[Array, Array] | None = None
 
     def places(self, share: Array) -> Array:
-        """Parameters ``(q, 2)`` at fractions of the edge."""
-        start, stop = self.curve.knots.domain
-        return self.curve.evaluate(start + share * (stop - start))[0]
+        """Parameters ``(q, 2)`` at fractions of the seam."""
+        return self.curve.evaluate(self._at(share))[0]
 
     def way(self, share: Array) -> Array:
-        """Derivative of :meth:`places`, ``(q, 2)``."""
+        """Derivative of the curve by its own fraction, in the sense of the seam, ``(q, 2)``."""
         start, stop = self.curve.knots.domain
-        return self.curve.evaluate(start + share * (stop - start), 1)[1] * (stop - start)
+        back = self.law is not None and self.law[1][-1] < self.law[1][0]
+        return self.curve.evaluate(self._at(share), 1)[1] * (start - stop if back else stop - start)
+
+    def _at(self, share: Array) -> Array:
+        start, stop = self.curve.knots.domain
+        return start + (share if self.law is None else np.interp(share, *self.law)) * (stop - start)
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,6 +83,8 @@ class TrimmedSeam:
 
     Attributes
     ----------
+    edge, twin : int
+        The edge; twice, or the two free edges that coincide in an unsewn model.
     order : {0, 1, 2}
         Cross derivatives that the seam keeps.
     share : ndarray (q,)
@@ -83,6 +96,7 @@ class TrimmedSeam:
     """
 
     edge: int
+    twin: int
     a: Trace
     b: Trace
     order: int
@@ -107,24 +121,53 @@ class TrimmedSeam:
         return (now / limit[:, None])[: self.order + 1].max(axis=0)
 
 
-def trimmed(model: Model, edge: Edge, wishes: Wishes) -> TrimmedSeam | str:
-    """The seam of an edge between two NURBS faces along their trim curves, or why it cannot move."""
-    faces = [model.faces[side.face] for side in edge.sides]
+def trimmed(model: Model, edge: Edge, twin: Edge, wishes: Wishes) -> TrimmedSeam | str:
+    """The seam of an edge between two NURBS faces along their trim curves, or why it cannot move.
+
+    Parameters
+    ----------
+    model : Model
+    edge, twin : Edge
+        The edge; twice, or the two free edges that coincide in an unsewn model.
+    wishes : Wishes
+    """
+    faces = [model.faces[i] for i in (edge.sides[0].face, twin.sides[-1].face)]
     if not np.allclose(faces[0].frame, faces[1].frame, rtol=0, atol=1e-12):
         return "faces are placed differently"
     if faces[0] is faces[1]:
         return "a face that meets itself"
-    return _judged(model, edge.index, (_trace(faces[0], edge), _trace(faces[1], edge)), wishes)
+    a, b = _trace(faces[0], edge), _trace(faces[1], twin)
+    if edge is not twin:
+        fractions = _followed(model, a, b, runs_back(edge.points, twin.points))
+        if (np.diff(fractions) * (fractions[-1] - fractions[0]) <= 0).any():
+            return UNEVEN
+        b = replace(b, law=(_EVENLY, fractions))
+    return _judged(model, edge.index, twin.index, (a, b), wishes)
+
+
+def _followed(model: Model, a: Trace, b: Trace, back: bool) -> Array:
+    """Fractions of the curve of b nearest to points at even fractions of a."""
+    points = model.surfaces[a.surface].net.evaluate(a.places(_EVENLY))
+    fractions = _EVENLY[::-1] if back else _EVENLY
+    net = model.surfaces[b.surface].net
+    for _ in range(NEWTON):
+        s, su, sv = net.evaluate(b.places(fractions), 1)
+        way = b.way(fractions)
+        along = su * way[:, :1] + sv * way[:, 1:]
+        step = ((points - s) * along).sum(axis=1) / np.maximum((along**2).sum(axis=1), 1e-300)
+        fractions = np.clip(fractions + step, 0.0, 1.0)
+    ends = [1.0, 0.0] if back else [0.0, 1.0]
+    return np.concatenate([ends[:1], fractions[1:-1], ends[1:]])
 
 
 def beside(model: Model, seam: Seam, wishes: Wishes) -> TrimmedSeam | str:
     """What the joint of a seam does not keep, to the tolerance."""
     line = KnotVector.clamped([0.0, 1.0], 1)
     a, b = (Trace(x.face, x.surface, Curve(line, x.places(np.array([0.0, 1.0])))) for x in (seam.a, seam.b))
-    return _judged(model, seam.edge, (a, b), wishes)
+    return _judged(model, seam.edge, seam.twin, (a, b), wishes)
 
 
-def _judged(model: Model, edge: int, traces: tuple[Trace, Trace], wishes: Wishes) -> TrimmedSeam | str:
+def _judged(model: Model, edge: int, twin: int, traces: tuple[Trace, Trace], wishes: Wishes) -> TrimmedSeam | str:
     spaces = {t.surface: (model.surfaces[t.surface].net.u, model.surfaces[t.surface].net.v) for t in traces}
     share = np.sort(np.concatenate([_SHARES, fine_sites(traces, spaces)[0]]))
     opening = parted(model, *traces, share)
@@ -134,7 +177,8 @@ def _judged(model: Model, edge: int, traces: tuple[Trace, Trace], wishes: Wishes
     order = CONTINUITY[wishes.keep] if angle <= max(CREASE, wishes.fit) else 0
     if order == 2 and not np.isfinite(opening[2]).all():
         return "no curvature along the seam"
-    return TrimmedSeam(edge, *traces, order, share, opening, wishes.close_gaps, order > 0 and bool(angle <= wishes.fit))
+    close, fit = wishes.close_gaps, order > 0 and bool(angle <= wishes.fit)
+    return TrimmedSeam(edge, twin, *traces, order, share, opening, close, fit)
 
 
 def _trace(face: Face, edge: Edge) -> Trace:
@@ -168,7 +212,7 @@ def across(vectors: Array, along: Array) -> Array:
 
 def crossings(trace: Trace, spaces: tuple[KnotVector, KnotVector]) -> Array:
     """Fractions of the edge, 0 and 1 among them, at which a trace crosses the knot lines of a space."""
-    share = np.linspace(0.0, 1.0, SAMPLES)
+    share = _EVENLY
     found = [share[[0, -1]]]
     for knots, x in zip(spaces, trace.places(share).T, strict=True):
         lines = knots.breaks

@@ -133,8 +133,10 @@ class Together:
         self.found: list[Seam] = []
         self.closing: dict[int, tuple[Border, Border]] = {}
         self.frozen: dict[int, str] = {}
+        self.twins: dict[int, int] = {}
         if options.edges == "coupled":
-            self.found, self.closing, self.frozen = seams(model, movable, self.wishes)
+            known = seams(model, movable, self.wishes)
+            self.found, self.closing, self.frozen, self.twins = known.found, known.closing, known.frozen, known.twins
             self._try_trimmed()
             self._supplement()
             idle = (
@@ -151,11 +153,13 @@ class Together:
         """Let seams that cannot move exactly move to the gap tolerance."""
         for index, reason in list(self.frozen.items()):
             edge = self.model.edges[index]
-            if reason in (TRIMMED, UNEVEN, CROWDED) and len(edge.sides) == 2:
-                seam = trimmed(self.model, edge, self.wishes)
+            twin = self.model.edges[self.twins.get(index, index)]
+            if reason in (TRIMMED, UNEVEN, CROWDED) and len({edge.index, twin.index}) + len(edge.sides) == 3:
+                seam = trimmed(self.model, edge, twin, self.wishes)
                 if isinstance(seam, TrimmedSeam):
                     self.trimmed.append(seam)
-                    del self.frozen[index]
+                    self.frozen.pop(index)
+                    self.frozen.pop(twin.index, None)
                 else:
                     self.frozen[index] = seam
 
@@ -180,12 +184,11 @@ class Together:
     @property
     def moving(self) -> set[int]:
         """Edges that move."""
-        exact = {edge for seam in self.found for edge in (seam.edge, seam.twin)}
-        return set(self.closing) | exact | {seam.edge for seam in self.trimmed}
+        return set(self.closing) | {edge for seam in self._every() for edge in (seam.edge, seam.twin)}
 
     def treatments(self) -> tuple[Treatment, ...]:
         """What was done about each edge of a movable face, in edge order."""
-        loose = {seam.edge for seam in self.trimmed}
+        loose = {edge for seam in self.trimmed for edge in (seam.edge, seam.twin)}
 
         def of(edge: int) -> Treatment:
             faces = tuple(side.face for side in self.model.edges[edge].sides)
@@ -238,7 +241,7 @@ class Together:
 
     def _freeze(self, reasons: Mapping[int, str]) -> None:
         self.frozen |= reasons
-        self.frozen |= {seam.twin: reasons[seam.edge] for seam in self.found if seam.edge in reasons}
+        self.frozen |= {seam.twin: reasons[seam.edge] for seam in self._every() if seam.edge in reasons}
         self.found = [seam for seam in self.found if seam.edge not in reasons]
         self.trimmed = [seam for seam in self.trimmed if seam.edge not in reasons]
 

@@ -273,7 +273,10 @@ class Copies:
             For a copy that frozen points take too much of.
         """
         model = self.ground.model
-        found, closing, frozen = seams(model, self.ground.chosen, Wishes(keep))
+        known = seams(model, self.ground.chosen, Wishes(keep))
+        loose = {edge: "joint varies along the seam" for s in known.found if s.loose for edge in (s.edge, s.twin)}
+        closing, frozen = known.closing, known.frozen | loose
+        found = [s for s in known.found if not s.loose]
         joined = [(s, r) for s in found if (r := self._stretch(s, removed)) is not None] if coupled else []
         extra = self._refined([])
         while True:

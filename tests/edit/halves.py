@@ -63,31 +63,44 @@ def _fitted(u, v, heights):
     return panels.interpolated(v, v.greville(), heights.T).T
 
 
-def document(left, right):
-    """Both halves in one shell."""
-    knots = KnotVector.clamped(np.linspace(0.0, SIZE, 25), 3)
-    y = knots.greville()
-    x = panels.interpolated(knots, y, waist(y))
-    paths = [np.stack([x - shear * y, y], axis=1) for shear in (0.0, SHEAR)]
+def document(left, right, sewn=True):
+    """Both halves in one shell; or each with edges of its own, the seam's running opposite ways at different paces."""
     grounds = [make.surface(net.poles, net.u.knots, net.v.knots, (3, 3)) for net in (left, right)]
-    traces = [make.curve(path, knots.knots, 3) for path in paths]
-    curve = make.on_surface(grounds[0], traces[0], 0.0, SIZE, 400)
-    ends = [make.vertex(curve.poles[0]), make.vertex(curve.poles[-1])]
-    seam = make.edge(curve.geometry, tuple(ends), (0.0, SIZE), 1e-2)
     faces = []
-    for net, ground, path, trace, far in zip(
-        (left, right), grounds, paths, traces, (left.u.domain[0], right.u.domain[1]), strict=True
+    edge = None
+    for net, ground, shear, far in zip(
+        (left, right), grounds, (0.0, SHEAR), (left.u.domain[0], right.u.domain[1]), strict=True
     ):
         row = 0 if far == net.u.domain[0] else -1
+        back = not sewn and row == -1
+        knots, path = _path(shear, back)
+        trace = make.curve(path, knots.knots, 3)
+        if edge is None or not sewn:
+            curve = make.on_surface(ground, trace, 0.0, SIZE, 400)
+            points = curve.poles[[-1, 0]] if back else curve.poles[[0, -1]]
+            ends = [make.vertex(point) for point in points]
+            edge = make.edge(curve.geometry, tuple(ends[::-1] if back else ends), (0.0, SIZE), 1e-2)
         corners = [make.vertex(net.poles[row, k]) for k in (0, -1)]
         rails = []
-        for k, (low, high) in enumerate(sorted((far, path[-j][0])) for j in (0, 1)):
+        for k, x in enumerate(sorted(path[[0, -1]].tolist(), key=lambda place: place[1])):
+            low, high = sorted((far, x[0]))
             rail = make.curve(net.poles[:, -k], net.u.knots, 3)
             pair = (corners[k], ends[k]) if row == 0 else (ends[k], corners[k])
             rails.append(make.Side(make.edge(rail, pair, (low, high)), make.line2d((0.0, SIZE * k), (1, 0)), k == 0))
         side = make.edge(make.curve(net.poles[row], net.v.knots, 3), tuple(corners), (0.0, SIZE))
         outer = make.Side(side, make.line2d((far, 0.0), (0, 1)), row == -1)
-        inner = make.Side(seam, trace, row == 0)
+        inner = make.Side(edge, trace, (row == 0) != back)
         loop = [rails[0], inner, rails[1], outer] if row == 0 else [rails[0], outer, rails[1], inner]
         faces.append(make.face(ground, [loop]))
     return make.single(make.shell(faces), "halves")
+
+
+def _path(shear, back):
+    """Knots and control points of the trim curve in the parameter plane; ``back`` from the top down, ever faster."""
+    knots = KnotVector.clamped(np.linspace(0.0, SIZE, 25), 3)
+    y = knots.greville()
+    if back:
+        share = y / SIZE
+        y = SIZE * (1 - share * (0.8 + 0.2 * share))
+    points = np.stack([waist(y) - shear * y, y], axis=1)
+    return knots, panels.interpolated(knots, knots.greville(), points)

@@ -19,9 +19,9 @@ from tests.edit import halves
 NOISE = 0.2
 
 
-def smoothed(left, right, **options):
+def smoothed(left, right, sewn=True, **options):
     """The document's models before and after smoothing (read again from a file), and the report."""
-    document = halves.document(left, right)
+    document = halves.document(left, right, sewn)
     report = job.run(document, smooth, Smooth(scale="30mm", **options))
     stream = io.BytesIO()
     write_step(document, stream)
@@ -37,7 +37,7 @@ def ideal(clean, left):
 
 def seam(model):
     """The measure of the one seam, and points along it."""
-    (measure,) = seams(model)
+    (measure,) = (measure for measure in seams(model) if len(measure.faces) == 2)
     return measure, next(edge.points for edge in model.edges if edge.index == measure.edge)
 
 
@@ -73,6 +73,19 @@ def test_a_trimmed_seam_moves_and_holds(spans):
             assert np.linalg.norm(line - moved, axis=1).max() > NOISE / 4
     print("\nrms beside the seam, mm:", {k: round(x, 4) for k, x in errors.items()})
     assert max(errors["g1"], errors["g2"]) < min(1.25 * errors["ideal"], 0.8 * errors["frozen"])
+
+
+def test_a_model_that_was_never_sewn_moves_like_a_sewn_one():
+    left, right = halves.quiet(NOISE, (10, 20))
+    moved = []
+    for sewn in (True, False):
+        before, after, report = smoothed(left, right, sewn)
+        (old, _), (new, _) = seam(before), seam(after)
+        assert old.sewn is sewn
+        assert sum(t.how == "to tolerance" for t in report.edit.edges) == 2 - sewn
+        assert new.gap <= old.gap + 1e-4 and new.angle <= old.angle + 0.008
+        moved.append(np.concatenate([s.net.poles.reshape(-1, 3) for s in after.surfaces]))
+    assert np.abs(moved[1] - moved[0]).max() < 1e-4
 
 
 @pytest.mark.parametrize("keep", ["g1", "g2"])
