@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mracad.bspline.knots import Side as Limit
-from mracad.bspline.net import curvature
+from mracad.bspline.net import cross, curvature
 from mracad.constraint.coincide import GAP, coinciding
 from mracad.constraint.seam import from_inside
 from mracad.model import Edge, Face, Model, Side
@@ -123,7 +123,7 @@ def _measure(edge: Edge, sewn: bool, sides: tuple[Side, Side], a: Array, b: Arra
     apart -= (apart * edge.tangents).sum(axis=1, keepdims=True) * edge.tangents
     gaps = np.linalg.norm(apart, axis=1)
     one, two = a[:, 3:6], b[:, 3:6]
-    angles = np.degrees(np.arctan2(np.linalg.norm(np.cross(one, two), axis=1), (one * two).sum(axis=1)))
+    angles = np.degrees(np.arctan2(np.linalg.norm(cross(one, two), axis=1), (one * two).sum(axis=1)))
     jumps = np.abs(a[:, 6] - b[:, 6])
     bent = ~np.isnan(jumps)
     size = np.maximum(np.maximum(np.abs(a[:, 6]), np.abs(b[:, 6])), FLAT)[bent]
@@ -164,14 +164,15 @@ def _evaluate(model: Model, uses: list[tuple[Edge, Side]]) -> list[Array]:
     for (surface, limits), members in groups.items():
         net = model.surfaces[surface].net
         uv = np.concatenate([uv for _, uv in members])
-        jets = np.stack([*net.evaluate(uv, 2, limits), net.normals(uv, limits)])
+        point, su, sv, *second = net.evaluate(uv, 2, limits)
+        jets = np.stack([point, su, sv, *second, net.normals(uv, limits, (su, sv))])
         ends = np.cumsum([len(uv) for _, uv in members])[:-1]
         for (i, _), jet in zip(members, np.split(jets, ends, axis=1), strict=True):
             edge, side = uses[i]
             face = model.faces[side.face]
             point, *derivatives, normal = jet @ face.frame[:3, :3].T
             sign = -1 if face.reversed else 1
-            bends = sign * curvature(tuple(derivatives), np.cross(normal, edge.tangents))
+            bends = sign * curvature(tuple(derivatives), cross(normal, edge.tangents))
             result[i] = np.column_stack([point + face.frame[:3, 3], sign * normal, bends])
     return result
 

@@ -190,7 +190,7 @@ class KnotVector:
         """
         x = self.wrap(x, side)
         place = np.searchsorted(self.breaks, x, "right" if side == "right" else "left") - 1
-        span = self.span_index[np.clip(place, 0, self.spans - 1)]
+        span = self.span_index[np.minimum(np.maximum(place, 0), self.spans - 1)]
         return span, x - self.knots[span]
 
     def refined(self, extra_knots: Array | Sequence[float]) -> KnotVector:
