@@ -182,6 +182,14 @@ class Net:
             stack = _surface_quotient(stack)
         return stack if derivatives else stack[0]
 
+    def tangents(self, us: Array, vs: Array, axis: int) -> Array:
+        """Only ``S_u`` (axis 0) or only ``S_v`` (axis 1) on the tensor product of two lists of parameters."""
+        if self.weights is not None:
+            return self.grid(us, vs, 1)[1 + axis]
+        in_u = _collocation(self.u, us, 1 - axis, "right")[-1]
+        in_v = _collocation(self.v, vs, axis, "right")[-1]
+        return in_v.apply(in_u.apply(self.poles, 0), 1)
+
     def normals(
         self,
         uv: Array,
