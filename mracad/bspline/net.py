@@ -215,8 +215,8 @@ class Net:
 
     @cached_property
     def _extent(self) -> float:
-        flat = self.poles.reshape(-1, self.poles.shape[2])
-        return float(np.linalg.norm(flat.max(axis=0) - flat.min(axis=0)))
+        high, low = self.poles.max(axis=0).max(axis=0), self.poles.min(axis=0).min(axis=0)
+        return float(np.linalg.norm(high - low))
 
     def _limits(self, uv: Array, side: tuple[Side, Side]) -> Array:
         """Directions of the normal next to ``uv`` on the way to the middle of the domain."""

@@ -191,4 +191,4 @@ def _spline(curve: Geom2d_Curve, first: float, last: float) -> Geom2d_BSplineCur
 def _segment(line: Geom2d_Curve, first: float, last: float) -> Curve:
     """A straight line over its range."""
     ends = (line.Value(first), line.Value(last))
-    return Curve(KnotVector.clamped([first, last], 1), np.array([point.Coord() for point in ends]), None)
+    return Curve(KnotVector([first, first, last, last], 1), np.array([point.Coord() for point in ends]), None)

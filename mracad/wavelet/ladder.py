@@ -169,7 +169,7 @@ class _Ladder:
 
     def beside(self) -> Array:
         """Sum of the spans before and after each cluster; at the ends twice the one there is (a loop goes on)."""
-        before, after = self.spans[[0, *range(len(self.spans))]], self.spans[[*range(len(self.spans)), -1]]
+        before, after = np.append(self.spans[0], self.spans), np.append(self.spans, self.spans[-1])
         if self.kv.periodic:
             before[0], after[-1] = self.spans[-1], self.spans[0]
         return before + after
