@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from mracad import review
 from mracad.audit.compare import Limits
-from mracad.audit.continuity import SeamMeasure, key, seams
+from mracad.audit.continuity import SeamMeasure, key, remeasured, seams
 from mracad.audit.deviation import Deviation, deviations
 from mracad.audit.verdict import Layer, Verdict
 from mracad.edit.result import Edit
@@ -236,18 +236,18 @@ def run(
             stage("checking the input")(0, 1)
             valid_before = check(document)
         valid_after = valid_before
-        after = seams(result.displacement.applied(model)) if result.displacement.offsets else before
-        torn = {
-            i for i in _torn(before, after, result, options.keep) if model.faces[i].surface is not None
-        } - spoiled.keys()
+        offsets = result.displacement.offsets
+        after = remeasured(result.displacement.applied(model), before, offsets) if offsets else before
+        torn = {i for i in _torn(before, after, result, options.keep) if model.faces[i].surface is not None}
+        torn -= spoiled.keys()
         if torn:
             spoiled |= dict.fromkeys(torn, "its seams would not hold")
             continue
-        if not (apply and result.displacement.offsets):
+        if not (apply and offsets):
             break
         put(document, model, result.displacement)
         stage("checking the result")(0, 1)
-        touched = {f for i in result.displacement.offsets for f in model.surfaces[i].faces}
+        touched = {f for i in offsets for f in model.surfaces[i].faces}
         moved = check(document, faces=touched)
         worse = _worse(valid_before, moved)
         if not worse:

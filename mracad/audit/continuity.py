@@ -9,17 +9,19 @@ direction n × t, the curvature jump is |κ_a − κ_b|; relative, it is divided
 from __future__ import annotations
 
 from collections import defaultdict
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
 
 from mracad.bspline.knots import Side as Limit
-from mracad.bspline.net import curvature
+from mracad.bspline.net import Net, cross, curvature
 from mracad.constraint.coincide import GAP, coinciding
 from mracad.constraint.seam import from_inside
 from mracad.model import Edge, Face, Model, Side
 
 Array = np.ndarray
+_Pair = tuple[Edge, bool, tuple[Side, Side]]
 
 SMOOTH = 1.0
 """Degrees: a seam whose largest angle is below this counts as smooth in summaries."""
@@ -85,15 +87,15 @@ class SeamSummary:
 
 def seams(model: Model, every: bool = False) -> list[SeamMeasure]:
     """Measure every seam that touches a NURBS face (or just every one), in edge order; coinciding free edges last."""
-    pairs = [(edge, *edge.sides) for edge in model.edges if len(edge.sides) == 2 and not edge.degenerate]
-    pairs = [pair for pair in pairs if len(pair[0].points) and (every or _nurbs(pair))]
-    jets = _evaluate(model, [(edge, side) for edge, *sides in pairs for side in sides])
-    found = [_measure(edge, True, (a, b), jets[2 * i], jets[2 * i + 1]) for i, (edge, a, b) in enumerate(pairs)]
-    matched = [m for m in coinciding(model, TORN if every else GAP) if every or _nurbs((m[0], m[1], m[2]))]
-    jets = _evaluate(model, [(edge, side) for edge, *sides in matched for side in sides])
-    return found + [
-        _measure(edge, False, (a, b), jets[2 * i], jets[2 * i + 1]) for i, (edge, a, b) in enumerate(matched)
-    ]
+    return _measured(model, _pairs(model, every))
+
+
+def remeasured(model: Model, before: list[SeamMeasure], moved: Collection[int]) -> list[SeamMeasure]:
+    """What :func:`seams` measures after some surfaces ``moved``, from what it measured ``before``."""
+    pairs = _pairs(model)
+    touched = [any(model.faces[side.face].surface in moved for side in sides) for _, _, sides in pairs]
+    fresh = iter(_measured(model, [pair for pair, new in zip(pairs, touched, strict=True) if new]))
+    return [next(fresh) if new else old for old, new in zip(before, touched, strict=True)]
 
 
 def summary(measures: list[SeamMeasure], smooth: frozenset[tuple[int, tuple[int, int]]] | None = None) -> SeamSummary:
@@ -113,8 +115,18 @@ def key(measure: SeamMeasure) -> tuple[int, tuple[int, int]]:
     return measure.edge, measure.faces
 
 
-def _nurbs(pair: tuple[Edge, Side, Side]) -> bool:
-    return pair[1].uv is not None or pair[2].uv is not None
+def _pairs(model: Model, every: bool = False) -> list[_Pair]:
+    """The edges of :func:`seams`, whether they are sewn, and the two faces' views of them."""
+    sewn: list[_Pair] = [
+        (e, True, (e.sides[0], e.sides[1])) for e in model.edges if len(e.sides) == 2 and len(e.points)
+    ]
+    matched: list[_Pair] = [(e, False, (a, b)) for e, a, b in coinciding(model, TORN if every else GAP)]
+    return [pair for pair in sewn + matched if every or any(side.uv is not None for side in pair[2])]
+
+
+def _measured(model: Model, pairs: list[_Pair]) -> list[SeamMeasure]:
+    jets = _evaluate(model, [(edge, side) for edge, _, sides in pairs for side in sides])
+    return [_measure(*pair, *jets[2 * i : 2 * i + 2]) for i, pair in enumerate(pairs)]
 
 
 def _measure(edge: Edge, sewn: bool, sides: tuple[Side, Side], a: Array, b: Array) -> SeamMeasure:
@@ -123,7 +135,7 @@ def _measure(edge: Edge, sewn: bool, sides: tuple[Side, Side], a: Array, b: Arra
     apart -= (apart * edge.tangents).sum(axis=1, keepdims=True) * edge.tangents
     gaps = np.linalg.norm(apart, axis=1)
     one, two = a[:, 3:6], b[:, 3:6]
-    angles = np.degrees(np.arctan2(np.linalg.norm(np.cross(one, two), axis=1), (one * two).sum(axis=1)))
+    angles = np.degrees(np.arctan2(np.linalg.norm(cross(one, two), axis=1), (one * two).sum(axis=1)))
     jumps = np.abs(a[:, 6] - b[:, 6])
     bent = ~np.isnan(jumps)
     size = np.maximum(np.maximum(np.abs(a[:, 6]), np.abs(b[:, 6])), FLAT)[bent]
@@ -148,7 +160,7 @@ def _measure(edge: Edge, sewn: bool, sides: tuple[Side, Side], a: Array, b: Arra
 def _evaluate(model: Model, uses: list[tuple[Edge, Side]]) -> list[Array]:
     """Points, outward normals and curvatures across the edge ``(k, 7)`` of each side, seen from inside its face.
 
-    Surfaces are evaluated once for all their sides.
+    Faces are evaluated once for all their edges.
     """
     result: list[Array] = [np.empty((0, 7))] * len(uses)
     groups: dict[tuple[int, tuple[Limit, Limit]], list[tuple[int, Array]]] = defaultdict(list)
@@ -158,24 +170,24 @@ def _evaluate(model: Model, uses: list[tuple[Edge, Side]]) -> list[Array]:
             result[i] = np.column_stack([side.points, side.normals, bends])  # type: ignore[list-item]
         else:
             face = model.faces[side.face]
-            surface = _surface(face)
-            uv, limits = from_inside(face, model.surfaces[surface].net, edge.index, side.uv)
-            groups[surface, limits].append((i, uv))
-    for (surface, limits), members in groups.items():
-        net = model.surfaces[surface].net
+            uv, limits = from_inside(face, _net(model, face), edge.index, side.uv)
+            groups[side.face, limits].append((i, uv))
+    for (number, limits), members in groups.items():
+        face = model.faces[number]
+        net, frame, sign = _net(model, face), face.frame, -1 if face.reversed else 1
         uv = np.concatenate([uv for _, uv in members])
-        jets = np.stack([*net.evaluate(uv, 2, limits), net.normals(uv, limits)])
+        point, su, sv, *second = net.evaluate(uv, 2, limits)
+        jets = np.stack([point, su, sv, *second, net.normals(uv, limits, (su, sv))]) @ frame[:3, :3].T
+        point, *derivatives, normal = jets
+        tangents = np.concatenate([uses[i][0].tangents for i, _ in members])
+        bends = sign * curvature(tuple(derivatives), cross(normal, tangents))
+        table = np.column_stack([point + frame[:3, 3], sign * normal, bends])
         ends = np.cumsum([len(uv) for _, uv in members])[:-1]
-        for (i, _), jet in zip(members, np.split(jets, ends, axis=1), strict=True):
-            edge, side = uses[i]
-            face = model.faces[side.face]
-            point, *derivatives, normal = jet @ face.frame[:3, :3].T
-            sign = -1 if face.reversed else 1
-            bends = sign * curvature(tuple(derivatives), np.cross(normal, edge.tangents))
-            result[i] = np.column_stack([point + face.frame[:3, 3], sign * normal, bends])
+        for (i, _), part in zip(members, np.split(table, ends), strict=True):
+            result[i] = part
     return result
 
 
-def _surface(face: Face) -> int:
+def _net(model: Model, face: Face) -> Net:
     assert face.surface is not None
-    return face.surface
+    return model.surfaces[face.surface].net

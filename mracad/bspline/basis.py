@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import lru_cache
 
 import numpy as np
@@ -36,24 +37,30 @@ def basis(kv: KnotVector, x: Array, derivative: int = 0, side: Side = "right") -
     de Boor, *A Practical Guide to Splines*, ch. X: every term of the recursion is non-negative, hence stable at any
     degree.
     """
+    first, values = jet(kv, x, (derivative,), side)
+    return first, values[:, 0]
+
+
+def jet(kv: KnotVector, x: Array, orders: Sequence[int], side: Side = "right") -> tuple[Array, Array]:
+    """As :func:`basis` for derivatives of several orders at once; values ``(q, len(orders), d + 1)``."""
     at = np.atleast_1d(np.asarray(x, dtype=float))
     if at.ndim == 1 and len(at) <= SHORT:
-        return _remembered(kv, at.tobytes(), derivative, side)
-    return _computed(kv, at, derivative, side)
+        return _remembered(kv, at.tobytes(), tuple(orders), side)
+    return _computed(kv, at, orders, side)
 
 
 @lru_cache(maxsize=4096)
-def _remembered(kv: KnotVector, at: bytes, derivative: int, side: Side) -> tuple[Array, Array]:
+def _remembered(kv: KnotVector, at: bytes, orders: tuple[int, ...], side: Side) -> tuple[Array, Array]:
     """Few places are often asked for again: the samples of a seam before and after an edit."""
-    first, values = _computed(kv, np.frombuffer(at), derivative, side)
+    first, values = _computed(kv, np.frombuffer(at), orders, side)
     for array in (first, values):
         array.setflags(write=False)
     return first, values
 
 
-def _computed(kv: KnotVector, at: Array, derivative: int, side: Side) -> tuple[Array, Array]:
+def _computed(kv: KnotVector, at: Array, orders: Sequence[int], side: Side) -> tuple[Array, Array]:
     span, offset = kv.locate(at, side)
-    return span - kv.degree, local_values(kv, span, offset, derivative).T
+    return span - kv.degree, np.stack([values.T for values in _local(kv, span, offset, orders)], axis=1)
 
 
 def local_values(kv: KnotVector, span: Array, offset: Array, derivative: int = 0) -> Array:
@@ -62,24 +69,32 @@ def local_values(kv: KnotVector, span: Array, offset: Array, derivative: int = 0
     ``offset`` has shape ``(q,)``, or ``(d - derivative, q)`` for the polar form (blossom) of the functions' polynomial
     pieces on the span, one argument a row.
     """
+    return _local(kv, span, offset, (derivative,))[0]
+
+
+def _local(kv: KnotVector, span: Array, offset: Array, orders: Sequence[int]) -> list[Array]:
+    """The values of :func:`local_values` for derivatives of several orders: they share the first steps."""
     d = kv.degree
-    if derivative > d:
-        return np.zeros((d + 1, len(span)))
     around = kv.knots[span + np.arange(1 - d, d + 1)[:, None]] - kv.knots[span]
     left, right = around[:d], around[d:]
-    arguments = np.broadcast_to(offset, (d - derivative, len(span)))
-    values = np.ones((1, len(span)))
-    for k in range(1, d + 1):
-        low, high, old = left[d - k :], right[:k], values
-        values = np.zeros((k + 1, len(span)))
-        if k <= d - derivative:
-            x = arguments[k - 1]
-            values[:-1] = (high - x) / (high - low) * old
-            values[1:] += (x - low) / (high - low) * old
-        else:
-            slope = k / (high - low) * old
-            values[:-1] = -slope
-            values[1:] += slope
+    values = [np.ones((1, len(span)))]
+    for k in range(1, d - min(orders) + 1):
+        low, high, x = left[d - k :], right[:k], offset if offset.ndim == 1 else offset[k - 1]
+        width = high - low
+        values.append(np.zeros((k + 1, len(span))))
+        values[k][:-1] = (high - x) / width * values[k - 1]
+        values[k][1:] += (x - low) / width * values[k - 1]
+    return [_differentiated(left, right, values[d - r], r) if r <= d else np.zeros((d + 1, len(span))) for r in orders]
+
+
+def _differentiated(left: Array, right: Array, values: Array, order: int) -> Array:
+    """Derivatives of the functions of full degree from values of those of a degree lower by ``order``."""
+    d = len(left)
+    for k in range(d - order + 1, d + 1):
+        slope = k / (right[:k] - left[d - k :]) * values
+        values = np.zeros((k + 1, slope.shape[1]))
+        values[:-1] = -slope
+        values[1:] += slope
     return values
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -84,9 +84,18 @@ def gram(kv: KnotVector, derivative: int = 0, weights: Array | None = None) -> G
     Gram
         In parameter units: its entries scale with ``length ** (1 - 2 k)``.
     """
+    return _remembered(kv, derivative) if weights is None else _computed(kv, derivative, checked_weights(kv, weights))
+
+
+@lru_cache(maxsize=512)
+def _remembered(kv: KnotVector, derivative: int) -> Gram:
+    """Surfaces often share their knots."""
+    return _computed(kv, derivative, np.ones(kv.spans))
+
+
+def _computed(kv: KnotVector, derivative: int, weights: Array) -> Gram:
     span, offset, quadrature = gauss(kv, kv.degree + 1)
-    if weights is not None:
-        quadrature = quadrature * checked_weights(kv, weights)[:, None]
+    quadrature = quadrature * weights[:, None]
     points = quadrature.shape[1]
     values = local_values(kv, np.repeat(span, points), offset.ravel(), derivative).reshape(-1, *quadrature.shape)
     local = np.einsum("asg,bsg,sg->sab", values, values, quadrature, optimize=True)

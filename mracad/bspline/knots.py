@@ -66,7 +66,7 @@ class KnotVector:
             raise UsageError(f"a knot vector of degree {d} needs at least {2 * d + 2} knots")
         if not np.isfinite(flat).all():
             raise UsageError("a knot is not a finite number")
-        if (np.diff(flat) < 0).any():
+        if (flat[1:] < flat[:-1]).any():
             raise UsageError("knots decrease")
         low, high = flat[d], flat[-d - 1]
         if not low < high:
@@ -76,7 +76,8 @@ class KnotVector:
             given, flat = flat, _periodic_layout(np.append(breaks, high), np.append(mults, mults[0]), d)
             if len(given) != len(flat) or np.abs(given - flat).max() > 1e-9 * (high - low):
                 raise UsageError("knots of a periodic vector do not repeat with its period")
-        breaks, mults = np.unique(flat, return_counts=True)
+        first = np.append(0, np.flatnonzero(flat[1:] > flat[:-1]) + 1)
+        breaks, mults = flat[first], np.diff(first, append=len(flat))
         inside = (breaks >= low) & (breaks <= high)
         if mults.max() > d + 1:
             raise UsageError(f"a knot of multiplicity {mults.max()} exceeds degree {d} + 1")
@@ -190,7 +191,7 @@ class KnotVector:
         """
         x = self.wrap(x, side)
         place = np.searchsorted(self.breaks, x, "right" if side == "right" else "left") - 1
-        span = self.span_index[np.clip(place, 0, self.spans - 1)]
+        span = self.span_index[np.minimum(np.maximum(place, 0), self.spans - 1)]
         return span, x - self.knots[span]
 
     def refined(self, extra_knots: Array | Sequence[float]) -> KnotVector:

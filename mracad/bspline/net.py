@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from math import comb
 
 import numpy as np
 
-from mracad.bspline.basis import basis
+from mracad.bspline.basis import basis, jet
 from mracad.bspline.knots import Array, KnotVector, Side
 from mracad.bspline.refine import refinement
 from mracad.bspline.rows import Rows
@@ -152,8 +153,8 @@ class Net:
     def _sums(
         self, poles: Array, uv: Array, derivatives: int, orders: list[tuple[int, int]], side: tuple[Side, Side]
     ) -> Array:
-        first_u, in_u = _stacked(self.u, uv[:, 0], derivatives, side[0])
-        first_v, in_v = _stacked(self.v, uv[:, 1], derivatives, side[1])
+        first_u, in_u = jet(self.u, uv[:, 0], range(derivatives + 1), side[0])
+        first_v, in_v = jet(self.v, uv[:, 1], range(derivatives + 1), side[1])
         row = (first_u[:, None] + np.arange(self.u.degree + 1)) % self.u.count
         column = (first_v[:, None] + np.arange(self.v.degree + 1)) % self.v.count
         local = poles.reshape(-1, poles.shape[2])[row[:, :, None] * self.v.count + column[:, None, :]]
@@ -173,35 +174,49 @@ class Net:
             ``S``; or ``(S, Su, Sv)`` for ``derivatives=1``.
         """
         poles = _homogeneous(self.poles, self.weights)
-        in_u = [_collocation(self.u, us, r, side[0]) for r in range(derivatives + 1)]
-        in_v = [_collocation(self.v, vs, r, side[1]) for r in range(derivatives + 1)]
+        in_u = _collocation(self.u, us, derivatives, side[0])
+        in_v = _collocation(self.v, vs, derivatives, side[1])
         along_u = [rows.apply(poles, 0) for rows in in_u]
         stack = tuple(in_v[s].apply(along_u[r], 1) for total in range(derivatives + 1) for r, s in _pairs(total))
         if self.weights is not None:
             stack = _surface_quotient(stack)
         return stack if derivatives else stack[0]
 
-    def normals(self, uv: Array, side: tuple[Side, Side] = ("right", "right")) -> Array:
+    def tangents(self, us: Array, vs: Array, axis: int) -> Array:
+        """Only ``S_u`` (axis 0) or only ``S_v`` (axis 1) on the tensor product of two lists of parameters."""
+        if self.weights is not None:
+            return self.grid(us, vs, 1)[1 + axis]
+        in_u = _collocation(self.u, us, 1 - axis, "right")[-1]
+        in_v = _collocation(self.v, vs, axis, "right")[-1]
+        return in_v.apply(in_u.apply(self.poles, 0), 1)
+
+    def normals(
+        self,
+        uv: Array,
+        side: tuple[Side, Side] = ("right", "right"),
+        tangents: tuple[Array, Array] | None = None,
+    ) -> Array:
         """Unit normals ``S_u × S_v / |…|``, ``(q, 3)``.
 
         Where the surface is degenerate (a collapsed side, a cusp) the limit from the middle of the domain is taken, by
         the second derivatives or, where those say nothing either, from a point nearby; NaN where there is none.
+        ``tangents`` are ``S_u`` and ``S_v``, where they are known.
         """
         uv = np.asarray(uv, dtype=float).reshape(-1, 2)
-        _, su, sv = self.evaluate(uv, 1, side)
+        su, sv = tangents or self.evaluate(uv, 1, side)[1:]
         lengths = [np.linalg.norm(x, axis=1) for x in (su, sv)]
         floor = [1e-7 * (self._extent / kv.period) for kv in (self.u, self.v)]
-        normal = np.cross(su, sv)
+        normal = cross(su, sv)
         bad = ~(np.linalg.norm(normal, axis=1) > 1e-9 * lengths[0] * lengths[1])
         bad |= (lengths[0] < floor[0]) | (lengths[1] < floor[1])
         if bad.any():
             normal[bad] = self._limits(uv[bad], side)
         return _unit(normal)
 
-    @property
+    @cached_property
     def _extent(self) -> float:
-        flat = self.poles.reshape(-1, self.poles.shape[2])
-        return float(np.linalg.norm(flat.max(axis=0) - flat.min(axis=0)))
+        high, low = self.poles.max(axis=0).max(axis=0), self.poles.min(axis=0).min(axis=0)
+        return float(np.linalg.norm(high - low))
 
     def _limits(self, uv: Array, side: tuple[Side, Side]) -> Array:
         """Directions of the normal next to ``uv`` on the way to the middle of the domain."""
@@ -210,12 +225,12 @@ class Net:
         inward = np.where(inward == 0, high - low, inward)
         _, su, sv, suu, suv, svv = self.evaluate(uv, 2, side)
         e, f = inward[:, :1], inward[:, 1:]
-        normal = e * (np.cross(suu, sv) + np.cross(su, suv)) + f * (np.cross(suv, sv) + np.cross(su, svv))
+        normal = e * (cross(suu, sv) + cross(su, suv)) + f * (cross(suv, sv) + cross(su, svv))
         size = self._extent**2 / ((high - low).prod())
         bad = ~(np.linalg.norm(normal, axis=1) > 1e-6 * size)
         if bad.any():
             _, su, sv = self.evaluate(uv[bad] + 1e-4 * inward[bad], 1)
-            near = np.cross(su, sv)
+            near = cross(su, sv)
             near[~(np.linalg.norm(near, axis=1) > 1e-13 * size)] = np.nan
             normal[bad] = near
         return normal
@@ -233,6 +248,12 @@ class Net:
         if v != self.v:
             poles = refinement(self.v, v).apply(poles, 1)
         return Net(u, v, *_euclidean(poles, self.weights is not None))
+
+
+def cross(a: Array, b: Array) -> Array:
+    """Cross products of vectors ``(…, 3)``: those of numpy, whose general treatment of axes costs more than they."""
+    i, j = [1, 2, 0], [2, 0, 1]
+    return a[..., i] * b[..., j] - a[..., j] * b[..., i]
 
 
 def curvature(derivatives: tuple[Array, ...], direction: Array) -> Array:
@@ -254,7 +275,7 @@ def curvature(derivatives: tuple[Array, ...], direction: Array) -> Array:
     """
     su, sv, suu, suv, svv = derivatives
     e, f, g, p, q = ((x * y).sum(axis=1) for x, y in ((su, su), (su, sv), (sv, sv), (su, direction), (sv, direction)))
-    normal = np.cross(su, sv)
+    normal = cross(su, sv)
     with np.errstate(invalid="ignore", divide="ignore"):
         determinant = e * g - f * f
         a, b = (p * g - q * f) / determinant, (q * e - p * f) / determinant
@@ -276,15 +297,10 @@ def _pairs(total: int) -> list[tuple[int, int]]:
     return [(total - b, b) for b in range(total + 1)]
 
 
-def _stacked(kv: KnotVector, x: Array, derivatives: int, side: Side) -> tuple[Array, Array]:
-    """First function and ``(q, derivatives + 1, d + 1)`` values of functions and derivatives."""
-    parts = [basis(kv, x, r, side) for r in range(derivatives + 1)]
-    return parts[0][0], np.stack([values for _, values in parts], axis=1)
-
-
-def _collocation(kv: KnotVector, x: Array, derivative: int, side: Side) -> Rows:
-    first, values = basis(kv, x, derivative, side)
-    return Rows(first, np.ascontiguousarray(values), kv.count, kv.periodic)
+def _collocation(kv: KnotVector, x: Array, derivatives: int, side: Side) -> list[Rows]:
+    """Collocation matrices of the derivatives up to the given one."""
+    first, values = jet(kv, x, range(derivatives + 1), side)
+    return [Rows(first, np.ascontiguousarray(part), kv.count, kv.periodic) for part in values.swapaxes(0, 1)]
 
 
 def _homogeneous(poles: Array, weights: Array | None) -> Array:

@@ -80,8 +80,11 @@ class Rows:
         moved = np.moveaxis(c, axis, 0)
         flat = moved.reshape(self.columns, -1)
         out = np.zeros((len(self.start), flat.shape[1]))
+        term = np.empty_like(out)
         for column, value in zip(self.index.T, self.values.T, strict=True):
-            out += value[:, None] * flat[column]
+            np.take(flat, column, axis=0, out=term, mode="clip")
+            term *= value[:, None]
+            out += term
         return np.moveaxis(out.reshape(-1, *moved.shape[1:]), 0, axis)
 
     def apply_transposed(self, c: Array, axis: int = 0) -> Array:

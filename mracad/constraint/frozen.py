@@ -175,9 +175,9 @@ def local_span(knots: KnotVector, at: float) -> float:
     start, end = knots.domain
     if knots.periodic:
         at = start + (at - start) % (end - start)
-    cell = int(np.clip(np.searchsorted(breaks, at, side="right") - 1, 0, len(breaks) - 2))
-    near = np.diff(breaks)[max(cell - 1, 0) : cell + 2]
-    return float(near.min())
+    cell = min(max(int(breaks.searchsorted(at, side="right")) - 1, 0), len(breaks) - 2)
+    near = breaks[max(cell - 1, 0) : cell + 3]
+    return float((near[1:] - near[:-1]).min())
 
 
 def _meeting(knots: KnotVector, low: float, high: float) -> Array:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -19,6 +20,8 @@ MARGIN = 1e-9
 
 DEPTH = 24
 """Most halvings of one Bézier piece on the walk over the knot grid."""
+
+_REGIONS: WeakKeyDictionary[Face, dict[tuple[KnotVector, KnotVector], Region]] = WeakKeyDictionary()
 
 
 @dataclass(frozen=True, eq=False)
@@ -208,4 +211,7 @@ def _covered(net: Net, chords: Array) -> Array:
 
 def face_region(net: Net, face: Face) -> Region:
     """The :class:`Region` of a face on its surface ``net``; its crossed cells are in the order of the trims."""
-    return region(net, [trim.curve for trim in face.trims])
+    known = _REGIONS.setdefault(face, {})
+    if (net.u, net.v) not in known:
+        known[net.u, net.v] = region(net, [trim.curve for trim in face.trims])
+    return known[net.u, net.v]

@@ -17,7 +17,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from mracad.bspline.knots import Side as Limit
-from mracad.bspline.net import Net
+from mracad.bspline.net import Net, cross
 from mracad.constraint.coincide import GAP, apart, coinciding
 from mracad.constraint.frozen import CONTINUITY, ISO, local_span
 from mracad.model import Edge, Face, Model, Side
@@ -289,7 +289,7 @@ def _seam(
     if edges[0] is not edges[1] and runs_back(edges[0].points, edges[1].points):
         b = replace(b, start=b.stop, stop=b.start)
     fa, fb = model.faces[a.face], model.faces[b.face]
-    if not np.allclose(fa.frame[:3, :3], fb.frame[:3, :3], rtol=0, atol=1e-12):
+    if np.abs(fa.frame[:3, :3] - fb.frame[:3, :3]).max() > 1e-12:
         return "faces are placed differently"
     if a.surface == b.surface and a.axis == b.axis:
         net = model.surfaces[a.surface].net
@@ -390,12 +390,12 @@ def _opening(model: Model, borders: tuple[Border, Border], found: tuple[_Jet, _J
 def _outward(model: Model, border: Border, across: Array, along: Array) -> Array:
     """Outward normals, not of unit length, from the derivatives across and along a border."""
     turned = model.faces[border.face].reversed != (border.stop < border.start)
-    return (-1 if turned else 1) * np.cross(*((across, along) if border.axis == 0 else (along, across)))
+    return (-1 if turned else 1) * cross(*((across, along) if border.axis == 0 else (along, across)))
 
 
 def between(one: Array, two: Array) -> Array:
     """Angles between vectors."""
-    return np.arctan2(np.linalg.norm(np.cross(one, two), axis=1), (one * two).sum(axis=1))
+    return np.arctan2(np.linalg.norm(cross(one, two), axis=1), (one * two).sum(axis=1))
 
 
 def _joint(model: Model, borders: tuple[Border, Border], found: tuple[_Jet, _Jet], wishes: Wishes) -> Joint | str:

@@ -7,7 +7,6 @@ from OCP.BRep import BRep_Tool
 from OCP.BRepTools import BRepTools
 from OCP.Geom import Geom_BezierSurface, Geom_BSplineSurface
 from OCP.GeomConvert import GeomConvert
-from OCP.gp import gp_Pnt
 from OCP.TColStd import TColStd_Array1OfInteger, TColStd_Array1OfReal
 from OCP.TopAbs import TopAbs_FORWARD
 from OCP.TopLoc import TopLoc_Location
@@ -19,7 +18,7 @@ from mracad.model import Displacement, Model, Offset, Surface
 from mracad.occ.convert import lay
 from mracad.occ.document import Document, label_key
 from mracad.occ.follow import follow
-from mracad.occ.geometry import basis, nets, spline
+from mracad.occ.geometry import basis, nets, set_poles, spline
 from mracad.occ.settings import quiet
 from mracad.occ.topology import edge_uses
 
@@ -65,7 +64,7 @@ def restore(document: Document, model: Model, displacement: Displacement) -> Non
             surface = model.surfaces[index]
             handle = basis(BRep_Tool.Surface_s(document.faces[surface.faces[0]], TopLoc_Location()))
             if nets([handle])[0].poles.shape == surface.net.poles.shape:
-                _set(handle, np.argwhere(displacement.offsets[index].poles.any(axis=2)), surface.net.poles)
+                set_poles(handle, surface.net.poles)
             else:
                 _lay_all(document, surface, spline(surface.net))
         _forget(document)
@@ -113,13 +112,7 @@ def _move(surface: Geom_BSplineSurface | Geom_BezierSurface, offset: Offset) -> 
     poles = nets([surface])[0].poles
     if poles.shape != offset.poles.shape:
         raise MracadError(f"offsets of shape {offset.poles.shape} for a surface of {poles.shape} control points")
-    _set(surface, np.argwhere(offset.poles.any(axis=2)), poles + offset.poles)
-
-
-def _set(surface: Geom_BSplineSurface | Geom_BezierSurface, places: Array, poles: Array) -> None:
-    """Set the control points at ``places`` (k, 2) to those of ``poles`` (nu, nv, 3)."""
-    for (i, j), pole in zip((places + 1).tolist(), poles[tuple(places.T)].tolist(), strict=True):
-        surface.SetPole(i, j, gp_Pnt(*pole))
+    set_poles(surface, np.where(offset.poles.any(axis=2, keepdims=True), poles + offset.poles, poles))
 
 
 def _moved_edges(model: Model, displacement: Displacement) -> list[int]:

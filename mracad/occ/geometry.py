@@ -1,7 +1,7 @@
 """Curves and surfaces out of the kernel in bulk.
 
-Asking for poles one at a time costs a microsecond each; the kernel's binary writer hands over the same numbers at a
-fraction of that, and numpy reads them where they lie.
+Asking for poles one at a time costs a microsecond each, setting them several; the kernel's binary writer and reader
+hand over the same numbers at a fraction of that, and numpy reads and writes them where they lie.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import io
 from collections.abc import Sequence
 
 import numpy as np
-from OCP.BinTools import BinTools_Curve2dSet, BinTools_SurfaceSet
+from OCP.BinTools import BinTools_Curve2dSet, BinTools_CurveSet, BinTools_SurfaceSet
 from OCP.Geom import Geom_BezierSurface, Geom_BSplineSurface, Geom_RectangularTrimmedSurface, Geom_Surface
 from OCP.Geom2d import Geom2d_BSplineCurve, Geom2d_Curve, Geom2d_Line, Geom2d_TrimmedCurve
 from OCP.Geom2dConvert import Geom2dConvert
@@ -23,6 +23,7 @@ from mracad.bspline.net import Curve, Net
 
 Array = np.ndarray
 _KNOTS = np.dtype([("knot", "<f8"), ("mult", "<i4")])
+_SPLINE = 7  # the kernel's number for a B-spline curve
 _SAME_RANGE = 1e-9  # relative to the range: a curve whose domain differs by less is used as it is
 
 
@@ -51,6 +52,29 @@ def nets(surfaces: Sequence[Geom_Surface]) -> list[Net]:
         collection.Add(surface)
     stream = _Stream(collection)
     return [_net(stream, isinstance(surface, Geom_BezierSurface)) for surface in surfaces]
+
+
+def set_poles(surface: Geom_BSplineSurface | Geom_BezierSurface, poles: Array) -> None:
+    """Give a surface other control points ``(nu, nv, 3)``, in place; weights stay.
+
+    The kernel takes them from the columns' polygons.
+    """
+    count, polygons = poles.shape[:2]
+    table = np.zeros(
+        polygons,
+        [
+            ("type", "u1"), ("rational", "u1"), ("periodic", "u1"), ("degree", "<u2"), ("poles", "<i4"),
+            ("knots", "<i4"), ("pole", "<f8", (count, 3)), ("knot", _KNOTS, count),
+        ],
+    )  # fmt: skip
+    table["type"], table["degree"], table["poles"], table["knots"] = _SPLINE, 1, count, count
+    table["pole"] = poles.swapaxes(0, 1)
+    table["knot"]["knot"], table["knot"]["mult"] = np.arange(count), 1
+    table["knot"]["mult"][:, [0, -1]] = 2
+    columns = BinTools_CurveSet()
+    columns.Read(io.BytesIO(b"Curves %d\n" % polygons + table.tobytes()))
+    for j in range(1, polygons + 1):
+        surface.SetPoleCol(j, columns.Curve(j).Poles())
 
 
 def spline(net: Net) -> Geom_BSplineSurface:
@@ -167,4 +191,4 @@ def _spline(curve: Geom2d_Curve, first: float, last: float) -> Geom2d_BSplineCur
 def _segment(line: Geom2d_Curve, first: float, last: float) -> Curve:
     """A straight line over its range."""
     ends = (line.Value(first), line.Value(last))
-    return Curve(KnotVector.clamped([first, last], 1), np.array([point.Coord() for point in ends]), None)
+    return Curve(KnotVector([first, first, last, last], 1), np.array([point.Coord() for point in ends]), None)

@@ -17,7 +17,7 @@ from OCP.TopAbs import TopAbs_FORWARD, TopAbs_REVERSED
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS, TopoDS_Edge, TopoDS_Face
 
-from mracad.bspline.net import Net, curvature
+from mracad.bspline.net import Net, cross, curvature
 from mracad.errors import FileError, UsageError
 from mracad.model import Edge, Face, Model, Side, Surface, Trim
 from mracad.occ.convert import conversion
@@ -257,8 +257,8 @@ def _wall(found: _Found, index: int) -> Callable[[_Use, Array, Array], tuple[Arr
             surface.D2(u, v, point, du, dv, duu, dvv, duv)
             rows.append(point.Coord() + du.Coord() + dv.Coord() + duu.Coord() + duv.Coord() + dvv.Coord())
         feet, su, sv, *second = np.array(rows).reshape(-1, 6, 3).swapaxes(0, 1)
-        normals = _unit(np.cross(su, sv))
-        bends = sign * curvature((su, sv, *second), np.cross(normals, tangents))
+        normals = _unit(cross(su, sv))
+        bends = sign * curvature((su, sv, *second), cross(normals, tangents))
         return feet, sign * normals, bends
 
     return on_surface

@@ -122,10 +122,8 @@ def arc_lengths(net: Net, direction: int) -> Array:
     places = (along.knots[span][:, None] + offset).ravel()
     low, _ = across.domain
     others = low + across.period * (np.arange(_POSITIONS) + 0.5) / _POSITIONS
-    if direction == 0:
-        speed = np.linalg.norm(net.grid(places, others, 1)[1], axis=2).mean(axis=1)
-    else:
-        speed = np.linalg.norm(net.grid(others, places, 1)[2], axis=2).mean(axis=0)
+    us, vs = (places, others) if direction == 0 else (others, places)
+    speed = np.linalg.norm(net.tangents(us, vs, direction), axis=2).mean(axis=1 - direction)
     return (speed.reshape(weight.shape) * weight).sum(axis=1)
 
 
@@ -171,7 +169,7 @@ class _Ladder:
 
     def beside(self) -> Array:
         """Sum of the spans before and after each cluster; at the ends twice the one there is (a loop goes on)."""
-        before, after = self.spans[[0, *range(len(self.spans))]], self.spans[[*range(len(self.spans)), -1]]
+        before, after = np.append(self.spans[0], self.spans), np.append(self.spans, self.spans[-1])
         if self.kv.periodic:
             before[0], after[-1] = self.spans[-1], self.spans[0]
         return before + after

@@ -86,6 +86,8 @@ def test_grid_is_evaluate_on_a_tensor_product(kind_u, rational):
     for a, b in zip(net.grid(us, vs, 1), net.evaluate(uv, 1), strict=True):
         np.testing.assert_allclose(a.reshape(-1, 3), b, atol=1e-12 * np.abs(b).max())
     np.testing.assert_allclose(net.grid(us, vs).reshape(-1, 3), net.evaluate(uv), atol=1e-12)
+    for axis in (0, 1):
+        np.testing.assert_array_equal(net.tangents(us, vs, axis), net.grid(us, vs, 1)[1 + axis])
 
 
 def test_many_points_are_evaluated_in_blocks(monkeypatch):

@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 from mracad import job
-from mracad.audit.continuity import seams
+from mracad.audit.continuity import remeasured, seams
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.net import Net
 from mracad.edit.smooth import smooth
+from mracad.model import Displacement, Offset
 from mracad.occ.step import read_step, write_step
 from mracad.occ.view import view
 from mracad.options import Smooth
@@ -213,3 +214,15 @@ def test_a_t_junction_moves():
     gap, angle = holds(view(document))
     assert coupled(report) == 3 and report.valid_after.valid
     assert gap <= 1e-9 and angle <= 1e-5
+
+
+@pytest.mark.parametrize("sewn", [True, False])
+def test_only_seams_of_moved_faces_are_measured_anew(sewn):
+    clean, _ = panels.whole(8, 0.0)
+    model = view(panels.document(panels.cut(clean, (2, 3)), sewn=sewn))
+    poles = model.surfaces[0].net.poles
+    moved = Displacement({0: Offset(np.random.default_rng(0).standard_normal(poles.shape))}).applied(model)
+    before = seams(model)
+    after = remeasured(moved, before, {0})
+    assert after == seams(moved)
+    assert [m is not old for m, old in zip(after, before, strict=True)] == [0 in m.faces for m in before]
