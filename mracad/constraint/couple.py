@@ -21,12 +21,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
 
-from mracad.bspline.basis import basis
+from mracad.bspline.basis import jet
 from mracad.bspline.gram import Gram, gram
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.knots import Side as Limit
@@ -167,14 +167,14 @@ def _jet(net: Net, border: Border, at: Array, order: int, limit: Limit) -> tuple
     """
     across, along = (net.u, net.v)[:: 1 - 2 * border.axis]
     place = np.array([border.at])
-    in_n = [basis(across, place, r, border.limit) for r in range(order + 1)]
-    in_t = [basis(along, at, r, limit) for r in range(order + 1)]
-    line = (in_n[0][0][:, None] + np.arange(across.degree + 1)) % across.count
-    step = (in_t[0][0][:, None] + np.arange(along.degree + 1)) % along.count
+    first_n, in_n = jet(across, place, range(order + 1), border.limit)
+    first_t, in_t = jet(along, at, range(order + 1), limit)
+    line = (first_n[:, None] + np.arange(across.degree + 1)) % across.count
+    step = (first_t[:, None] + np.arange(along.degree + 1)) % along.count
     stride = (net.v.count, 1)[:: 1 - 2 * border.axis]
     index = (line[:, :, None] * stride[0] + step[:, None, :] * stride[1]).reshape(len(at), -1)
     table = {
-        (i, j): (in_n[i][1][:, :, None] * in_t[j][1][:, None, :]).reshape(len(at), -1)
+        (i, j): (in_n[:, i, :, None] * in_t[:, j, None, :]).reshape(len(at), -1)
         for i in range(order + 1)
         for j in range(order + 1 - i)
     }
@@ -517,6 +517,7 @@ class _Space:
         return flat if len(self.inverses) == 2 else self.solve(self.lift.T @ (self.gram @ flat))
 
 
+@lru_cache(maxsize=64)
 def _inverse(matrix: Gram) -> Callable[[Array], Array]:
     """The inverse of a Gram matrix as a function of right-hand sides ``(n, k)``."""
     if matrix.shape[0] > DENSE:
@@ -535,6 +536,7 @@ def _wavelets(base: KnotVector, lifted: KnotVector) -> Any:
     return csr_array((value, (row, column)), shape=found.shape)
 
 
+@lru_cache(maxsize=256)
 def _lumped(knots: KnotVector) -> Array:
     """∫ N_i, the row sums of the Gram matrix, with the same for the outermost functions as for whole ones."""
     return gram(knots).apply(np.ones(knots.count))

@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from mracad.bspline.basis import basis
+from mracad.bspline.basis import jet
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.net import Curve, Net, curvature
 from mracad.constraint.frozen import CONTINUITY
@@ -316,13 +316,13 @@ def _components(su: Array, sv: Array, vector: Array) -> Array:
 
 def _jet(net: Net, uv: Array, order: int) -> tuple[Array, list[Array]]:
     """Control points ``(q, k)``, and the rational basis functions there with their derivatives."""
-    in_u = [basis(net.u, uv[:, 0], r) for r in range(order + 1)]
-    in_v = [basis(net.v, uv[:, 1], r) for r in range(order + 1)]
-    row = (in_u[0][0][:, None] + np.arange(net.u.degree + 1)) % net.u.count
-    column = (in_v[0][0][:, None] + np.arange(net.v.degree + 1)) % net.v.count
+    first_u, in_u = jet(net.u, uv[:, 0], range(order + 1))
+    first_v, in_v = jet(net.v, uv[:, 1], range(order + 1))
+    row = (first_u[:, None] + np.arange(net.u.degree + 1)) % net.u.count
+    column = (first_v[:, None] + np.arange(net.v.degree + 1)) % net.v.count
     index = (row[:, :, None] * net.v.count + column[:, None, :]).reshape(len(uv), -1)
     table = [
-        (in_u[i][1][:, :, None] * in_v[j][1][:, None, :]).reshape(len(uv), -1)
+        (in_u[:, i, :, None] * in_v[:, j, None, :]).reshape(len(uv), -1)
         for i, j in ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))[: (1, 3, 6)[order]]
     ]
     if net.weights is None:
