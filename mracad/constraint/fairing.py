@@ -150,7 +150,7 @@ class Fairing:
         origin = target.mean(axis=(0, 1))
         known = np.where(mask, target - origin, given - origin)
         wanted = _both(self.mass[0].__matmul__, self.mass[1].__matmul__, target - origin)
-        residual = (wanted - self.apply(known)) * mask
+        residual = (wanted - self._apply(known)) * mask
         change = np.zeros_like(known)
         direction = precondition(residual)
         rho = (residual * direction).sum()
@@ -158,7 +158,7 @@ class Fairing:
         for _ in range(MOST_STEPS):
             if rho <= RESIDUAL**2 * start or rho == 0.0:
                 break
-            image = self.apply(direction) * mask
+            image = self._apply(direction) * mask
             step = rho / (direction * image).sum()
             change += step * direction
             residual -= step * image
@@ -167,17 +167,7 @@ class Fairing:
             direction = preconditioned + rho / previous * direction
         return np.where(mask, target + change, given)
 
-    def matrix(self, points: Array) -> Any:
-        """(A_u ⊗ A_v) for some control points, a mask (nu, nv), as a sparse matrix."""
-        from scipy.sparse import csr_array, kron
-
-        frame = [np.flatnonzero(points.any(axis=1)), np.flatnonzero(points.any(axis=0))]
-        parts = [csr_array(a)[lines][:, lines] for a, lines in zip(self.stiff, frame, strict=True)]
-        inside = np.flatnonzero(points[np.ix_(*frame)])
-        return kron(*parts, format="csr")[inside][:, inside]
-
-    def apply(self, net: Array) -> Array:
-        """(A_u ⊗ A_v) times a net (nu, nv, k)."""
+    def _apply(self, net: Array) -> Array:
         return _both(self.stiff[0].__matmul__, self.stiff[1].__matmul__, net)
 
 

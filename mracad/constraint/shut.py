@@ -3,12 +3,14 @@
 With f the input of all surfaces, s where the edit would have them, C the conditions of the trimmed seams at the Gauss
 points of their pieces between knot lines and L those of the other seams,
 
-    x = argmin Σ q(x − s) / (σ Λ)² + Σ w |C x − c|² / (τ² Λ),      c = C f, its gaps made a little smaller,
+    x = argmin (x − s)ᵀ K (x − s) / (σ Λ)² + Σ w |C x − c|² / (τ² Λ),      c = C f, its gaps made a little smaller,
+    K = M_u ⊗ M_v + ℓ² (T_u ⊗ M_v + M_u ⊗ T_v),   M = diag(∫ N_i),   T_ij = ∫ N_i' N_j'   (arc length, mm),   ℓ = Λ / 5,
 
-over the free control points within a wavelength of the trimmed seams, on whatever surface, L x kept; q(x − s) the
-fairing form of :mod:`mracad.constraint.fairing`, σ the largest displacement wanted, Λ the wavelength of the edit, w arc
-lengths (all mm), τ the tolerance of a condition.  The form makes the change as smooth as the edit is: it can be had on
-both sides of a seam alike, and what is left of a gap falls with the fourth power of the spans.
+over the free control points within a wavelength of the trimmed seams, on whatever surface, L x kept; σ the largest
+displacement wanted, Λ the wavelength of the edit, w arc lengths (all mm), τ the tolerance of a condition.  Where points
+nearby are frozen, x − s fades within ℓ and never exceeds what they miss (the energy is that of a membrane: a plate's
+would go on beyond a noisy frozen border in its slope).  A change that fades so is much the same on both sides of a
+seam; what is left of a gap falls as the spans are halved.
 """
 
 from __future__ import annotations
@@ -19,17 +21,17 @@ from typing import Any
 
 import numpy as np
 
+from mracad.bspline.gram import gram
 from mracad.bspline.net import Net
 from mracad.constraint.definite import definite
-from mracad.constraint.fairing import Fairing
 from mracad.constraint.region import meeting, supported
 from mracad.constraint.trimmed import Trace, TrimmedSeam, across, collocation, fine_sites
 from mracad.wavelet.ladder import arc_lengths
 
 Array = np.ndarray
 
-BORDER = 0.5
-"""The noise that the fairing form expects at frozen points: between none and as much as everywhere."""
+FADE = 5.0
+"""The wavelength is so many times the length ℓ in which a change fades."""
 
 STRICT = 1e3
 """How much heavier than the conditions of trimmed seams those of the others are."""
@@ -73,13 +75,17 @@ class Sheet:
         apart = KDTree(points).query(self.net.poles.reshape(-1, 3), distance_upper_bound=self.scale)[0]
         return self.free & (supported(self.net, cells) | np.isfinite(apart).reshape(self.free.shape))
 
-    def fairing(self) -> Fairing:
-        """The fairing form; without the energy where the spans are too uneven for it."""
-        parts = self.net.u, self.net.v, (arc_lengths(self.net, 0), arc_lengths(self.net, 1)), self.scale
-        try:
-            return Fairing(*parts, BORDER)
-        except ValueError:
-            return Fairing(*parts, 1.0)
+    def form(self) -> Any:
+        """K, on the control points in row-major order."""
+        from scipy.sparse import diags_array, kron
+
+        mass, stretch = [], []
+        for axis, knots in enumerate((self.net.u, self.net.v)):
+            lengths = arc_lengths(self.net, axis)
+            speed = np.maximum(lengths, 1e-6 * lengths.max()) / np.diff(knots.breaks)
+            mass.append(diags_array(gram(knots, weights=speed).apply(np.ones(knots.count))))
+            stretch.append((self.scale / FADE) ** 2 * gram(knots, 1, weights=1.0 / speed).tocsr())
+        return (kron(*mass) + kron(stretch[0], mass[1]) + kron(mass[0], stretch[1])).tocsr()
 
 
 def shut(
@@ -135,9 +141,10 @@ def shut(
     form, pull = [], []
     for i, sheet in sheets.items():
         if masks[i].any():
-            fairing = sheet.fairing()
-            form.append(fairing.matrix(masks[i]) / (size * scale) ** 2)
-            pull.append(fairing.apply(sheet.wanted - sheet.offset)[masks[i]] / (size * scale) ** 2)
+            own = np.flatnonzero(masks[i])
+            rows = sheet.form()[own] / (size * scale) ** 2
+            form.append(rows[:, own])
+            pull.append(rows @ (sheet.wanted - sheet.offset).reshape(-1, 3))
     matrix = vstack([loose, exact], format="csr")
     missing = np.concatenate([defect, exact @ start]) - matrix @ start
     weights = diags_array(np.append(weight, np.full(exact.shape[0], STRICT * weight.max())))

@@ -19,10 +19,11 @@ from mracad.bspline.basis import basis
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.net import Net
 from mracad.constraint.fairing import Fairing, border_noise
-from mracad.constraint.frozen import Separation, reached, separate
+from mracad.constraint.frozen import REFINED_SHARE, Separation, halvings, reached, separate
 from mracad.edit.bound import OVERSHOOT, bounded, deviation
+from mracad.edit.group import Moved, Setting
 from mracad.edit.result import Edit, FaceOutcome, Status
-from mracad.edit.together import Moved, Together
+from mracad.edit.together import Together
 from mracad.model import Displacement, Face, Model, Offset, Surface
 from mracad.options import Smooth, length
 from mracad.wavelet.ladder import arc_lengths, ladder_for_scale, rungs_by_level
@@ -35,12 +36,6 @@ KINK = math.radians(0.1)
 
 DETAIL = 1e-7
 """Least change of a control point, mm, that counts as detail: the kernel's coincidence tolerance."""
-
-REFINED_POINTS = 10_000
-"""Most control points to which a net is refined in search of free ones."""
-
-REFINED_SHARE = 1 / 16
-"""Share of the visible points that should be free after refinement."""
 
 
 def smooth(
@@ -72,7 +67,7 @@ def smooth(
     works = [_SurfaceSmoothing(model, surface, movable, options) for surface in model.surfaces]
     coarser = {work.index for work in works if work.coarser_knots(scale)}
     spans, creases = {w.index: w.spans for w in works}, {w.index: w.creases for w in works}
-    together = Together(model, movable, coarser, options, spans, creases)
+    together = Together(Setting(model, movable, options, spans, creases), coarser)
     moved = together.smoothed(scale, bound)
     outcomes: dict[int, FaceOutcome] = {}
     offsets: dict[int, Offset] = {}
@@ -258,17 +253,8 @@ class _SurfaceSmoothing:
 
     def _refine(self, faces: list[Face], edited: Collection[int], target: _Target) -> tuple[Array, Array, Array] | None:
         """Halve knot spans, the longer ones first, until enough of the visible points are free."""
-        net = self.net
-        u_knots, v_knots = np.empty(0), np.empty(0)
         best = None
-        while net.poles.shape[0] * net.poles.shape[1] < REFINED_POINTS:
-            spans = arc_lengths(net, 0), arc_lengths(net, 1)
-            halves_u, halves_v = (
-                ((k.breaks[:-1] + k.breaks[1:]) / 2)[s > max(spans[0].max(), spans[1].max()) / 2]
-                for k, s in zip(_pair(net), spans, strict=True)
-            )
-            u_knots, v_knots = np.sort(np.r_[u_knots, halves_u]), np.sort(np.r_[v_knots, halves_v])
-            net = self.net.refined(u_knots, v_knots)
+        for net, u_knots, v_knots in halvings(self.net):
             separation = separate(net, faces, edited, self.options.keep, self.moving)
             fine = [
                 Net(self.net.u, self.net.v, self.net.poles + part, self.net.weights).refined(u_knots, v_knots).poles
@@ -279,11 +265,12 @@ class _SurfaceSmoothing:
                 continue
             spans = arc_lengths(net, 0), arc_lengths(net, 1)
             best = net, spans, separation, _Target(net.poles + fine[0], fine[1], fine[2], target.scale)
+            extra = u_knots, v_knots
             if separation.free.sum() >= REFINED_SHARE * separation.visible.sum():
                 break
         if best is None:
             return None
-        return self._solve(*best), u_knots, v_knots
+        return self._solve(*best), *extra
 
 
 def _pair(net: Net) -> tuple[KnotVector, KnotVector]:
