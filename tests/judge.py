@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
+from collections.abc import Collection
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -64,29 +65,33 @@ def kernel_copy(source: Path, target: Path) -> Path:
     return target
 
 
-def assert_as_good(result: Verdict, yardstick: Verdict, angles: bool = True) -> None:
+LOOSE = 1e-4, 0.01
+"""Gap, mm, that a seam that moved to the tolerance may have, and how much its angle may have grown, degrees."""
+
+
+def assert_as_good(result: Verdict, yardstick: Verdict, angles: bool = True, loose: Collection[tuple] = ()) -> None:
     """The output is as good as the kernel's own copy of the input.
 
-    ``angles`` is off for refined faces: the reader lays new curves on them (within the old tolerance), and where the
+    ``loose`` are pairs of faces whose seams moved to the tolerance.  ``angles`` is off for refined faces: the reader lays new curves on them (within the old tolerance), and where the
     normal turns quickly it turns a few thousandths of a degree at those.
     """
     new, old = result.validity, yardstick.validity
     assert new.valid or not old.valid, new.failures[:5]
     assert (new.solids, new.shells, new.faces) == (old.solids, old.shells, old.faces)
     assert new.free_edges <= old.free_edges
-    assert result.tolerance <= yardstick.tolerance + 1e-7
+    assert result.tolerance <= max(yardstick.tolerance, LOOSE[0] if loose else 0.0) + 1e-7
     ours, theirs = _by_faces(result.seams), _by_faces(yardstick.seams)
     assert ours.keys() == theirs.keys()
     for faces, found in ours.items():
         before = theirs[faces]
         assert len(found) == len(before)
         for new_gap, old_gap in zip(*(sorted(m.gap for m in each) for each in (found, before)), strict=True):
-            assert new_gap <= old_gap + 1e-7, faces
+            assert new_gap <= max(old_gap, LOOSE[0] if faces in loose else 0.0) + 1e-7, faces
         if not angles:
             continue
         smooth = [sorted(m.angle for m in each if m.smooth) for each in (found, before)]
         for new_angle, old_angle in zip(*smooth, strict=True):
-            assert new_angle <= old_angle + 1e-4, faces
+            assert new_angle <= old_angle + (LOOSE[1] if faces in loose else 1e-4), faces
 
 
 def _by_faces(measures: list[SeamMeasure]) -> dict[tuple[int, int], list[SeamMeasure]]:

@@ -17,7 +17,7 @@ Array = np.ndarray
 GAP = 1e-2
 """Distance, mm, within which free edges of different faces are taken for a seam (or 1e-6 of the diagonal)."""
 
-BEYOND = 0.2
+BEYOND = 0.125
 """Share of the first and last steps by which an edge goes on beyond its samples."""
 
 
@@ -68,8 +68,11 @@ def _carried(points: Array, edge: Edge) -> tuple[Array, Array | None]:
     start, chord = edge.points[:-1], np.diff(edge.points, axis=0)
     square = np.maximum((chord**2).sum(axis=1), np.finfo(float).tiny)
     low, high = np.zeros(len(chord)), np.ones(len(chord))
-    low[0], high[-1] = -BEYOND, 1.0 + BEYOND
-    along = np.clip(((points[:, None] - start) * chord).sum(axis=2) / square, low, high)
+    along = ((points[:, None] - start) * chord).sum(axis=2) / square
+    middle = along[len(points) // 2]
+    if middle[0] > 0 and middle[-1] < 1:
+        low[0], high[-1] = -BEYOND, 1.0 + BEYOND
+    along = np.clip(along, low, high)
     off = ((points[:, None] - start - along[..., None] * chord) ** 2).sum(axis=2)
     segment = off.argmin(axis=1)
     s = along[np.arange(len(points)), segment][:, None]

@@ -17,7 +17,7 @@ from mracad.errors import MracadError
 from mracad.model import Displacement, Model, Offset, Surface
 from mracad.occ.convert import lay
 from mracad.occ.document import Document, label_key
-from mracad.occ.follow import follow
+from mracad.occ.follow import following
 from mracad.occ.geometry import basis, nets, set_poles, spline
 from mracad.occ.settings import quiet
 from mracad.occ.topology import edge_uses
@@ -40,18 +40,18 @@ def apply(document: Document, model: Model, displacement: Displacement) -> None:
         The view of the document that the displacement was made for.
     displacement : Displacement
     """
-    with quiet():
+    if not displacement.offsets:
+        return
+    with quiet(), following(document, _moved_edges(model, displacement)):
         for index, offset in sorted(displacement.offsets.items()):
             surface = model.surfaces[index]
             handle = _handle(document, surface, refined=bool(offset.u_knots.size or offset.v_knots.size))
             if isinstance(handle, Geom_BSplineSurface):
                 _refine(handle, offset)
             _move(handle, offset)
-        if displacement.offsets:
-            _forget(document)
-            faces = (face for index in displacement.offsets for face in model.surfaces[index].faces)
-            document.moved |= {label_key(document.part_of(face).label) for face in faces}
-            follow(document, _moved_edges(model, displacement))
+        _forget(document)
+        faces = (face for index in displacement.offsets for face in model.surfaces[index].faces)
+        document.moved |= {label_key(document.part_of(face).label) for face in faces}
 
 
 def restore(document: Document, model: Model, displacement: Displacement) -> None:
@@ -59,7 +59,7 @@ def restore(document: Document, model: Model, displacement: Displacement) -> Non
 
     Faces that were converted stay on their (undisplaced) NURBS surfaces.
     """
-    with quiet():
+    with quiet(), following(document, _moved_edges(model, displacement)):
         for index in sorted(displacement.offsets):
             surface = model.surfaces[index]
             handle = basis(BRep_Tool.Surface_s(document.faces[surface.faces[0]], TopLoc_Location()))
@@ -68,7 +68,6 @@ def restore(document: Document, model: Model, displacement: Displacement) -> Non
             else:
                 _lay_all(document, surface, spline(surface.net))
         _forget(document)
-        follow(document, _moved_edges(model, displacement))
 
 
 def _handle(document: Document, surface: Surface, refined: bool) -> Geom_BSplineSurface | Geom_BezierSurface:
@@ -115,24 +114,25 @@ def _move(surface: Geom_BSplineSurface | Geom_BezierSurface, offset: Offset) -> 
     set_poles(surface, np.where(offset.poles.any(axis=2, keepdims=True), poles + offset.poles, poles))
 
 
-def _moved_edges(model: Model, displacement: Displacement) -> list[int]:
-    """The edges along which some side moves."""
-    sides: dict[int, list[tuple[int, Array]]] = {index: [] for index in displacement.offsets}
+def _moved_edges(model: Model, displacement: Displacement) -> dict[int, int]:
+    """The edges along which some side moves, each with a face that moves there."""
+    sides: dict[int, list[tuple[int, int, Array]]] = {index: [] for index in displacement.offsets}
     for edge in model.edges:
         for side in edge.sides:
             index = model.faces[side.face].surface
             if index in sides and side.uv is not None and not edge.degenerate:
-                sides[index].append((edge.index, side.uv))
-    moved: set[int] = set()
+                sides[index].append((edge.index, side.face, side.uv))
+    moved: dict[int, int] = {}
     for index, offset in displacement.offsets.items():
         if sides[index]:
             net = model.surfaces[index].net.refined(offset.u_knots, offset.v_knots)
             change = Net(net.u, net.v, offset.poles, net.weights)
-            along = change.evaluate(np.concatenate([uv for _, uv in sides[index]]))
+            along = change.evaluate(np.concatenate([uv for *_, uv in sides[index]]))
             far = np.linalg.norm(along, axis=1) > _STILL
-            which = np.repeat([edge for edge, _ in sides[index]], [len(uv) for _, uv in sides[index]])
-            moved.update(which[far].tolist())
-    return sorted(moved)
+            starts = np.cumsum([0, *(len(uv) for *_, uv in sides[index][:-1])])
+            beyond = np.logical_or.reduceat(far, starts)
+            moved |= {edge: face for (edge, face, _), off in zip(sides[index], beyond, strict=True) if off}
+    return dict(sorted(moved.items()))
 
 
 def _forget(document: Document) -> None:

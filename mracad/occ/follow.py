@@ -2,44 +2,63 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 
 from OCP.BRep import BRep_Builder, BRep_Tool
 from OCP.BRepAdaptor import BRepAdaptor_Curve
 from OCP.BRepLib import BRepLib
+from OCP.gp import gp_Pnt, gp_Vec
 from OCP.TopAbs import TopAbs_FORWARD
 from OCP.TopExp import TopExp
-from OCP.TopoDS import TopoDS
+from OCP.TopoDS import TopoDS, TopoDS_Edge, TopoDS_Face
+from OCP.TopTools import TopTools_MapOfShape
 
 from mracad.occ.document import Document
 
 _TOLERANCE = 1e-7  # memory units
 
 
-def follow(document: Document, edges: Iterable[int]) -> None:
-    """Give edges whose faces have moved 3D curves on their faces, and their vertices the ends of those curves.
+@contextmanager
+def following(document: Document, edges: Mapping[int, int]) -> Iterator[None]:
+    """Let edges follow faces that are moved inside the block: new 3D curves on the faces, and vertices that move as the
+    ends of the edges' curves on the faces do.
 
     A stale curve must never be left to the kernel, which would hide it in a large tolerance.  The faces of an edge
-    must have moved together: its curves on them stay.
+    must move together: its curves on them stay.  A vertex stays as far from the ends of its edges as it was: those that
+    do not move get no gap there that a reader would close.
 
     Parameters
     ----------
     document : Document
-    edges : iterable of int
-        Indices of edges, none of them degenerate.
+    edges : mapping of int to int
+        Indices of edges, none of them degenerate, each with a face that it bounds.
     """
     builder = BRep_Builder()
-    chosen = [TopoDS.Edge_s(document.edges[index].Oriented(TopAbs_FORWARD)) for index in edges]
-    for edge in chosen:
+    chosen = [
+        (TopoDS.Edge_s(document.edges[edge].Oriented(TopAbs_FORWARD)), TopoDS.Face_s(document.faces[face]))
+        for edge, face in edges.items()
+    ]
+    old = [_ends(*each) for each in chosen]
+    yield
+    for edge, _ in chosen:
         builder.UpdateEdge(edge, None, _TOLERANCE)
         BRepLib.BuildCurve3d_s(edge, _TOLERANCE)
         builder.SameRange(edge, True)
         builder.SameParameter(edge, False)
         BRepLib.SameParameter_s(edge, _TOLERANCE)
-    for edge in chosen:
-        curve = BRepAdaptor_Curve(edge)
-        ends = (TopExp.FirstVertex_s(edge), curve.FirstParameter()), (TopExp.LastVertex_s(edge), curve.LastParameter())
-        for vertex, place in ends:
-            builder.UpdateVertex(vertex, curve.Value(place), BRep_Tool.Tolerance_s(vertex))
+    moved = TopTools_MapOfShape()
+    for (edge, face), ends in zip(chosen, old, strict=True):
+        vertices = TopExp.FirstVertex_s(edge), TopExp.LastVertex_s(edge)
+        for vertex, before, now in zip(vertices, ends, _ends(edge, face), strict=True):
+            if moved.Add(vertex):
+                place = BRep_Tool.Pnt_s(vertex).Translated(gp_Vec(before, now))
+                builder.UpdateVertex(vertex, place, BRep_Tool.Tolerance_s(vertex))
     for part in document.parts if chosen else ():
         BRepLib.UpdateTolerances_s(part.shape)
+
+
+def _ends(edge: TopoDS_Edge, face: TopoDS_Face) -> tuple[gp_Pnt, gp_Pnt]:
+    """Where the curve of an edge on a face begins and ends."""
+    curve = BRepAdaptor_Curve(edge, face)
+    return curve.Value(curve.FirstParameter()), curve.Value(curve.LastParameter())

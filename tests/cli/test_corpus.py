@@ -3,17 +3,29 @@
 import json
 from collections import Counter
 
-from tests.judge import assert_as_good, judge, kernel_copy
+from tests.judge import LOOSE, assert_as_good, judge, kernel_copy
 
 MOVED = {
-    "airliner_777_onshape": (13, 0),
-    "engine_nacelle_openshell_tigl": (6, 0),
-    "fan_wheel_catia5": (0, 7),
-    "racecar_nose_openshells_ansys": (10, 0),
-    "robot_leader_handle_fusion": (0, 1),
+    "airliner_777_onshape": (13, 5),
+    "engine_nacelle_openshell_tigl": (6, 2),
+    "fan_wheel_catia5": (0, 11),
+    "racecar_nose_openshells_ansys": (14, 36),
+    "robot_leader_handle_fusion": (0, 4),
+    "robot_palm_shell_onshape": (0, 4),
     "windblade_iea15_rhino722": (6, 0),
 }
-"""How many seams are known to move exactly, and to the tolerance; all others stay frozen."""
+"""How many edges are known to move exactly, and to the tolerance; all others stay frozen."""
+
+REFINED: dict[str, tuple[int, int]] = {}
+"""The same where nets are refined."""
+
+
+def loose_pairs(body):
+    """Pairs of faces, counted from 0, whose seams moved to the tolerance."""
+    loose = {edge["edge"] for edge in body["edges"] if edge["how"] == "to tolerance"}
+    return {
+        tuple(sorted(face - 1 for face in seam["faces"])) for seam in body["seams"]["each"] if seam["edge"] in loose
+    }
 
 
 def test_smooth_at_two_percent(corpus_file, mracad, tmp_path):
@@ -37,7 +49,7 @@ def test_smooth_at_two_percent(corpus_file, mracad, tmp_path):
         print(f"{count:6d} {how}{reason and ': '}{reason}")
     exact, loose = MOVED.get(corpus_file.stem, (0, 0))
     assert edges["coupled", ""] >= exact and edges["to tolerance", ""] >= loose
-    assert_as_good(judge(out), judge(kernel_copy(corpus_file, tmp_path / "kernel.step")))
+    assert_as_good(judge(out), judge(kernel_copy(corpus_file, tmp_path / "kernel.step")), loose=loose_pairs(body))
 
 
 def test_refinement_changes_every_file_with_detail(corpus_file, refined_file, mracad, tmp_path):
@@ -46,7 +58,13 @@ def test_refinement_changes_every_file_with_detail(corpus_file, refined_file, mr
     assert result.code == 0, result.err
     body = json.loads(report.read_text())
     assert any(f["status"] == "edited" for f in body["faces"]) or not any(f["detail"] > 1e-7 for f in body["faces"])
+    moved = {edge["edge"]: edge["how"] for edge in body["edges"] if edge["how"] != "frozen"}
+    print(f"\n{refined_file.stem}", Counter(moved.values()), sum(edge["how"] == "frozen" for edge in body["edges"]))
+    exact, loose = REFINED.get(refined_file.stem, (0, 0))
+    assert list(moved.values()).count("coupled") >= exact and list(moved.values()).count("to tolerance") >= loose
     for seam in body["seams"]["each"]:
-        assert seam["after"]["gap"] <= seam["gap"] + 1e-7
-        assert not seam["smooth"] or seam["after"]["angle"] <= seam["angle"] + 1e-4
-    assert_as_good(judge(out), judge(kernel_copy(refined_file, tmp_path / "kernel.step")), angles=False)
+        slack = LOOSE if moved.get(seam["edge"]) == "to tolerance" else (0.0, 1e-4)
+        assert seam["after"]["gap"] <= max(seam["gap"], slack[0]) + 1e-7
+        assert not seam["smooth"] or seam["after"]["angle"] <= seam["angle"] + slack[1]
+    kernel = judge(kernel_copy(refined_file, tmp_path / "kernel.step"))
+    assert_as_good(judge(out), kernel, angles=False, loose=loose_pairs(body))

@@ -102,7 +102,7 @@ def test_surfaces_that_meet_exactly_stay_together(keep):
 def test_spans_under_a_seam_that_stays_open_are_halved(monkeypatch):
     found = {}
     for steeper in (0.008, 2e-5):
-        monkeypatch.setattr("mracad.edit.together.STEEPER", np.radians(steeper))
+        monkeypatch.setattr("mracad.edit.group.STEEPER", np.radians(steeper))
         _, after, report = smoothed(*halves.quiet(NOISE, (4, 6), 20.0), gap_tolerance="1e-6mm")
         assert treatment(report) == ("to tolerance", "")
         found[steeper] = seam(after)[0].angle, sum(surface.net.poles.size for surface in after.surfaces)
@@ -111,7 +111,7 @@ def test_spans_under_a_seam_that_stays_open_are_halved(monkeypatch):
 
 
 def test_a_seam_that_cannot_hold_stays_and_says_why(monkeypatch):
-    monkeypatch.setattr("mracad.edit.together.STEEPER", 1e-12)
+    monkeypatch.setattr("mracad.edit.group.STEEPER", 1e-12)
     _, left, right = halves.surfaces(NOISE, (30, 60))
     right.poles[..., 2] += 1e-3 * np.random.default_rng(5).standard_normal(right.poles.shape[:2])
     before, _, report = smoothed(left, right)
