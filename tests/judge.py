@@ -68,12 +68,16 @@ def kernel_copy(source: Path, target: Path) -> Path:
 LOOSE = 1e-4, 0.01
 """Gap, mm, that a seam that moved to the tolerance may have, and how much its angle may have grown, degrees."""
 
+SAMPLED = 1.05
+"""The gap of such a seam is not wider anywhere than it was at its widest; at the places of the measure it may be."""
+
 
 def assert_as_good(result: Verdict, yardstick: Verdict, angles: bool = True, loose: Collection[tuple] = ()) -> None:
     """The output is as good as the kernel's own copy of the input.
 
-    ``loose`` are pairs of faces whose seams moved to the tolerance.  ``angles`` is off for refined faces: the reader lays new curves on them (within the old tolerance), and where the
-    normal turns quickly it turns a few thousandths of a degree at those.
+    ``loose`` are pairs of faces whose seams moved to the tolerance.  ``angles`` is off for refined faces: the reader
+    lays new curves on them (within the old tolerance), and where the normal turns quickly it turns a few thousandths of
+    a degree at those.
     """
     new, old = result.validity, yardstick.validity
     assert new.valid or not old.valid, new.failures[:5]
@@ -86,7 +90,7 @@ def assert_as_good(result: Verdict, yardstick: Verdict, angles: bool = True, loo
         before = theirs[faces]
         assert len(found) == len(before)
         for new_gap, old_gap in zip(*(sorted(m.gap for m in each) for each in (found, before)), strict=True):
-            assert new_gap <= max(old_gap, LOOSE[0] if faces in loose else 0.0) + 1e-7, faces
+            assert new_gap <= (max(SAMPLED * old_gap, LOOSE[0]) if faces in loose else old_gap + 1e-7), faces
         if not angles:
             continue
         smooth = [sorted(m.angle for m in each if m.smooth) for each in (found, before)]

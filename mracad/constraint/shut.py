@@ -24,7 +24,7 @@ import numpy as np
 from mracad.bspline.gram import gram
 from mracad.bspline.net import Net
 from mracad.constraint.definite import definite
-from mracad.constraint.region import meeting, supported
+from mracad.constraint.region import supported
 from mracad.constraint.trimmed import Trace, TrimmedSeam, across, collocation, fine_sites
 from mracad.wavelet.ladder import arc_lengths
 
@@ -70,8 +70,7 @@ class Sheet:
 
         cells = np.zeros((self.net.u.spans, self.net.v.spans), bool)
         for trace in traces:
-            uv = trace.places(np.linspace(0.0, 1.0, 4 * max(cells.shape) + 1))
-            cells |= meeting(self.net, np.stack([uv, uv], axis=1))
+            cells |= trace.cells(self.net, np.linspace(0.0, 1.0, 4 * max(cells.shape) + 1))
         apart = KDTree(points).query(self.net.poles.reshape(-1, 3), distance_upper_bound=self.scale)[0]
         return self.free & (supported(self.net, cells) | np.isfinite(apart).reshape(self.free.shape))
 
@@ -137,7 +136,7 @@ def shut(
     inside = np.flatnonzero(np.concatenate([mask.ravel() for mask in masks.values()]))
     start = f + np.concatenate([sheet.offset.reshape(-1, 3) for sheet in sheets.values()])
     size = max(np.linalg.norm(sheet.wanted, axis=-1)[sheet.free].max(initial=0.0) for sheet in sheets.values())
-    size = max(size, tolerances[0], *(seam.opening[0].max() for seam in seams))
+    size = max(size, tolerances[0], *(float(seam.opening[0]) for seam in seams))
     form, pull = [], []
     for i, sheet in sheets.items():
         if masks[i].any():
@@ -157,6 +156,6 @@ def shut(
 
 
 def _tangents(net: Net, trace: Trace, share: Array) -> Array:
-    _, su, sv = net.evaluate(trace.places(share), 1)
+    _, su, sv = trace.on(net, share, 1)
     way = trace.way(share)
     return su * way[:, :1] + sv * way[:, 1:]

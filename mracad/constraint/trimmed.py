@@ -21,9 +21,11 @@ import numpy as np
 
 from mracad.bspline.basis import jet
 from mracad.bspline.knots import KnotVector
+from mracad.bspline.knots import Side as Limit
 from mracad.bspline.net import Curve, Net, curvature
-from mracad.constraint.frozen import CONTINUITY
-from mracad.constraint.seam import CREASE, UNEVEN, Seam, Wishes, between, runs_back
+from mracad.constraint.frozen import CONTINUITY, local_span
+from mracad.constraint.region import meeting
+from mracad.constraint.seam import CREASE, UNEVEN, Seam, Wishes, between, from_inside, runs_back
 from mracad.model import Edge, Face, Model
 
 Array = np.ndarray
@@ -41,7 +43,7 @@ NEWTON = 6
 """Steps in which the fractions of two edges that belong together are found."""
 
 _EVENLY = np.linspace(0.0, 1.0, SAMPLES)
-_SHARES = 0.5 - 0.5 * np.cos(np.pi * (np.arange(65) + 0.5) / 65)
+_SHARES = 0.5 - 0.5 * np.cos(np.pi * (np.arange(75) + 0.5) / 75)
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,16 +57,38 @@ class Trace:
         In the parameter plane, over the edge's range.
     law : (ndarray, ndarray), optional
         Fractions of the seam and the fractions of the curve that belong to them, where these are not the same.
+    line : (int, float), optional
+        The axis and the knot line on which it lies.
+    limits : (str, str)
+        The sides of knot lines in u and v on which the face lies.
     """
 
     face: int
     surface: int
     curve: Curve
     law: tuple[Array, Array] | None = None
+    line: tuple[int, float] | None = None
+    limits: tuple[Limit, Limit] = ("right", "right")
 
     def places(self, share: Array) -> Array:
         """Parameters ``(q, 2)`` at fractions of the seam."""
-        return self.curve.evaluate(self._at(share))[0]
+        uv = self.curve.evaluate(self._at(share))[0]
+        if self.line is not None:
+            uv[:, self.line[0]] = self.line[1]
+        return uv
+
+    def on(self, net: Net, share: Array, derivatives: int) -> tuple[Array, ...]:
+        """A surface and its derivatives at fractions of the seam, seen from inside the face."""
+        return tuple(np.asarray(x) for x in net.evaluate(self.places(share), derivatives, self.limits))
+
+    def cells(self, net: Net, share: Array) -> Array:
+        """Knot cells of a surface on which the face meets the seam at fractions of it, a mask."""
+        uv = self.places(share)
+        if self.line is not None:
+            axis, at = self.line
+            step = 0.5 * local_span((net.u, net.v)[axis], at)
+            uv[:, axis] += step if self.limits[axis] == "right" else -step
+        return meeting(net, np.stack([uv, uv], axis=1))
 
     def way(self, share: Array) -> Array:
         """Derivative of the curve by its own fraction, in the sense of the seam, ``(q, 2)``."""
@@ -87,10 +111,8 @@ class TrimmedSeam:
         The edge; twice, or the two free edges that coincide in an unsewn model.
     order : {0, 1, 2}
         Cross derivatives that the seam keeps.
-    share : ndarray (q,)
-        Fractions of the edge at which it is judged.
-    opening : ndarray (3, q)
-        Gap, angle and curvature jump of the input there, as :func:`parted` measures them.
+    opening : ndarray (3,)
+        Largest gap, angle and curvature jump of the input, as :func:`parted` measures them.
     close, fit : bool
         Whether the gap and the tilt of the input are to be pulled shut instead of carried.
     """
@@ -100,13 +122,12 @@ class TrimmedSeam:
     a: Trace
     b: Trace
     order: int
-    share: Array
     opening: Array
     close: bool
     fit: bool
 
-    def excess(self, model: Model, allowed: Sequence[float], more: Sequence[float]) -> Array:
-        """Opening ``(q,)`` after an edit, relative to what it may be, the worst of all that the seam keeps.
+    def excess(self, model: Model, allowed: Sequence[float], more: Sequence[float]) -> tuple[Array, Array]:
+        """Opening after an edit, relative to what it may be, the worst of all that the seam keeps.
 
         Parameters
         ----------
@@ -115,10 +136,15 @@ class TrimmedSeam:
         allowed, more : sequence of float
             Gap (mm), angle and curvature jump (1/mm) that a seam may have whatever it had, and that it may have more
             than it had at its worst.
+
+        Returns
+        -------
+        share, excess : ndarray (q,)
+            Fractions of the edge, and the excess there.
         """
-        now, worst = parted(model, self.a, self.b, self.share), self.opening.max(axis=1)
-        limit = np.maximum(allowed, worst + more)
-        return (now / limit[:, None])[: self.order + 1].max(axis=0)
+        share = judged(model, (self.a, self.b))
+        limit = np.maximum(allowed, self.opening + more)
+        return share, (parted(model, self.a, self.b, share) / limit[:, None])[: self.order + 1].max(axis=0)
 
 
 def trimmed(model: Model, edge: Edge, twin: Edge, wishes: Wishes) -> TrimmedSeam | str:
@@ -136,7 +162,7 @@ def trimmed(model: Model, edge: Edge, twin: Edge, wishes: Wishes) -> TrimmedSeam
         return "faces are placed differently"
     if faces[0] is faces[1]:
         return "a face that meets itself"
-    a, b = _trace(faces[0], edge), _trace(faces[1], twin)
+    a, b = _trace(model, faces[0], edge), _trace(model, faces[1], twin)
     if edge is not twin:
         fractions = _followed(model, a, b, runs_back(edge.points, twin.points))
         if (np.diff(fractions) * (fractions[-1] - fractions[0]) <= 0).any():
@@ -162,28 +188,39 @@ def _followed(model: Model, a: Trace, b: Trace, back: bool) -> Array:
 
 def beside(model: Model, seam: Seam, wishes: Wishes) -> TrimmedSeam | str:
     """What the joint of a seam does not keep, to the tolerance."""
-    line = KnotVector.clamped([0.0, 1.0], 1)
-    a, b = (Trace(x.face, x.surface, Curve(line, x.places(np.array([0.0, 1.0])))) for x in (seam.a, seam.b))
+    line, ends = KnotVector.clamped([0.0, 1.0], 1), np.array([0.0, 1.0])
+    a, b = (
+        Trace(x.face, x.surface, Curve(line, x.places(ends)), line=(x.axis, x.at), limits=x.limits("right"))
+        for x in (seam.a, seam.b)
+    )
     return _judged(model, seam.edge, seam.twin, (a, b), wishes)
 
 
 def _judged(model: Model, edge: int, twin: int, traces: tuple[Trace, Trace], wishes: Wishes) -> TrimmedSeam | str:
-    spaces = {t.surface: (model.surfaces[t.surface].net.u, model.surfaces[t.surface].net.v) for t in traces}
-    share = np.sort(np.concatenate([_SHARES, fine_sites(traces, spaces)[0]]))
-    opening = parted(model, *traces, share)
-    if not np.isfinite(opening[1]).all():
+    opening = parted(model, *traces, judged(model, traces)).max(axis=1)
+    angle = opening[1]
+    if not np.isfinite(angle):
         return "degenerate along the seam"
-    angle = opening[1].max()
     order = CONTINUITY[wishes.keep] if angle <= max(CREASE, wishes.fit) else 0
-    if order == 2 and not np.isfinite(opening[2]).all():
+    if order == 2 and not np.isfinite(opening[2]):
         return "no curvature along the seam"
     close, fit = wishes.close_gaps, order > 0 and bool(angle <= wishes.fit)
-    return TrimmedSeam(edge, twin, *traces, order, share, opening, close, fit)
+    return TrimmedSeam(edge, twin, *traces, order, opening, close, fit)
 
 
-def _trace(face: Face, edge: Edge) -> Trace:
+def _trace(model: Model, face: Face, edge: Edge) -> Trace:
     assert face.surface is not None
-    return Trace(face.index, face.surface, next(trim.curve for trim in face.trims if trim.edge == edge.index))
+    net = model.surfaces[face.surface].net
+    trace = Trace(face.index, face.surface, next(trim.curve for trim in face.trims if trim.edge == edge.index))
+    uv, limits = from_inside(face, net, edge.index, trace.places(_SHARES))
+    lines = [axis for axis in (0, 1) if np.ptp(uv[:, axis]) == 0.0]
+    return replace(trace, line=(lines[0], float(uv[0, lines[0]])) if lines else None, limits=limits)
+
+
+def judged(model: Model, traces: tuple[Trace, Trace]) -> Array:
+    """Fractions of an edge at which a seam is judged: those of the report, and the Gauss points of all spans."""
+    spaces = {t.surface: (model.surfaces[t.surface].net.u, model.surfaces[t.surface].net.v) for t in traces}
+    return np.sort(np.concatenate([_SHARES, fine_sites(traces, spaces)[0]]))
 
 
 def parted(model: Model, a: Trace, b: Trace, share: Array) -> Array:
@@ -191,7 +228,7 @@ def parted(model: Model, a: Trace, b: Trace, share: Array) -> Array:
     points, normals, bends = [], [], []
     for trace in (a, b):
         face, net = model.faces[trace.face], model.surfaces[trace.surface].net
-        s, *derivatives = (x @ face.frame[:3, :3].T for x in net.evaluate(trace.places(share), 2))
+        s, *derivatives = (x @ face.frame[:3, :3].T for x in trace.on(net, share, 2))
         way = trace.way(share)
         along = derivatives[0] * way[:, :1] + derivatives[1] * way[:, 1:]
         sign = -1 if face.reversed else 1
@@ -273,7 +310,7 @@ def collocation(
         for order in range(seam.order + 1):
             row = count + np.arange(len(share))
             for trace, (way, bend), sign in zip((seam.b, seam.a), ways[::-1], (1.0, -1.0), strict=True):
-                index, table = _jet(nets[trace.surface], trace.places(share), order)
+                index, table = _jet(nets[trace.surface], trace, share, order)
                 x, y = way[:, :1], way[:, 1:]
                 if order == 0:
                     value = table[0]
@@ -291,11 +328,11 @@ def collocation(
 
 def _ways(ground: Mapping[int, Net], seam: TrimmedSeam, share: Array) -> list[tuple[Array, Array]]:
     """For a and b the directions c and z ``(q, 2)`` in the parameter planes."""
-    _, su, sv, *second = ground[seam.a.surface].evaluate(seam.a.places(share), 2)
+    _, su, sv, *second = seam.a.on(ground[seam.a.surface], share, 2)
     way = seam.a.way(share)
     conormal = np.cross(np.cross(su, sv), su * way[:, :1] + sv * way[:, 1:])
     conormal /= np.maximum(np.linalg.norm(conormal, axis=1, keepdims=True), 1e-300)
-    _, tu, tv, *other = ground[seam.b.surface].evaluate(seam.b.places(share), 2)
+    _, tu, tv, *other = seam.b.on(ground[seam.b.surface], share, 2)
     ways = _components(su, sv, conormal), _components(tu, tv, conormal)
     bends = [_twice(x, y) for x, y in zip(ways, (second, other), strict=True)]
     return [(ways[0], np.zeros_like(way)), (ways[1], _components(tu, tv, bends[0] - bends[1]))]
@@ -314,10 +351,11 @@ def _components(su: Array, sv: Array, vector: Array) -> Array:
     return np.stack([p * g - q * f, q * e - p * f], axis=1) / determinant[:, None]
 
 
-def _jet(net: Net, uv: Array, order: int) -> tuple[Array, list[Array]]:
-    """Control points ``(q, k)``, and the rational basis functions there with their derivatives."""
-    first_u, in_u = jet(net.u, uv[:, 0], range(order + 1))
-    first_v, in_v = jet(net.v, uv[:, 1], range(order + 1))
+def _jet(net: Net, trace: Trace, share: Array, order: int) -> tuple[Array, list[Array]]:
+    """Control points ``(q, k)``, and the rational basis functions at fractions of a trace with their derivatives."""
+    uv = trace.places(share)
+    first_u, in_u = jet(net.u, uv[:, 0], range(order + 1), trace.limits[0])
+    first_v, in_v = jet(net.v, uv[:, 1], range(order + 1), trace.limits[1])
     row = (first_u[:, None] + np.arange(net.u.degree + 1)) % net.u.count
     column = (first_v[:, None] + np.arange(net.v.degree + 1)) % net.v.count
     index = (row[:, :, None] * net.v.count + column[:, None, :]).reshape(len(uv), -1)

@@ -18,7 +18,6 @@ from mracad.bspline.knots import KnotVector
 from mracad.bspline.net import Net
 from mracad.constraint.couple import Coupling, Patch
 from mracad.constraint.frozen import REFINED_SHARE, Separation, halvings, jet_support, separate
-from mracad.constraint.region import meeting
 from mracad.constraint.seam import TRIMMED, Border, Seam, opening
 from mracad.constraint.shut import Sheet, shut
 from mracad.constraint.strip import Coarse, Direction, Line, Strip, line, members, strips
@@ -343,10 +342,10 @@ class Group:
         after, far = self._after(moved), self._overshot(moved, self.trimmed)
         cells: dict[int, Array] = {}
         for seam in self.trimmed:
-            open_at = seam.share[(self._excess(seam, after) > 1.0) | (seam.edge in far)]
+            share, excess = self._excess(seam, after)
+            open_at = share[(excess > 1.0) | (seam.edge in far)]
             for trace in (seam.a, seam.b):
-                uv = trace.places(open_at)
-                met = meeting(moved[trace.surface].net, np.stack([uv, uv], axis=1))
+                met = trace.cells(moved[trace.surface].net, open_at)
                 cells[trace.surface] = met | cells.get(trace.surface, False)
         result = {}
         for i, met in cells.items():
@@ -417,14 +416,14 @@ class Group:
             surfaces[i] = Surface(i, Net(m.net.u, m.net.v, m.net.poles + m.offset, m.net.weights), surfaces[i].faces)
         return self.model.with_surfaces(surfaces)
 
-    def _excess(self, seam: TrimmedSeam, after: Model) -> Array:
+    def _excess(self, seam: TrimmedSeam, after: Model) -> tuple[Array, Array]:
         scale = min(self.scales[seam.a.surface], self.scales[seam.b.surface])
         return seam.excess(after, (self.gap, 0.0, 0.0), (0.0, STEEPER, BUMPIER / scale))
 
     def _broken(self, moved: Mapping[int, Moved]) -> dict[int, str]:
         """Seams that are wider or steeper than they may be, and what is wrong with them."""
         after = self._after(moved)
-        excess = {seam.edge: self._excess(seam, after).max() for seam in self.trimmed}
+        excess = {seam.edge: self._excess(seam, after)[1].max() for seam in self.trimmed}
         worst = max(excess.values(), default=0.0)
         if worst > 1.0:
             # what is far off spoils its neighbours: try again without it before judging them

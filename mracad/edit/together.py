@@ -82,7 +82,7 @@ class Together:
         if isinstance(seam, Seam):
             close, fit, gap, angle = seam.joint.close, seam.joint.fit, seam.gap, seam.angle
         else:
-            close, fit, (gap, angle) = seam.close, seam.fit, seam.opening[:2].max(axis=1)
+            close, fit, (gap, angle) = seam.close, seam.fit, seam.opening[:2]
         return bool((close and gap > DEFECT[0]) or (fit and angle > DEFECT[1]))
 
     @property
