@@ -63,8 +63,11 @@ def _fitted(u, v, heights):
     return panels.interpolated(v, v.greville(), heights.T).T
 
 
-def document(left, right, sewn=True):
-    """Both halves in one shell; or each with edges of its own, the seam's running opposite ways at different paces."""
+def document(left, right, sewn=True, beside=0.0):
+    """Both halves in one shell; or each with edges of its own, the seam's running opposite ways at different paces.
+
+    The vertices lie ``beside`` the ends of the seam, mm.
+    """
     grounds = [make.surface(net.poles, net.u.knots, net.v.knots, (3, 3)) for net in (left, right)]
     faces = []
     edge = None
@@ -78,7 +81,7 @@ def document(left, right, sewn=True):
         if edge is None or not sewn:
             curve = make.on_surface(ground, trace, 0.0, SIZE, 400)
             points = curve.poles[[-1, 0]] if back else curve.poles[[0, -1]]
-            ends = [make.vertex(point) for point in points]
+            ends = [make.vertex((x, y, z + beside), 1e-7 + 2 * beside) for x, y, z in points]
             edge = make.edge(curve.geometry, tuple(ends[::-1] if back else ends), (0.0, SIZE), 1e-2)
         corners = [make.vertex(net.poles[row, k]) for k in (0, -1)]
         rails = []

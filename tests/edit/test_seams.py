@@ -226,3 +226,11 @@ def test_only_seams_of_moved_faces_are_measured_anew(sewn):
     after = remeasured(moved, before, {0})
     assert after == seams(moved)
     assert [m is not old for m, old in zip(after, before, strict=True)] == [0 in m.faces for m in before]
+
+
+@pytest.mark.parametrize("edges", ["coupled", "frozen"])
+def test_only_the_position_is_kept_where_that_is_asked(edges):
+    _, noisy = panels.whole(SPANS, NOISE, patches=(1, 2))
+    model, report = edited(panels.cut(noisy, (1, 2)), level=3, keep="g0", edges=edges)
+    gap, angle = holds(model)
+    assert len(report.edit.faces("edited")) == 2 and gap <= 1e-9 and angle > 0.01

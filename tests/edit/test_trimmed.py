@@ -4,6 +4,8 @@ import io
 
 import numpy as np
 import pytest
+from OCP.BRep import BRep_Tool
+from OCP.TopExp import TopExp
 
 from mracad import job
 from mracad.audit.continuity import seams
@@ -126,3 +128,13 @@ def test_gaps_and_tilts_are_pulled_shut_where_asked():
     (old, _), (new, _) = seam(before), seam(after)
     assert treatment(report) == ("mended", "")
     assert new.mean_gap < 0.3 * old.mean_gap and new.mean_angle < 0.5 * old.mean_angle
+
+
+def test_vertices_stay_where_the_ends_of_their_edges_do():
+    document = halves.document(*halves.quiet(NOISE, (10, 20)), beside=1e-3)
+    edge = next(edge.index for edge in view(document).edges if len(edge.sides) == 2)
+    vertices = [end(document.edges[edge]) for end in (TopExp.FirstVertex_s, TopExp.LastVertex_s)]
+    before = [BRep_Tool.Pnt_s(vertex) for vertex in vertices]
+    report = job.run(document, smooth, Smooth(scale="30mm"))
+    assert treatment(report) == ("to tolerance", "")
+    assert all(old.Distance(BRep_Tool.Pnt_s(vertex)) < 1e-9 for old, vertex in zip(before, vertices, strict=True))
