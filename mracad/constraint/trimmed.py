@@ -126,25 +126,30 @@ class TrimmedSeam:
     close: bool
     fit: bool
 
-    def excess(self, model: Model, allowed: Sequence[float], more: Sequence[float]) -> tuple[Array, Array]:
+    def excess(
+        self, before: Model, after: Model, allowed: Sequence[float], more: Sequence[float]
+    ) -> tuple[Array, Array]:
         """Opening after an edit, relative to what it may be, the worst of all that the seam keeps.
+
+        It may be what the input had at its worst; the gap no more than what it had at the same place and the tolerance.
 
         Parameters
         ----------
-        model : Model
-            After the edit.
+        before, after : Model
         allowed, more : sequence of float
             Gap (mm), angle and curvature jump (1/mm) that a seam may have whatever it had, and that it may have more
-            than it had at its worst.
+            than it had.
 
         Returns
         -------
         share, excess : ndarray (q,)
             Fractions of the edge, and the excess there.
         """
-        share = judged(model, (self.a, self.b))
-        limit = np.maximum(allowed, self.opening + more)
-        return share, (parted(model, self.a, self.b, share) / limit[:, None])[: self.order + 1].max(axis=0)
+        share = judged(after, (self.a, self.b))
+        old, now = (parted(model, self.a, self.b, share) for model in (before, after))
+        limit = np.repeat(np.maximum(allowed, self.opening + more)[:, None], len(share), axis=1)
+        limit[0] = np.minimum(limit[0], old[0] + allowed[0] + more[0])
+        return share, (now / limit)[: self.order + 1].max(axis=0)
 
 
 def trimmed(model: Model, edge: Edge, twin: Edge, wishes: Wishes) -> TrimmedSeam | str:

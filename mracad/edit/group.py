@@ -418,7 +418,7 @@ class Group:
 
     def _excess(self, seam: TrimmedSeam, after: Model) -> tuple[Array, Array]:
         scale = min(self.scales[seam.a.surface], self.scales[seam.b.surface])
-        return seam.excess(after, (self.gap, 0.0, 0.0), (0.0, STEEPER, BUMPIER / scale))
+        return seam.excess(self.model, after, (self.gap, 0.0, 0.0), (0.0, STEEPER, BUMPIER / scale))
 
     def _broken(self, moved: Mapping[int, Moved]) -> dict[int, str]:
         """Seams that are wider or steeper than they may be, and what is wrong with them."""

@@ -9,14 +9,22 @@ MOVED = {
     "airliner_777_onshape": (13, 5),
     "engine_nacelle_openshell_tigl": (6, 2),
     "fan_wheel_catia5": (0, 11),
-    "racecar_nose_openshells_ansys": (14, 36),
+    "racecar_nose_openshells_ansys": (14, 32),
     "robot_leader_handle_fusion": (0, 4),
     "robot_palm_shell_onshape": (0, 4),
     "windblade_iea15_rhino722": (6, 0),
 }
 """How many edges are known to move exactly, and to the tolerance; all others stay frozen."""
 
-REFINED: dict[str, tuple[int, int]] = {}
+REFINED = {
+    "airliner_777_onshape": (30, 0),
+    "catamaran_hulls_fusion": (2, 0),
+    "engine_nacelle_openshell_tigl": (6, 2),
+    "mouse_cover_onshape": (8, 14),
+    "robot_leader_handle_fusion": (2, 8),
+    "robot_palm_shell_onshape": (0, 34),
+    "windblade_iea15_rhino722": (6, 0),
+}
 """The same where nets are refined."""
 
 
@@ -48,7 +56,8 @@ def test_smooth_at_two_percent(corpus_file, mracad, tmp_path):
         print(f"{count:6d} {how}{reason and ': '}{reason}")
     exact, loose = MOVED.get(corpus_file.stem, (0, 0))
     assert edges["coupled", ""] >= exact and edges["to tolerance", ""] >= loose
-    assert_as_good(judge(out), judge(kernel_copy(corpus_file, tmp_path / "kernel.step")), loose=loose_pairs(body))
+    kernel = judge(kernel_copy(corpus_file, tmp_path / "kernel.step"))
+    assert_as_good(judge(out), kernel, loose=loose_pairs(body), source=judge(corpus_file))
 
 
 def test_refinement_changes_every_file_with_detail(corpus_file, refined_file, mracad, tmp_path):
@@ -69,4 +78,4 @@ def test_refinement_changes_every_file_with_detail(corpus_file, refined_file, mr
         steeper = LOOSE[1] if seam["edge"] in moved else 1e-4
         assert not seam["smooth"] or seam["after"]["angle"] <= seam["angle"] + steeper
     kernel = judge(kernel_copy(refined_file, tmp_path / "kernel.step"))
-    assert_as_good(judge(out), kernel, angles=False, loose=loose_pairs(body))
+    assert_as_good(judge(out), kernel, angles=False, loose=loose_pairs(body), source=judge(refined_file))
