@@ -56,6 +56,7 @@ bench: $(VENV)/dev
 	$(BIN)/python benchmarks/transform.py
 	$(BIN)/python benchmarks/command.py
 	$(BIN)/python benchmarks/features.py
+	$(BIN)/python benchmarks/seams.py
 
 # Batches: what workers gain, kills, a lost cluster worker; some minutes
 bench-batch: $(VENV)/dev
