@@ -172,7 +172,8 @@ class Treatment:
     reason : str
         Why it is frozen.
     freedom : int
-        Degrees of freedom of the edge's curve in the coarse space, where coupled.
+        Degrees of freedom of the edge's curve in the coarse space, where coupled; the number of points at which the
+        coarse spaces of both sides meet, where it moves to the tolerance.
     """
 
     edge: int

@@ -21,7 +21,7 @@ from mracad.constraint.frozen import REFINED_SHARE, Separation, halvings, jet_su
 from mracad.constraint.seam import TRIMMED, Border, Seam, opening
 from mracad.constraint.shut import Sheet, shut
 from mracad.constraint.strip import Coarse, Direction, Line, Strip, line, members, strips
-from mracad.constraint.trimmed import TrimmedSeam
+from mracad.constraint.trimmed import TrimmedSeam, coarse_sites
 from mracad.edit.bound import OVERSHOOT, bounded, deviation
 from mracad.model import Model, Surface
 from mracad.options import Smooth, length
@@ -268,6 +268,8 @@ class Group:
     def _locked(self, coupling: Coupling) -> dict[int, str]:
         """Seams whose conditions leave too little freedom; counts the freedom of all."""
         result = {}
+        bases = {i: patch.base for i, patch in coupling.patches.items()}
+        self.freedom = {seam.edge: len(coarse_sites(seam, bases)) for seam in self.trimmed}
         for number, seam in enumerate(self.found):
             whole = min(self._functions(coupling.patches[b.surface].base, b) for b in (seam.a, seam.b))
             degrees = {coupling.patches[b.surface].base[1 - b.axis].degree for b in (seam.a, seam.b)}

@@ -93,15 +93,15 @@ class Together:
     def treatments(self) -> tuple[Treatment, ...]:
         """What was done about each edge of a movable face, in edge order."""
         loose = {edge for seam in self.trimmed for edge in (seam.edge, seam.twin)}
+        freedom = self.freedom | {seam.twin: self.freedom.get(seam.edge, 0) for seam in self._every()}
 
         def of(edge: int) -> Treatment:
             faces = tuple(side.face for side in self.model.edges[edge].sides)
             if edge in self.frozen:
                 return Treatment(edge, faces, "frozen", self.frozen[edge])
             mended = self.setting.mending and edge not in self.closing
-            if edge in loose and not mended:
-                return Treatment(edge, faces, "to tolerance")
-            return Treatment(edge, faces, "mended" if mended else "coupled", freedom=self.freedom.get(edge, 0))
+            how = "mended" if mended else "to tolerance" if edge in loose else "coupled"
+            return Treatment(edge, faces, how, freedom=freedom.get(edge, 0))
 
         return tuple(of(edge) for edge in sorted(self.moving | set(self.frozen)))
 
