@@ -107,34 +107,17 @@ def shut(
     from scipy.sparse import block_diag, diags_array, vstack
 
     nets = {i: sheet.net for i, sheet in sheets.items()}
-    spaces = {i: (net.u, net.v) for i, net in nets.items()}
-    places = [fine_sites((seam.a, seam.b), spaces) for seam in seams]
     f = np.concatenate([net.poles.reshape(-1, 3) for net in nets.values()])
     f = f - f.mean(axis=0)
-    loose = collocation(nets, nets, seams, [share for share, _ in places])
-    scale = min(sheet.scale for sheet in sheets.values())
-    curves = [nets[seam.a.surface].evaluate(seam.a.places(_EVENLY)) for seam in seams]
-    weight = np.concatenate(
-        [
-            np.linalg.norm(np.diff(curve, axis=0), axis=1).sum() * share / (tolerances[order] ** 2 * scale)
-            for seam, (_, share), curve in zip(seams, places, curves, strict=True)
-            for order in range(seam.order + 1)
-        ]
-    )
-    defect, first = loose @ f, 0
-    for seam, (share, _) in zip(seams, places, strict=True):
-        gap, tilt, _ = (slice(first + k * len(share), first + (k + 1) * len(share)) for k in range(3))
-        along = _tangents(nets[seam.a.surface], seam.a, share)
-        defect[gap] -= (1.0 if seam.close else EASED) * amount * across(defect[gap], along)
-        if seam.fit:
-            defect[tilt] *= 1.0 - amount
-        first += (seam.order + 1) * len(share)
-    traces = [trace for seam in seams for trace in (seam.a, seam.b)]
+    near = np.concatenate([nets[seam.a.surface].evaluate(seam.a.places(_EVENLY)) for seam in seams])
     masks = {
-        i: sheet.near([t for t in traces if t.surface == i], np.concatenate(curves)) for i, sheet in sheets.items()
+        i: sheet.near([t for seam in seams for t in (seam.a, seam.b) if t.surface == i], near)
+        for i, sheet in sheets.items()
     }
     inside = np.flatnonzero(np.concatenate([mask.ravel() for mask in masks.values()]))
-    start = f + np.concatenate([sheet.offset.reshape(-1, 3) for sheet in sheets.values()])
+    if not len(inside):
+        return {i: sheet.offset for i, sheet in sheets.items()}
+    scale = min(sheet.scale for sheet in sheets.values())
     size = max(np.linalg.norm(sheet.wanted, axis=-1)[sheet.free].max(initial=0.0) for sheet in sheets.values())
     size = max(size, tolerances[0], *(float(seam.opening[0]) for seam in seams))
     form, pull = [], []
@@ -144,8 +127,11 @@ def shut(
             rows = sheet.form()[own] / (size * scale) ** 2
             form.append(rows[:, own])
             pull.append(rows @ (sheet.wanted - sheet.offset).reshape(-1, 3))
+    loose, goal, weight = _conditions(nets, seams, f, tolerances, amount)
+    weight /= scale
+    start = f + np.concatenate([sheet.offset.reshape(-1, 3) for sheet in sheets.values()])
     matrix = vstack([loose, exact], format="csr")
-    missing = np.concatenate([defect, exact @ start]) - matrix @ start
+    missing = np.concatenate([goal, exact @ start]) - matrix @ start
     weights = diags_array(np.append(weight, np.full(exact.shape[0], STRICT * weight.max())))
     rows = matrix[:, inside]
     normal = block_diag(form, format="csr") + rows.T @ weights @ rows
@@ -153,6 +139,29 @@ def shut(
     change[inside] = definite(normal)(np.concatenate(pull) + rows.T @ (weights @ missing))
     parts = np.split(change, np.cumsum([mask.size for mask in masks.values()])[:-1])
     return {i: s.offset + part.reshape(s.offset.shape) for (i, s), part in zip(sheets.items(), parts, strict=True)}
+
+
+def _conditions(
+    nets: Mapping[int, Net], seams: Sequence[TrimmedSeam], f: Array, tolerances: Sequence[float], amount: float
+) -> tuple[Any, Array, Array]:
+    """C, c, and the lengths (mm) that the conditions stand for over their squared tolerances."""
+    spaces = {i: (net.u, net.v) for i, net in nets.items()}
+    places = [fine_sites((seam.a, seam.b), spaces) for seam in seams]
+    matrix = collocation(nets, nets, seams, [share for share, _ in places])
+    goal, weight = matrix @ f, np.empty(matrix.shape[0])
+    first = 0
+    for seam, (share, part) in zip(seams, places, strict=True):
+        net, curve = nets[seam.a.surface], nets[seam.a.surface].evaluate(seam.a.places(_EVENLY))
+        length = np.linalg.norm(np.diff(curve, axis=0), axis=1).sum()
+        orders = [slice(first + k * len(share), first + (k + 1) * len(share)) for k in range(seam.order + 1)]
+        for own, tolerance in zip(orders, tolerances, strict=False):
+            weight[own] = length * part / tolerance**2
+        gap = goal[orders[0]]
+        gap -= (1.0 if seam.close else EASED) * amount * across(gap, _tangents(net, seam.a, share))
+        if seam.fit:
+            goal[orders[1]] *= 1.0 - amount
+        first = orders[-1].stop
+    return matrix, goal, weight
 
 
 def _tangents(net: Net, trace: Trace, share: Array) -> Array:
