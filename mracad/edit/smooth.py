@@ -168,18 +168,18 @@ class _SurfaceSmoothing:
         status: Status
         if held or not edited:
             status, reason = ("held", "held") if held else ("unselected", "not selected")
+        elif self.offset is not None and moved > 0.0:
+            status, reason = "edited", ""
         elif not self.coarser:
             status, reason = "unchanged", "crease lines only" if creases and pairs else "no span finer than the scale"
         elif detail <= DETAIL:
             status, reason = "unchanged", "no detail"
         elif self.options.amount == 0:
             status, reason = "unchanged", "amount 0"
-        elif self.offset is None or moved == 0.0:
+        else:
             status, reason = "stuck", "no free poles" if not free else "no free poles where the detail is"
             if self.entangled:
                 reason = "its poles cannot move one by one"
-        else:
-            status, reason = "edited", ""
         return FaceOutcome(
             face.index,
             status,
