@@ -71,10 +71,21 @@ def test_solids_stay_solid_and_smooth(samples, tmp_path, source, scale, moving):
     assert is_watertight(corners(tmp_path / "out.stl"))
 
 
-def test_a_face_that_closes_on_itself_gets_no_kink_there():
+def pipe():
     path = cadquery.Workplane("XY").spline([(0, 0), (20, 5), (40, 30), (60, 20)])
     solid = cadquery.Workplane("YZ").circle(4).sweep(path).val().wrapped
-    document = make.single(BRepBuilderAPI_NurbsConvert(solid, True).Shape(), "pipe")
+    return make.single(BRepBuilderAPI_NurbsConvert(solid, True).Shape(), "pipe")
+
+
+def test_a_face_that_only_follows_its_neighbour_counts_as_edited():
+    report = job.run(pipe(), smooth, Smooth(scale="8%"))
+    assert [t.how for t in report.edit.edges] == ["coupled", "to tolerance", "to tolerance"]
+    assert [(o.status, o.moved > 0) for o in report.edit.outcomes] == [("edited", True)] * 3
+    assert min(o.detail for o in report.edit.outcomes) < 1e-7
+
+
+def test_a_face_that_closes_on_itself_gets_no_kink_there():
+    document = pipe()
     report = job.run(document, smooth, Smooth(level=1))
     closing = [(a, b) for a, b in zip(report.before, report.after, strict=True) if a.faces[0] == a.faces[1]]
     assert closing and report.edit.faces("edited") and report.valid_after.valid

@@ -139,11 +139,3 @@ def test_vertices_stay_where_the_ends_of_their_edges_do():
     report = job.run(document, smooth, Smooth(scale="30mm"))
     assert treatment(report) == ("to tolerance", "")
     assert all(old.Distance(BRep_Tool.Pnt_s(vertex)) < 1e-9 for old, vertex in zip(before, vertices, strict=True))
-
-
-def test_a_face_without_detail_that_follows_its_neighbour_counts_as_edited():
-    left, right = halves.quiet(NOISE, (2, 4))
-    _, _, report = smoothed(left, right)
-    assert treatment(report)[0] == "to tolerance"
-    follower = report.edit.outcomes[1]
-    assert follower.status == "edited" and follower.moved > 1e-4
