@@ -52,9 +52,6 @@ MOST_POINTS = 40_000
 SHORTEST = 1e-2
 """Spans shorter than this, mm, are not halved."""
 
-DEFECT = 1e-6, math.radians(1e-3)
-"""Gap, mm, and angle from which on a seam is worth mending."""
-
 CLUSTER = 1e-6, 1e-4
 """Knots closer than this fraction of the curve, or this in mm, are not set apart."""
 
@@ -247,7 +244,6 @@ class Group:
 
     def _free(self, surface: int, nets: dict[int, Net], separations: dict[int, Separation]) -> None:
         """Halve the spans of a surface, the longer ones first, until enough of its points are free."""
-
         own = self.inserted[surface]
         for net, u, v in halvings(nets[surface]):
             separation = self._separated(self.model.surfaces[surface], net)
