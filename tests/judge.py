@@ -97,7 +97,9 @@ def assert_as_good(
         before = theirs[faces]
         assert len(found) == len(before)
         for new_gap, old_gap in zip(*(sorted(m.gap for m in each) for each in (found, before)), strict=True):
-            limit = max(SAMPLED * widest[faces], LOOSE[0]) if faces in loose else old_gap + (1e-7 if angles else 1e-6)
+            limit = old_gap + (1e-7 if angles else 1e-6)
+            if faces in loose:
+                limit = max(limit, SAMPLED * widest[faces], LOOSE[0])
             assert new_gap <= limit, faces
         if not angles:
             continue

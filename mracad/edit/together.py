@@ -9,7 +9,8 @@ import numpy as np
 
 from mracad.constraint.seam import TRIMMED, UNEVEN, Seam, Seams, Treatment, Wishes, seams
 from mracad.constraint.trimmed import TrimmedSeam, beside, trimmed
-from mracad.edit.group import CROWDED, Group, Moved, Setting
+from mracad.edit.group import CLUSTER, CROWDED, Group, Moved, Setting
+from mracad.model import Edge
 
 Array = np.ndarray
 
@@ -17,6 +18,7 @@ DEFECT = 1e-6, math.radians(1e-3)
 """Gap, mm, and angle from which on a seam is worth mending."""
 
 IDLE = "nothing to smooth on either side"
+SHORT = "knots of a face there nearly meet"
 
 
 class Together:
@@ -57,15 +59,21 @@ class Together:
             edge = self.model.edges[index]
             twin = self.model.edges[self.twins.get(index, index)]
             if reason in (TRIMMED, UNEVEN, CROWDED) and len({edge.index, twin.index}) + len(edge.sides) == 3:
-                faces = (edge.sides[0].face, twin.sides[-1].face)
-                idle = not self.coarser & {self.model.faces[face].surface for face in faces}
-                seam = IDLE if idle and not self.setting.mending else trimmed(self.model, edge, twin, self.wishes)
+                seam = self._trimmed(edge, twin)
                 if isinstance(seam, TrimmedSeam):
                     self.trimmed.append(seam)
                     self.frozen.pop(index)
                     self.frozen.pop(twin.index, None)
                 else:
                     self.frozen[index] = seam
+
+    def _trimmed(self, edge: Edge, twin: Edge) -> TrimmedSeam | str:
+        surfaces = {self.model.faces[face].surface for face in (edge.sides[0].face, twin.sides[-1].face)}
+        if not (surfaces & self.coarser or self.setting.mending):
+            return IDLE
+        if min(s.min() for i in surfaces if i is not None for s in self.setting.spans[i]) < CLUSTER[1]:
+            return SHORT
+        return trimmed(self.model, edge, twin, self.wishes)
 
     def _supplement(self) -> None:
         """Keep to the tolerance what the joints of seams do not keep by a law."""
