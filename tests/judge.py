@@ -76,14 +76,16 @@ def assert_as_good(
     result: Verdict,
     yardstick: Verdict,
     angles: bool = True,
+    coupled: Collection[tuple] = (),
     loose: Collection[tuple] = (),
     source: Verdict | None = None,
 ) -> None:
     """The output is as good as the kernel's own copy of the input.
 
-    ``loose`` are pairs of faces whose seams moved to the tolerance: they are as good as those of the ``source`` (the
-    reader heals some seams of its own copy).  ``angles`` is off for refined faces: the reader lays new curves on them
-    (within the old tolerance), and where the normal turns quickly it turns a few thousandths of a degree at those.
+    ``coupled`` are pairs of faces whose seams moved exactly, ``loose`` those whose seams moved to the tolerance: these
+    are as good as those of the ``source`` (the reader heals some seams of its own copy).  ``angles`` is off for refined
+    faces: the reader lays new curves on them (within the old tolerance), and where the normal turns quickly it turns a
+    few thousandths of a degree at those.
     """
     new, old = result.validity, yardstick.validity
     assert new.valid or not old.valid, new.failures[:5]
@@ -97,7 +99,7 @@ def assert_as_good(
         before = theirs[faces]
         assert len(found) == len(before)
         for new_gap, old_gap in zip(*(sorted(m.gap for m in each) for each in (found, before)), strict=True):
-            limit = old_gap + (1e-7 if angles else 1e-6)
+            limit = old_gap + (1e-6 if faces in coupled else 1e-7)
             if faces in loose:
                 limit = max(limit, SAMPLED * widest[faces], LOOSE[0])
             assert new_gap <= limit, faces
