@@ -196,7 +196,7 @@ class Seams:
     frozen : dict of int to str
         Every other edge, and why it does not move.
     twins : dict of int to int
-        Of the frozen ones, free edges that coincide with another one, as a whole.
+        Free edges that coincide with another one, as a whole.
     """
 
     found: list[Seam] = field(default_factory=list)
@@ -241,13 +241,13 @@ def seams(model: Model, movable: Collection[int], wishes: Wishes) -> Seams:
         if other is None:
             frozen[edge.index] = "coincides with a part of another edge"
             continue
+        result.twins[edge.index] = other.index
         seam = _seam(model, movable, wishes, (edge, other), (one, other.sides[0]))
         if isinstance(seam, Seam):
             found.append(seam)
             del frozen[seam.edge], frozen[seam.twin]
         elif isinstance(seam, str):
             frozen[edge.index] = seam
-            result.twins[edge.index] = other.index
     return result
 
 
