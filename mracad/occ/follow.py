@@ -26,7 +26,8 @@ def following(document: Document, edges: Mapping[int, int]) -> Iterator[None]:
 
     A stale curve must never be left to the kernel, which would hide it in a large tolerance.  The faces of an edge
     must move together: its curves on them stay.  A vertex stays as far from the ends of its edges as it was: those that
-    do not move get no gap there that a reader would close.
+    do not move get no gap there that a reader would close.  Nor does an edge get a smaller tolerance than it had: files
+    state the mean of all, and by that a reader heals edges that nothing touched.
 
     Parameters
     ----------
@@ -40,13 +41,15 @@ def following(document: Document, edges: Mapping[int, int]) -> Iterator[None]:
         for edge, face in edges.items()
     ]
     old = [_ends(*each) for each in chosen]
+    tolerances = [BRep_Tool.Tolerance_s(edge) for edge, _ in chosen]
     yield
-    for edge, _ in chosen:
+    for (edge, _), tolerance in zip(chosen, tolerances, strict=True):
         builder.UpdateEdge(edge, None, _TOLERANCE)
         BRepLib.BuildCurve3d_s(edge, _TOLERANCE)
         builder.SameRange(edge, True)
         builder.SameParameter(edge, False)
         BRepLib.SameParameter_s(edge, _TOLERANCE)
+        builder.UpdateEdge(edge, tolerance)
     moved = TopTools_MapOfShape()
     for (edge, face), ends in zip(chosen, old, strict=True):
         vertices = TopExp.FirstVertex_s(edge), TopExp.LastVertex_s(edge)
