@@ -4,25 +4,28 @@ from __future__ import annotations
 
 import contextlib
 import os
-import tempfile
+import re
+import secrets
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import IO, BinaryIO
 
 from mracad import guard
 from mracad.errors import FileError
 
+PREFIX = ".mracad-"
+"""How the names of temporary files begin; 32 hexadecimal digits and ``.part`` follow, as no other file has them."""
+
 _ABANDONED = 60.0  # seconds: an unlocked temporary file of that age has no writer any more
 
 
 @contextlib.contextmanager
-def beside(target: str | os.PathLike, prefix: str = ".mracad-") -> Iterator[Path]:
+def beside(target: str | os.PathLike, prefix: str = PREFIX) -> Iterator[Path]:
     """A temporary path in the target's folder, which takes the target's place when the block ends well.
 
-    Nothing is left behind when it does not, unless the process is killed: then a file whose name begins with
-    ``prefix``.  It was locked while its writer lived; the next one to write into the folder, a minute later or more,
-    removes it.
+    Nothing is left behind when it does not, unless the process is killed: then a file that :func:`temporary` knows.
+    It was locked while its writer lived; the next one to write into the folder, a minute later or more, removes it.
 
     Raises
     ------
@@ -30,36 +33,58 @@ def beside(target: str | os.PathLike, prefix: str = ".mracad-") -> Iterator[Path
         When the target cannot be written.
     """
     path = Path(target)
-    try:
+    with _writing(path):
         if path.is_dir():
             raise IsADirectoryError("it is a folder")
         _remove_abandoned(path.parent, prefix)
-        handle, name = tempfile.mkstemp(prefix=prefix, suffix=path.suffix, dir=path.parent)
-    except OSError as error:
-        raise _unwritable(path, error) from error
-    temporary = Path(name)
+        made = path.parent / f"{prefix}{secrets.token_hex(16)}.part"
+        handle = os.open(made, os.O_RDWR | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o600)
     try:
         with os.fdopen(handle, "rb+") as held:
             with contextlib.suppress(OSError):
                 _lock(held)
-            yield temporary
-            os.fsync(held.fileno())
+            yield made
+            with _writing(path):
+                os.fsync(held.fileno())
         guard.ending()
-        temporary.chmod(_mode(path))
-        temporary.replace(path)
-    except FileError:
-        raise
-    except OSError as error:
-        raise _unwritable(path, error) from error
+        with _writing(path):
+            made.chmod(_mode(path))
+            made.replace(path)
     finally:
-        temporary.unlink(missing_ok=True)
+        made.unlink(missing_ok=True)
 
 
-def put(data: bytes, target: str | os.PathLike | BinaryIO, prefix: str = ".mracad-") -> None:
+def temporary(folder: Path, prefix: str = PREFIX) -> list[Path]:
+    """The temporary files in a folder, whether their writers live or not: told by their names."""
+    return [p for p in folder.glob(f"{prefix}*") if re.fullmatch(r"[0-9a-f]{32}\.part", p.name[len(prefix) :])]
+
+
+def put_all(files: Mapping[str | os.PathLike, bytes], last: Callable[[], object] = bool, prefix: str = PREFIX) -> None:
+    """Write files whole; where one cannot be written, or ``last`` fails, none takes its place.
+
+    Parameters
+    ----------
+    files : mapping
+    last : callable
+        Called when all are written and before the first takes its place.
+
+    Raises
+    ------
+    FileError
+        When a file cannot be written.
+    """
+    with contextlib.ExitStack() as stack:
+        for path, data in files.items():
+            made = stack.enter_context(beside(path, prefix))
+            with _writing(Path(path)):
+                made.write_bytes(data)
+        last()
+
+
+def put(data: bytes, target: str | os.PathLike | BinaryIO, prefix: str = PREFIX) -> None:
     """Write bytes to a path (whole or not at all) or to a binary stream; raises FileError."""
     if isinstance(target, str | os.PathLike):
-        with beside(target, prefix) as temporary:
-            temporary.write_bytes(data)
+        put_all({target: data}, prefix=prefix)
         return
     try:
         target.write(data)
@@ -78,7 +103,7 @@ def holds(path: Path, data: bytes) -> bool:
 
 def _remove_abandoned(folder: Path, prefix: str) -> None:
     """Remove the temporary files that killed writers left."""
-    for left in folder.glob(f"{prefix}*"):
+    for left in temporary(folder, prefix):
         with contextlib.suppress(OSError):
             if time.time() - left.stat().st_mtime > _ABANDONED:
                 with left.open("rb") as file:
@@ -104,5 +129,11 @@ def _mode(path: Path) -> int:
     return 0o666 & ~mask
 
 
-def _unwritable(path: Path, error: OSError) -> FileError:
-    return FileError(f"cannot write '{path}': {error.strerror or error}", "choose another place for the output")
+@contextlib.contextmanager
+def _writing(path: Path) -> Iterator[None]:
+    """What goes wrong in the block as the error of a file that cannot be written."""
+    try:
+        yield
+    except OSError as error:
+        hint = "choose another place for the output"
+        raise FileError(f"cannot write '{path}': {error.strerror or error}", hint) from error

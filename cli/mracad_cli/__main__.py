@@ -41,6 +41,18 @@ class Commands(click.Group):
             raise click.UsageError(f"no command {args[0]!r}" + (f", did you mean {near[0]!r}?" if near else ""))
         return super().resolve_command(ctx, args)
 
+    def invoke(self, ctx: click.Context) -> object:
+        try:
+            return super().invoke(ctx)
+        except BrokenPipeError as error:  # before click takes it for exit code 1
+            raise _unread() from error
+
+
+def _unread() -> MracadError:
+    """The error for output that nobody reads; what is left of it goes nowhere."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    return MracadError("the reader of standard output went away", "", Code.FILE)
+
 
 def _modules() -> set[str]:
     files = os.listdir(commands.__path__[0])
@@ -73,8 +85,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except (KeyboardInterrupt, click.Abort):
         failure = MracadError("interrupted", "nothing was written", Code.INTERRUPTED)
     except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        failure = MracadError("the reader of standard output went away", "", Code.FILE)
+        failure = _unread()
     except MemoryError:
         failure = MracadError("out of memory", "use a smaller model or a machine with more memory", Code.LIMIT)
     except Exception as error:
@@ -85,10 +96,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
             "please report it with the output of --debug",
         )
     if "--json" in arguments:
-        import json
+        from mracad_cli.render import json_text
 
         body = {"code": int(failure.code), "message": failure.message, "hint": failure.hint}
-        click.echo(json.dumps({"error": body}, ensure_ascii=False))
+        click.echo(json_text({"error": body}))
     click.echo(f"mracad: {' '.join(str(failure).split())}", err=True)
     return int(failure.code)
 

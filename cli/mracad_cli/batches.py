@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import sys
 import time
@@ -24,8 +23,9 @@ from mracad.errors import Code, MracadError
 from mracad.guard import size
 from mracad.options import duration
 from mracad.recipe import Recipe
-from mracad_cli.files import check_target, depfile_text, write_text
+from mracad_cli.files import check_reports, deliver, depfile_text
 from mracad_cli.progress import Progress
+from mracad_cli.render import json_text
 from mracad_cli.steps import needed, plan
 from mracad_cli.verdicts import clean
 
@@ -59,8 +59,7 @@ def run_batch(
         input_unit, (schema or "").upper(), overwrite, if_changed, record, retry, fail_fast=not keep_going
     )
     limits = Limits(duration(time_limit, "time-limit"), size(memory_limit) if memory_limit else 0)
-    for path in filter(None, (report, junit, depfile)):
-        check_target(Path(path), overwrite=True)
+    check_reports(report, junit, depfile, overwrite=True)
     words = [word for given in sources for word in (_listed() if given == "-" else [given])]
     items = find(words, Path(folder), format or "")
     if dry_run:
@@ -83,7 +82,7 @@ def run_batch(
             for outcome in results:
                 outcomes.append(outcome)
                 if as_json and outcome.status != "not tried":
-                    print(json.dumps(msgspec.to_builtins(outcome), ensure_ascii=False), flush=True)
+                    print(json_text(msgspec.to_builtins(outcome)), flush=True)
                 failed += outcome.status == "failed"
                 progress(f"{recipe.name}, {failed} failed" if failed else recipe.name, len(outcomes), len(items))
         except KeyboardInterrupt:
@@ -99,17 +98,14 @@ def run_batch(
         **{str(k): n for k, n in counts.items()},
         "seconds": seconds,
     }
+    files: dict[str, str] = {}
     if report:
-        write_text(Path(report), json.dumps({**body, "each": msgspec.to_builtins(outcomes)}, indent=1) + "\n")
+        files[report] = json_text({**body, "each": msgspec.to_builtins(outcomes)}, 1) + "\n"
     if junit:
-        write_text(Path(junit), junit_text(recipe.name, outcomes, seconds))
+        files[junit] = junit_text(recipe.name, outcomes, seconds)
     if depfile:
-        write_text(Path(depfile), _depfile(recipe, items, Path(folder)))
-    if as_json:
-        print(json.dumps({"summary": body}, ensure_ascii=False))
-    else:
-        for line in summary(outcomes, seconds):
-            print(line)
+        files[depfile] = _depfile(recipe, items, Path(folder))
+    deliver(files, [json_text({"summary": body})] if as_json else summary(outcomes, seconds))
     return 1 if failed else 0
 
 

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import contextlib
 import io
 import os
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -37,9 +36,12 @@ def read(source: str | Text, input_unit: str | None) -> Document:
 
 
 def check_reports(*paths: str | None, overwrite: bool) -> None:
-    """Refuse reports that could not be written."""
-    for path in filter(None, paths):
-        check_target(Path(path), overwrite)
+    """Refuse reports that could not be written, and two that would be the same file."""
+    given = [Path(path) for path in paths if path]
+    for number, path in enumerate(given):
+        if path.resolve() in [other.resolve() for other in given[:number]]:
+            raise UsageError(f"{path} is named twice", "give each file that is written a name of its own")
+        check_target(path, overwrite)
 
 
 def check_target(path: Path, overwrite: bool) -> None:
@@ -54,11 +56,36 @@ def check_target(path: Path, overwrite: bool) -> None:
         raise UsageError(f"{path} exists", "give --overwrite to replace it")
 
 
-def write_text(path: Path, text: str) -> None:
-    """Write a text file whole or not at all."""
-    from mracad.output import put
+def deliver(files: Mapping[str, str | bytes | None], lines: Iterable[str], *, stream: bytes | None = None) -> None:
+    """End a command: print what it says, and let its files take their places; all of this or nothing.
 
-    put(text.encode(errors="surrogateescape"), path)
+    Parameters
+    ----------
+    files : mapping
+        Contents by path; texts are written as UTF-8, what is None is left out.
+    lines : iterable of str
+        What is printed.
+    stream : bytes, optional
+        A model for standard output; the lines go to standard error then.
+
+    Raises
+    ------
+    FileError
+        When a file cannot be written.
+    """
+    from mracad.output import put_all
+
+    said = list(lines)
+
+    def say() -> None:
+        if stream is not None:
+            sys.stdout.buffer.write(stream)
+        for line in said:
+            print(line, file=sys.stdout if stream is None else sys.stderr)
+        sys.stdout.flush()
+
+    contents = {path: content for path, content in files.items() if content is not None}
+    put_all({p: c.encode(errors="surrogateescape") if isinstance(c, str) else c for p, c in contents.items()}, say)
 
 
 def depfile_text(outputs: Iterable[str], inputs: Iterable[str]) -> str:
@@ -72,7 +99,7 @@ def _for_make(path: str) -> str:
 
 
 class Outputs:
-    """The outputs of a command, and where its text goes (standard error when the model goes to standard output)."""
+    """The outputs of a command: made first, and put in their places at its end with what it says."""
 
     def __init__(
         self,
@@ -86,35 +113,29 @@ class Outputs:
         angle: float,
         ascii_stl: bool,
         needed: bool = True,
+        beside: Iterable[str | None] = (),
     ) -> None:
         self.paths, self.schema = paths, (schema or "").upper()
         self.overwrite, self.if_changed = overwrite or if_changed, if_changed
         self.chord, self.angle, self.ascii_stl = chord, angle, ascii_stl
         self.lost: dict[str, tuple[Lost, ...]] = {}
-        self._sizes: list[str] = []
+        self._made: dict[str, bytes] = {}
         if needed and not paths:
             raise UsageError("no output is named", "name a file with -o OUT.step, or - for standard output")
-        if len(set(paths)) < len(paths):
-            raise UsageError("the same output is named twice", "give each -o once")
+        if paths.count("-") > 1:
+            raise UsageError("- is named twice", "give each -o once")
         self.formats = {path: FORMATS[format] if path == "-" else by_ending(path) for path in paths}
-        for path in self.files():
-            check_target(Path(path), self.overwrite)
+        check_reports(*self.files(), *beside, overwrite=self.overwrite)
 
-    def check_report(self, path: str) -> None:
-        """Refuse a report that could not be written."""
-        check_target(Path(path), self.overwrite)
-
-    def write(self, document: Document, title: str) -> None:
-        """Write the document to every output; none is replaced unless all could be made."""
+    def make(self, document: Document, title: str) -> None:
+        """Make the content of every output; nothing is written yet."""
         from mracad.occ.files import write
-        from mracad.output import beside, holds
 
         meshed = any(format.kind == "mesh" for format in self.formats.values())
         chord = self._chord(document) if meshed else None
-        made: dict[str, bytes] = {}
         for path, format in self.formats.items():
             stream = io.BytesIO()
-            lost = write(
+            self.lost[self._name(path)] = write(
                 document,
                 stream,
                 format.name,
@@ -124,19 +145,18 @@ class Outputs:
                 ascii=self.ascii_stl,
                 options_text=title,
             )
-            made[path] = stream.getvalue()
-            self.lost[self._name(path)] = lost
-        with contextlib.ExitStack() as stack:
-            for path, data in made.items():
-                if path != "-" and not (self.if_changed and holds(Path(path), data)):
-                    stack.enter_context(beside(path)).write_bytes(data)
-        if "-" in made:
-            sys.stdout.buffer.write(made["-"])
-            sys.stdout.buffer.flush()
+            self._made[path] = stream.getvalue()
+
+    def deliver(self, files: Mapping[str, str | None], lines: Iterable[str]) -> None:
+        """End the command: what was made, texts beside it and the lines of the result, all or nothing."""
+        from mracad.output import holds
+
         for name, lost in self.lost.items():
             if lost:
                 print(f"warning: {name} lacks {', '.join(map(str, lost))}", file=sys.stderr)
-        self._sizes = [f"{self._name(path)}, {_size(len(data))}" for path, data in made.items()]
+        made = {p: d for p, d in self._made.items() if p != "-" and not (self.if_changed and holds(Path(p), d))}
+        stream = self._made.get("-", b"" if "-" in self.paths else None)
+        deliver({**made, **files}, lines, stream=stream)
 
     def _chord(self, document: Document) -> float:
         """The chord in millimetres; it may be a share of the diagonal."""
@@ -145,23 +165,15 @@ class Outputs:
 
         return length(self.chord, view(document).diagonal, "chord")
 
-    def say(self, line: str) -> None:
-        """Print a line of the result."""
-        print(line, file=sys.stderr if "-" in self.paths else sys.stdout)
-
     def files(self) -> list[str]:
         """The outputs that are files."""
         return [path for path in self.paths if path != "-"]
-
-    def records(self) -> list[str]:
-        """The files beside the outputs that say how they were made."""
-        return [f"{path}.toml" for path in self.files()]
 
     def names(self) -> list[str]:
         return [self._name(path) for path in self.paths]
 
     def sizes(self) -> str:
-        return ", ".join(self._sizes)
+        return ", ".join(f"{self._name(path)}, {_size(len(data))}" for path, data in self._made.items())
 
     @staticmethod
     def _name(path: str) -> str:

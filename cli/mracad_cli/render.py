@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import json
+import math
+import sys
 from collections import Counter
 from typing import TYPE_CHECKING, Any
 
@@ -146,6 +149,26 @@ def seam_line(new: SeamSummary, old: SeamSummary | None = None) -> str:
         angle, gap = f"{angle} (was {degrees(old.angle)})", f"{gap} (was {mm(old.gap)})"
     line = f"seams: {new.smooth} smooth of {new.seams}, angle ≤ {angle}; gap ≤ {gap}"
     return line + (f"; {new.unsewn} not sewn" if new.unsewn else "")
+
+
+def json_text(value: Any, indent: int | None = None) -> str:
+    """JSON that any reader takes: what is not finite is null, signs that cannot be written as they are, escaped."""
+    body = _finite(value)
+    text = json.dumps(body, indent=indent, ensure_ascii=False)
+    try:
+        for encoding in {"utf-8", sys.stdout.encoding or "utf-8"}:
+            text.encode(encoding)
+    except UnicodeEncodeError:
+        return json.dumps(body, indent=indent)
+    return text
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _finite(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def plain(value: Any) -> Any:

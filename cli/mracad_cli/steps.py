@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -13,10 +11,11 @@ from msgspec import structs
 
 from mracad.options import STEPS, Selection
 from mracad_cli import options
-from mracad_cli.files import Outputs, depfile_text, load, read, write_text
+from mracad_cli.files import Outputs, depfile_text, load, read
 from mracad_cli.progress import Progress
 
 if TYPE_CHECKING:
+    from mracad.job import Judged, Report
     from mracad.occ import Document
     from mracad.recipe import Recipe, Step
 
@@ -66,13 +65,8 @@ def run_steps(
     from mracad_cli import render
 
     start = time.perf_counter()
-    targets = Outputs(outputs, needed=not dry_run, **formats)
-    for path in (report, depfile, *(targets.records() if record else ())):
-        if path:
-            targets.check_report(path)
-    if recipe and dry_run and not as_json:
-        for line in plan(steps):
-            targets.say(line)
+    records = [f"{path}.toml" for path in outputs if record and path != "-"]
+    targets = Outputs(outputs, needed=not dry_run, beside=(report, depfile, *records), **formats)
     with Progress() as progress:
         progress("reading", 0, 1)
         text = load(source)
@@ -87,37 +81,41 @@ def run_steps(
         written = not (dry_run or failed)
         if written:
             progress("writing", 0, 1)
-            targets.write(document, title(steps))
-    if written and record:
-        for path in targets.records():
-            write_text(Path(path), record_of(steps))
-    if written and depfile:
+            targets.make(document, title(steps))
+    body = _body(document.name, steps, results, recipe)
+    body |= {"written": targets.names() if written else [], "lost": render.plain(targets.lost)}
+    files: dict[str, str | None] = {report: render.json_text(body, 1) + "\n"} if report else {}
+    if written:
+        files |= dict.fromkeys(records, record_of(steps))
         needs = [source] * (source != "-") + needed(steps, recipe)
-        write_text(Path(depfile), depfile_text(targets.files(), needs))
-    parts = [render.result(result) for result in results]
-    for part, step in zip(parts, steps, strict=False):
-        part["options"] = structs.asdict(step.options)
-    ends = {"written": targets.names() if written else [], "lost": render.plain(targets.lost)}
-    if recipe:
-        named = [{"step": s.id, "use": s.use, **part} for s, part in zip(steps, parts, strict=False)]
-        body: dict[str, Any] = {"file": document.name, "steps": named, **ends}
-    else:
-        body = {**parts[0], **ends}
-    if report:
-        write_text(Path(report), json.dumps(body, indent=1, ensure_ascii=False) + "\n")
+        files |= {depfile: depfile_text(targets.files(), needs)} if depfile else {}
     end = f"wrote {targets.sizes()}" if written else f"{'dry run, ' if dry_run else ''}nothing written"
     end += "" if dry_run else f", {time.perf_counter() - start:.1f} s"
     if as_json:
-        targets.say(json.dumps(body, ensure_ascii=False))
+        lines = [render.json_text(body)]
     elif recipe:
-        for step, result in zip(steps, results, strict=False):
-            for line in render.step_lines(step, result):
-                targets.say(line)
-        targets.say(end)
+        told = [line for step, result in zip(steps, results, strict=False) for line in render.step_lines(step, result)]
+        lines = [*(plan(steps) if dry_run else []), *told, end]
     else:
-        for line in render.edit_lines(results[0], steps[0].options, end):  # type: ignore[arg-type]  # it is an edit
-            targets.say(line)
+        lines = render.edit_lines(results[0], steps[0].options, end)  # type: ignore[arg-type]  # it is an edit
+    targets.deliver(files, lines)
     return 1 if failed else 0
+
+
+def _body(
+    name: str, steps: Sequence[Step], results: Sequence[Report | Judged], recipe: Recipe | None
+) -> dict[str, Any]:
+    """The full report: that of an edit, or with a recipe that of each step."""
+    from mracad_cli import render
+
+    parts = [
+        {**render.result(result), "options": structs.asdict(step.options)}
+        for step, result in zip(steps, results, strict=False)
+    ]
+    if not recipe:
+        return parts[0]
+    named = [{"step": s.id, "use": s.use, **part} for s, part in zip(steps, parts, strict=False)]
+    return {"file": name, "steps": named}
 
 
 def plan(steps: Sequence[Step]) -> list[str]:

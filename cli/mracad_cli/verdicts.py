@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import json
 import math
 import re
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as Xml
 
@@ -14,7 +12,8 @@ import msgspec
 
 import mracad
 from mracad.audit.verdict import Finding, Layer, Verdict
-from mracad_cli.files import write_text
+from mracad_cli.files import deliver
+from mracad_cli.render import json_text
 
 SHOWN = 8
 """Most findings of one layer in the text."""
@@ -38,15 +37,9 @@ def emit(
     junit, sarif : str or None
         Files to write.
     """
-    if junit:
-        write_text(Path(junit), _junit(verdict, failed, command))
-    if sarif:
-        write_text(Path(sarif), json.dumps(_sarif(verdict, failed, command), indent=1, ensure_ascii=False) + "\n")
-    if as_json:
-        print(json.dumps(as_data(verdict, failed), ensure_ascii=False))
-    else:
-        for line in _lines(verdict, failed):
-            print(line)
+    files = {junit: _junit(verdict, failed, command)} if junit else {}
+    files |= {sarif: json_text(_sarif(verdict, failed, command), 1) + "\n"} if sarif else {}
+    deliver(files, [json_text(as_data(verdict, failed))] if as_json else _lines(verdict, failed))
     return 1 if failed else 0
 
 

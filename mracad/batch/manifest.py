@@ -10,11 +10,12 @@ import contextlib
 import hashlib
 import json
 import os
+from collections.abc import Mapping
 from pathlib import Path
-from types import TracebackType
+from types import MappingProxyType, TracebackType
 
 from mracad.errors import FileError
-from mracad.output import holds, put
+from mracad.output import holds, put_all, temporary
 
 NAME = "manifest.jsonl"
 
@@ -41,8 +42,9 @@ class Manifest:
         except OSError as error:
             raise FileError(f"cannot write '{path}': {error.strerror}", "choose another folder") from error
         _lock(self._file.fileno(), folder)
-        for left in folder.rglob(f"{UNFINISHED}*"):
-            left.unlink(missing_ok=True)
+        for below, _, _ in os.walk(folder):
+            for left in temporary(Path(below), UNFINISHED):
+                left.unlink(missing_ok=True)
         self._file.seek(0)
         text = self._file.read()
         for line in text.splitlines():
@@ -74,8 +76,16 @@ class Manifest:
         except OSError:
             return False
 
-    def write(self, output: str, key: str, data: bytes, if_changed: bool = False) -> None:
-        """Note an output and write it, whole or not at all; raises FileError.
+    def write(
+        self,
+        output: str,
+        key: str,
+        data: bytes,
+        beside: Mapping[str, bytes] = MappingProxyType({}),
+        *,
+        if_changed: bool = False,
+    ) -> None:
+        """Note an output and write it and what belongs to it, all or nothing; raises FileError.
 
         Parameters
         ----------
@@ -84,18 +94,26 @@ class Manifest:
         key : str
             A hash of everything that it depends on.
         data : bytes
+        beside : mapping
+            Contents of files that belong to it, by their names relative to the folder.
         if_changed : bool
             Leave a file alone that has this content.
         """
-        target = self.folder / output
         try:
             self._note(output, key, data)
         except OSError as error:
             raise FileError(f"cannot write '{self._file.name}': {error.strerror}", "make room for it") from error
-        if not (if_changed and holds(target, data)):
-            with contextlib.suppress(OSError):  # writing says it better
-                target.parent.mkdir(parents=True, exist_ok=True)
-            put(data, target, UNFINISHED)
+        with contextlib.suppress(OSError):  # writing says it better
+            (self.folder / output).parent.mkdir(parents=True, exist_ok=True)
+        self._put({output: data, **beside}, if_changed)
+
+    def restore(self, beside: Mapping[str, bytes]) -> None:
+        """Write what belongs to an output that is done, where it is not there."""
+        self._put(beside, True)
+
+    def _put(self, contents: Mapping[str, bytes], if_changed: bool) -> None:
+        places = {self.folder / name: content for name, content in contents.items()}
+        put_all({p: c for p, c in places.items() if not (if_changed and holds(p, c))}, prefix=UNFINISHED)
 
     def _note(self, output: str, key: str, data: bytes) -> None:
         entry = {"output": output, "key": key, "sha256": digest(data)}

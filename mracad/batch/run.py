@@ -14,11 +14,10 @@ from pathlib import Path
 from typing import Any, Literal, Protocol
 
 from mracad.batch.cluster import lost
-from mracad.batch.manifest import UNFINISHED, Manifest, digest
+from mracad.batch.manifest import Manifest, digest
 from mracad.batch.work import Product, Work, do
 from mracad.errors import Code, FileError, MracadError, UsageError
 from mracad.formats import FORMATS, READABLE, by_ending
-from mracad.output import holds, put
 from mracad.recipe import Recipe, record_of
 
 AHEAD = 2
@@ -253,7 +252,7 @@ class _Batch:
         key = self._key(work)
         if self.manifest.done(item.output, key):
             try:
-                self._record(item, work)
+                self.manifest.restore(self._record(item, work))
             except MracadError as error:
                 return _failed(item, error)
             return Outcome(item.source, item.output, "unchanged")
@@ -281,11 +280,9 @@ class _Batch:
         task.start = time.perf_counter()
         self.pending[self.executor.submit(do, task.work)] = task
 
-    def _record(self, item: Item, work: Work) -> None:
-        """Write the resolved recipe beside the output where asked."""
-        target, data = self.manifest.folder / f"{item.output}.toml", record_of(work.steps).encode()
-        if self.settings.record and not holds(target, data):
-            put(data, target, UNFINISHED)
+    def _record(self, item: Item, work: Work) -> dict[str, bytes]:
+        """The resolved recipe that goes beside the output, where asked."""
+        return {f"{item.output}.toml": record_of(work.steps).encode()} if self.settings.record else {}
 
     def _check_target(self, item: Item) -> None:
         target = self.manifest.folder / item.output
@@ -302,8 +299,8 @@ class _Batch:
 
     def _written(self, task: _Task, product: Product) -> Outcome:
         output = task.item.output
-        self.manifest.write(output, task.key, product.data, self.settings.if_changed)
-        self._record(task.item, task.work)
+        beside = self._record(task.item, task.work)
+        self.manifest.write(output, task.key, product.data, beside, if_changed=self.settings.if_changed)
         return Outcome(
             task.item.source, output, "done", seconds=product.seconds, attempts=task.attempts, steps=product.steps
         )

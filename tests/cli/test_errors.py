@@ -1,6 +1,7 @@
 """Bad input: one line that says what is wrong and what to do, the exit code, and no file written or touched."""
 
 import json
+import os
 import subprocess
 import sys
 
@@ -127,3 +128,31 @@ def test_bad_usage_in_a_process_of_its_own(samples, tmp_path, words, says):
 def test_a_dry_run_needs_no_output(mracad, samples):
     result = mracad("smooth", samples / "panel.step", "--scale", "16mm", "--dry-run")
     assert result.code == 0 and "dry run, nothing written" in result.out
+
+
+def test_nothing_is_written_when_a_report_cannot_be_made(mracad, samples, tmp_path, monkeypatch):
+    from mracad_cli import render
+
+    monkeypatch.setattr(render, "report", lambda _: {"figure": object()})
+    for words in (["--json"], ["--report", tmp_path / "report.json"]):
+        words += ["--dry-run"] if "--report" in words else ["-o", tmp_path / "out.step", "--depfile", tmp_path / "d"]
+        assert mracad("smooth", samples / "blade.step", "--scale", "5%", *words).code == 70
+        assert not list(tmp_path.iterdir())
+
+
+def test_nothing_is_written_when_nobody_reads_the_result(samples, tmp_path):
+    words = ["smooth", str(samples / "blade.step"), "--scale", "5%", "-o", "out.step", "--report", "report.json"]
+    reader, writer = os.pipe()
+    os.close(reader)
+    command = [sys.executable, "-m", "mracad_cli", *words]
+    result = subprocess.run(command, stdout=writer, stderr=subprocess.PIPE, text=True, cwd=tmp_path)
+    os.close(writer)
+    assert result.returncode == 3 and "went away" in result.stderr and not list(tmp_path.iterdir())
+
+
+def test_two_files_of_one_name(mracad, samples, tmp_path):
+    blade, one = samples / "blade.step", tmp_path / "one.step"
+    for words in (["-o", one, "-o", one], ["-o", one, "--report", one], ["-o", one, "--report", "r", "--depfile", "r"]):
+        one_line(mracad("smooth", blade, "--scale", "5%", *words), 2)
+    one_line(mracad("check", blade, "--junit", one, "--sarif", tmp_path / "." / "one.step"), 2)
+    assert not list(tmp_path.iterdir())

@@ -11,6 +11,7 @@ import time
 import pytest
 
 from mracad import guard, output
+from mracad.batch.manifest import Manifest
 from mracad.errors import Code, EditError, FileError, MracadError
 from tests.robust import kill, mutate
 
@@ -28,7 +29,9 @@ def test_kills_leave_the_old_file_or_the_new_one():
 
 
 def test_what_killed_writers_left_is_removed(tmp_path):
-    left, held, young = (tmp_path / f".mracad-{name}" for name in ("left", "held", "young"))
+    with output.beside(tmp_path / "out.step") as made:
+        name = made.name
+    left, held, young = (tmp_path / name.replace(name[8:16], digits * 8) for digits in "abc")
     for path in (left, held, young):
         path.write_bytes(b"part of a file")
     for path in (left, held):
@@ -36,7 +39,38 @@ def test_what_killed_writers_left_is_removed(tmp_path):
     with held.open() as writer:
         fcntl.flock(writer, fcntl.LOCK_EX)
         output.put(b"whole", tmp_path / "out.step")
-    assert {path.name for path in tmp_path.iterdir()} == {".mracad-held", ".mracad-young", "out.step"}
+    assert {path.name for path in tmp_path.iterdir()} == {held.name, young.name, "out.step"}
+
+
+def test_files_of_the_user_are_not_taken_for_those_of_killed_writers(tmp_path):
+    own = [tmp_path / name for name in (".mracad-notes", ".mracad-batch-list.txt", f".mracad-{'ab' * 15}.part")]
+    for path in own:
+        path.write_text("of the user")
+        os.utime(path, (0, 0))
+    output.put(b"whole", tmp_path / "out.step")
+    with Manifest(tmp_path) as manifest:
+        manifest.write("two.step", "key", b"whole")
+    assert all(path.read_text() == "of the user" for path in own)
+
+
+def test_files_are_written_all_or_none(tmp_path):
+    """One that cannot be written, or a reader that went away before, leaves the others as they were."""
+    one, two = tmp_path / "one", tmp_path / "two"
+    one.write_text("old")
+    with pytest.raises(FileError, match="no/two"):
+        output.put_all({one: b"new", tmp_path / "no" / "two": b"new"})
+    with pytest.raises(BrokenPipeError):
+        output.put_all({one: b"new", two: b"new"}, last=lambda: os.write(closed(), b"lines"))
+    assert one.read_text() == "old" and [path.name for path in tmp_path.iterdir()] == ["one"]
+    output.put_all({one: b"new", two: b"new"})
+    assert one.read_text() == two.read_text() == "new"
+
+
+def closed():
+    """A pipe without a reader."""
+    reader, writer = os.pipe()
+    os.close(reader)
+    return writer
 
 
 def test_a_file_that_is_being_written_is_not_taken_for_one_that_was_left(tmp_path):

@@ -13,11 +13,10 @@ from mracad_cli.progress import Progress
 @click.command(help=__doc__)
 @options.apply(options.reading, options.writing, options.printing)
 def command(source: str, input_unit: str | None, as_json: bool, outputs: tuple[str, ...], **formats: Any) -> int:
-    import json
     import time
 
     from mracad_cli.files import Outputs, read
-    from mracad_cli.render import plain
+    from mracad_cli.render import json_text, plain
 
     start = time.perf_counter()
     targets = Outputs(outputs, **formats)
@@ -25,10 +24,9 @@ def command(source: str, input_unit: str | None, as_json: bool, outputs: tuple[s
         progress("reading", 0, 1)
         document = read(source, input_unit)
         progress("writing", 0, 1)
-        targets.write(document, "convert")
+        targets.make(document, "convert")
+    line = f"{document.name}: wrote {targets.sizes()}, {time.perf_counter() - start:.1f} s"
     if as_json:
-        body = {"file": document.name, "written": targets.names(), "lost": plain(targets.lost)}
-        targets.say(json.dumps(body, ensure_ascii=False))
-    else:
-        targets.say(f"{document.name}: wrote {targets.sizes()}, {time.perf_counter() - start:.1f} s")
+        line = json_text({"file": document.name, "written": targets.names(), "lost": plain(targets.lost)})
+    targets.deliver({}, [line])
     return 0

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +10,7 @@ import click
 from mracad.errors import UsageError
 from mracad.options import Repeat, Selection
 from mracad_cli import options
-from mracad_cli.files import check_target, read
+from mracad_cli.files import check_target, deliver, read
 
 
 @click.group(help=__doc__)
@@ -25,13 +24,13 @@ def list_(source: str, input_unit: str | None, faces: tuple[str, ...], as_json: 
     """Propose features: places where the detail of a face stands out, with size, height and scales."""
     from mracad import job
     from mracad.feature.find import found
-    from mracad_cli.render import mm, plain
+    from mracad_cli.render import json_text, mm, plain
 
     model, chosen, _ = job.looked_at(read(source, input_unit), faces, ())
     features = found(model, chosen)
     if as_json:
         body = [{**plain(f), "face": f.face + 1, "feature": f.text} for f in features]
-        print(json.dumps({"file": model.name, "features": body}, ensure_ascii=False))
+        print(json_text({"file": model.name, "features": body}))
         return
     for f in features:
         scales = f"{mm(f.scales[0])} to {mm(f.scales[1])}"
@@ -58,9 +57,8 @@ def extract(
     from mracad import job
     from mracad.edit.features import extract as taken
     from mracad.feature.detail import save
-    from mracad.output import put
     from mracad.recipe import options as options_of
-    from mracad_cli.render import mm
+    from mracad_cli.render import json_text, mm
 
     path = Path(output)
     if path.suffix != ".feature":
@@ -69,7 +67,6 @@ def extract(
     chosen_options = options_of(Repeat, {**given, "feature": feature, "at": ("0,0,0",)})
     model, chosen, _ = job.looked_at(read(source, input_unit), chosen_options.faces, ())
     found = taken(model, chosen_options, chosen)
-    put(save(found), path)
     body = {
         "file": model.name,
         "radius": found.radius,
@@ -77,7 +74,5 @@ def extract(
         "height": found.height,
         "written": path.name,
     }
-    if as_json:
-        print(json.dumps(body, ensure_ascii=False))
-    else:
-        print(f"{model.name}: {mm(found.height)} high, {mm(2 * found.radius)} across; wrote {path.name}")
+    said = f"{model.name}: {mm(found.height)} high, {mm(2 * found.radius)} across; wrote {path.name}"
+    deliver({output: save(found)}, [json_text(body) if as_json else said])

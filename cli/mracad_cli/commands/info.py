@@ -38,8 +38,6 @@ if TYPE_CHECKING:
     options.printing,
 )
 def command(source: str, input_unit: str | None, scale: str, keep: Any, everything: bool, as_json: bool) -> int:
-    import json
-
     from mracad.audit.continuity import seams, summary
     from mracad.edit.smooth import smooth
     from mracad.occ.check import check
@@ -74,7 +72,7 @@ def command(source: str, input_unit: str | None, scale: str, keep: Any, everythi
             "seams": {**render.plain(summary(measures)), "each": [render.seam(m) for m in measures]},
             "valid": render.validity(valid),
         }
-        print(json.dumps(body, ensure_ascii=False))
+        print(render.json_text(body))
         return 0
     kinds = Counter(face.kind for face in model.faces)
     print(f"{model.name}: {model.schema or 'unknown schema'}, unit {model.unit}, diagonal {render.mm(model.diagonal)}")

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import json
-
 import click
 
 from mracad_cli import options
+from mracad_cli.render import json_text
 from mracad_cli.steps import plan
 
 
@@ -26,7 +25,7 @@ def check(file: str, assignments: tuple[str, ...], as_json: bool) -> None:
     steps = found.steps("model.step")
     if as_json:
         listed = [{"id": step.id, "use": step.use, "text": step.text()} for step in steps]
-        print(json.dumps({"recipe": found.name, "steps": listed}, ensure_ascii=False))
+        print(json_text({"recipe": found.name, "steps": listed}))
     else:
         for line in plan(steps):
             print(line)
@@ -37,4 +36,4 @@ def schema() -> None:
     """Print the JSON schema of recipes, for editors and validators."""
     from mracad import recipe
 
-    print(json.dumps(recipe.schema(), indent=1, ensure_ascii=False))
+    print(json_text(recipe.schema(), 1))
