@@ -15,9 +15,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mracad.bspline.basis import basis
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.net import Net
+from mracad.constraint.crease import crease_lines
 from mracad.constraint.fairing import Fairing, border_noise
 from mracad.constraint.frozen import REFINED_SHARE, Separation, halvings, reached, separate
 from mracad.edit.bound import OVERSHOOT, bounded, deviation
@@ -26,13 +26,10 @@ from mracad.edit.result import Edit, FaceOutcome, Status
 from mracad.edit.together import Together
 from mracad.model import Displacement, Face, Model, Offset, Surface
 from mracad.options import Smooth, length
-from mracad.wavelet.ladder import arc_lengths, ladder_for_scale, rungs_by_level
+from mracad.wavelet.ladder import arc_lengths, finest_scale, ladder_for_scale, rungs_by_level
 from mracad.wavelet.project import projection
 
 Array = np.ndarray
-
-KINK = math.radians(0.1)
-"""A knot line of full multiplicity is a crease line where the normal turns by more than this across it."""
 
 DETAIL = 1e-7
 """Least change of a control point, mm, that counts as detail: the kernel's coincidence tolerance."""
@@ -108,7 +105,9 @@ class _SurfaceSmoothing:
         self.spans = (arc_lengths(self.net, 0), arc_lengths(self.net, 1))
         self.reach = reached(self.net, self.faces)
         inside = np.logical_or.reduce(list(self.reach.values()))
-        self.creases = (_crease_lines(self.net, 0, inside), _crease_lines(self.net, 1, inside))
+        self.creases = (crease_lines(self.net, 0, inside), crease_lines(self.net, 1, inside))
+        least = [finest_scale(*each) for each in zip(_pair(self.net), self.spans, self.creases, strict=True)]
+        self.finest = min(filter(None, least), default=0.0)
         self.fairing, self.inserted, self.coarser, self.entangled = 0.0, 0, False, False
         self.offset: Offset | None = None
 
@@ -163,7 +162,6 @@ class _SurfaceSmoothing:
         detail = _largest(self.change, reach)
         free = int((reach & self.separation.free).sum())
         moved = _largest(self.moved, reach) if self.moved.shape == self.net.poles.shape else _largest(self.moved)
-        pairs = [(s[1:] + s[:-1]).min() for s in self.spans if len(s) > 1]
         creases = sum(len(c) for c in self.creases)
         status: Status
         if held or not edited:
@@ -171,7 +169,10 @@ class _SurfaceSmoothing:
         elif self.offset is not None and moved > 0.0:
             status, reason = "edited", ""
         elif not self.coarser:
-            status, reason = "unchanged", "crease lines only" if creases and pairs else "no span finer than the scale"
+            status, reason = (
+                "unchanged",
+                "crease lines only" if creases and not self.finest else "no span finer than the scale",
+            )
         elif detail <= DETAIL:
             status, reason = "unchanged", "no detail"
         elif self.options.amount == 0:
@@ -189,7 +190,7 @@ class _SurfaceSmoothing:
             free=free,
             points=int(reach.sum()),
             spans=(float(min(s.min() for s in self.spans)), float(max(s.max() for s in self.spans))),
-            scale=float(min(pairs, default=0.0)),
+            scale=self.finest,
             creases=creases,
             fairing=self.fairing if status == "edited" else 0.0,
             inserted=self.inserted,
@@ -281,28 +282,3 @@ def _largest(change: Array, points: Array | None = None) -> float:
     """Length of the longest vector of ``change`` (nu, nv, 3), mm, among ``points``."""
     vectors = change.reshape(-1, 3) if points is None else change[points]
     return float(np.sqrt((vectors**2).sum(axis=-1).max(initial=0.0)))
-
-
-def _crease_lines(net: Net, axis: int, visible: Array) -> frozenset[float]:
-    """Interior knots of full multiplicity across which the normal turns by more than the kink angle.
-
-    Parameters
-    ----------
-    axis : int
-        0 for lines u = const, 1 for v = const.
-    visible : ndarray of bool (nu, nv)
-        Control points that some face depends on; a line counts only where one of those on it is visible.
-    """
-    knots, other = _pair(net)[axis], _pair(net)[1 - axis]
-    full = np.flatnonzero(knots.multiplicities[1:-1] >= knots.degree) + 1
-    if not len(full):
-        return frozenset()
-    lines, across = knots.breaks[full], other.greville()
-    first, values = basis(knots, lines)
-    on = (first + values.argmax(axis=1)) % knots.count
-    line, place = np.nonzero((visible if axis == 0 else visible.T)[on])
-    points = np.ascontiguousarray(np.stack([lines[line], across[place]], axis=1)[:, :: 1 - 2 * axis])
-    before = net.normals(points, side=("left", "right") if axis == 0 else ("right", "left"))
-    after = net.normals(points)
-    turn = np.arctan2(np.linalg.norm(np.cross(before, after), axis=1), (before * after).sum(axis=1))
-    return frozenset(float(x) for x in lines[np.unique(line[turn > KINK])])

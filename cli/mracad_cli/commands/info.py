@@ -12,7 +12,7 @@ from mracad_cli import options, render
 from mracad_cli.progress import Progress
 
 if TYPE_CHECKING:
-    from mracad.edit.result import FaceOutcome
+    from mracad.audit.scales import FaceScales
     from mracad.model import Face, Model
 
 
@@ -20,14 +20,14 @@ if TYPE_CHECKING:
 @options.apply(
     options.reading,
     click.option(
-        "--scale", metavar="LENGTH", default="2%", show_default=True, help="Scale at which to judge smoothing."
+        "--scale", metavar="LENGTH", default="2%", show_default=True, help="Scale at which to look for detail."
     ),
     click.option(
         "--keep",
         type=click.Choice(["g0", "g1", "g2"]),
         default="g1",
         show_default=True,
-        help="Continuity that smoothing would keep; it decides which poles are free.",
+        help="Continuity that edges keep; it decides which control points are free.",
     ),
     click.option(
         "--all",
@@ -39,26 +39,24 @@ if TYPE_CHECKING:
 )
 def command(source: str, input_unit: str | None, scale: str, keep: Any, everything: bool, as_json: bool) -> int:
     from mracad.audit.continuity import seams, summary
-    from mracad.edit.smooth import smooth
+    from mracad.audit.scales import scales
     from mracad.occ.check import check
     from mracad.occ.instance import instances
     from mracad.occ.view import view
-    from mracad.options import Smooth, length
+    from mracad.options import length
     from mracad_cli.files import read
 
     with Progress() as progress:
         progress("reading", 0, 1)
         document = read(source, input_unit)
+        progress("looking at faces", 0, 1)
         model = view(document)
-        outcomes = smooth(
-            model,
-            Smooth(scale=scale, keep=keep),
-            progress=lambda done, total: progress("looking at faces", done, total),
-        ).outcomes
+        width = length(scale, model.diagonal, "scale")
+        found = scales(model, width, keep, lambda done, total: progress("looking at scales", done, total))
+        progress("measuring seams", 0, 1)
         measures = seams(model)
         progress("checking", 0, 1)
         valid = check(document)
-    width = length(scale, model.diagonal, "scale")
     if as_json:
         body = {
             "file": model.name,
@@ -68,7 +66,7 @@ def command(source: str, input_unit: str | None, scale: str, keep: Any, everythi
             "instances": list(instances(document)),
             "diagonal": model.diagonal,
             "scale": width,
-            "faces": [{**_facts(model, f), **_judged(o)} for f, o in zip(model.faces, outcomes, strict=True)],
+            "faces": [{**_facts(model, face), **_judged(face, found.get(face.index))} for face in model.faces],
             "seams": {**render.plain(summary(measures)), "each": [render.seam(m) for m in measures]},
             "valid": render.validity(valid),
         }
@@ -83,13 +81,9 @@ def command(source: str, input_unit: str | None, scale: str, keep: Any, everythi
     print(f"faces: {len(model.faces)}: " + ", ".join(f"{n} {kind}" for kind, n in kinds.most_common()))
     print(render.seam_line(summary(measures)))
     print(f"valid: {render.verdict(valid.valid)}" + "".join(f"\n  {failure}" for failure in valid.failures[:10]))
-    rows = [
-        _row(model, face, outcome)
-        for face, outcome in zip(model.faces, outcomes, strict=True)
-        if everything or face.surface is not None
-    ]
+    rows = [_row(model, face, found.get(face.index)) for face in model.faces if everything or face.surface is not None]
     if rows:
-        print(f"smoothing is judged at {render.mm(width)}, keeping {keep.upper()}")
+        print(f"detail below {render.mm(width)}, free with all edges held at {keep.upper()}")
         _table(["face", "type", "degree", "net", "shape", "free", "spans mm", "at this scale", "from", "name"], rows)
     if everything and measures:
         _table(
@@ -133,45 +127,62 @@ def _facts(model: Model, face: Face) -> dict[str, Any]:
     return facts
 
 
-def _judged(outcome: FaceOutcome) -> dict[str, Any]:
-    """What smoothing at the given scale would do to the face, and why."""
+def _judged(face: Face, scales: FaceScales | None) -> dict[str, Any]:
+    """What there is to smooth on a face at the given scale, and what stands against it."""
+    status, reason = _status(face, scales)
     return {
-        "smoothing": "changes" if outcome.status == "edited" else outcome.status,
-        "reason": outcome.reason,
-        "detail": outcome.detail,
-        "free_poles": outcome.free,
-        "visible_poles": outcome.points,
-        "spans": list(outcome.spans),
-        "finest_scale": outcome.scale,
-        "crease_lines": outcome.creases,
+        "smoothing": status,
+        "reason": reason,
+        "detail": scales.detail if scales else 0.0,
+        "detail_rms": scales.rms if scales else 0.0,
+        "free_poles": scales.free if scales else 0,
+        "visible_poles": scales.points if scales else 0,
+        "spans": list(scales.spans) if scales else [0.0, 0.0],
+        "finest_scale": scales.finest if scales else 0.0,
+        "crease_lines": scales.creases if scales else 0,
     }
 
 
-def _row(model: Model, face: Face, outcome: FaceOutcome) -> Sequence[str]:
+def _status(face: Face, scales: FaceScales | None) -> tuple[str, str]:
+    """A word for what smoothing at the given scale would meet, and the reason where it would change nothing."""
+    from mracad.audit.scales import LEAST
+
+    if scales is None:
+        return "analytic", f"{face.kind}, not a NURBS face"
+    if not scales.coarser:
+        creases = scales.creases and not scales.finest
+        return "unchanged", "crease lines only" if creases else "no span finer than the scale"
+    if scales.detail <= LEAST:
+        return "unchanged", "no detail"
+    return ("changes", "") if scales.free else ("stuck", "no free control points unless edges move or with --refine")
+
+
+def _row(model: Model, face: Face, scales: FaceScales | None) -> Sequence[str]:
     name = face.name or face.product
-    if face.surface is None:
-        return f"#{face.index + 1}", face.kind, "", "", "", "", "", outcome.reason, "", name
+    status, reason = _status(face, scales)
+    if scales is None or face.surface is None:
+        return f"#{face.index + 1}", face.kind, "", "", "", "", "", reason, "", name
     net = model.surfaces[face.surface].net
     shape = [
         word
         for word, true in (
             ("rational", net.weights is not None),
             ("periodic", net.u.periodic or net.v.periodic),
-            (f"{outcome.creases} crease lines", outcome.creases),
+            (f"{scales.creases} crease lines", scales.creases),
         )
         if true
     ]
-    verdict = f"changes by {outcome.moved:.2g} mm" if outcome.status == "edited" else outcome.reason
+    change = f"changes by {scales.detail:.2g} mm, rms {scales.rms:.2g}"
     return (
         f"#{face.index + 1}",
         face.kind,
         f"{net.u.degree}x{net.v.degree}",
         "x".join(map(str, net.poles.shape[:2])),
         " ".join(shape),
-        f"{outcome.free}/{outcome.points}",
-        f"{outcome.spans[0]:.3g}–{outcome.spans[1]:.3g}",
-        verdict,
-        f"{outcome.scale:.3g} mm" if outcome.scale else "never",
+        f"{scales.free}/{scales.points}",
+        f"{scales.spans[0]:.3g}–{scales.spans[1]:.3g}",
+        change if status == "changes" else f"{change}: {reason}" if status == "stuck" else reason,
+        f"{scales.finest:.3g} mm" if scales.finest else "never",
         name,
     )
 

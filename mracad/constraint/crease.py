@@ -1,0 +1,40 @@
+"""Crease lines: knot lines inside a face along which it is meant to be sharp."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from mracad.bspline.basis import basis
+from mracad.bspline.net import Net
+
+Array = np.ndarray
+
+KINK = math.radians(0.1)
+"""A knot line of full multiplicity is a crease line where the normal turns by more than this across it."""
+
+
+def crease_lines(net: Net, axis: int, visible: Array) -> frozenset[float]:
+    """Interior knots of full multiplicity across which the normal turns by more than the kink angle.
+
+    Parameters
+    ----------
+    axis : int
+        0 for lines u = const, 1 for v = const.
+    visible : ndarray of bool (nu, nv)
+        Control points that some face depends on; a line counts only where one of those on it is visible.
+    """
+    knots, other = (net.u, net.v)[axis], (net.u, net.v)[1 - axis]
+    full = np.flatnonzero(knots.multiplicities[1:-1] >= knots.degree) + 1
+    if not len(full):
+        return frozenset()
+    lines, across = knots.breaks[full], other.greville()
+    first, values = basis(knots, lines)
+    on = (first + values.argmax(axis=1)) % knots.count
+    line, place = np.nonzero((visible if axis == 0 else visible.T)[on])
+    points = np.ascontiguousarray(np.stack([lines[line], across[place]], axis=1)[:, :: 1 - 2 * axis])
+    before = net.normals(points, side=("left", "right") if axis == 0 else ("right", "left"))
+    after = net.normals(points)
+    turn = np.arctan2(np.linalg.norm(np.cross(before, after), axis=1), (before * after).sum(axis=1))
+    return frozenset(float(x) for x in lines[np.unique(line[turn > KINK])])
