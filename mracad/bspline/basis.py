@@ -108,12 +108,12 @@ def gauss(kv: KnotVector, points: int) -> tuple[Array, Array, Array]:
     offset, weight : ndarray (s, points)
         Parameters relative to the span's first knot, and quadrature weights in parameter units.
     """
-    nodes, weights = _legendre(points)
+    nodes, weights = legendre(points)
     lengths = np.diff(kv.breaks)[:, None]
     return kv.span_index, 0.5 * lengths * (nodes + 1), 0.5 * lengths * weights
 
 
 @lru_cache(maxsize=32)
-def _legendre(points: int) -> tuple[Array, Array]:
+def legendre(points: int) -> tuple[Array, Array]:
     """Nodes and weights of the Gauss–Legendre rule on [-1, 1]."""
     return np.polynomial.legendre.leggauss(points)

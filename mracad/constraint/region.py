@@ -95,7 +95,7 @@ def _pieces(net: Net, curves: Sequence[Curve]) -> tuple[Array, Array, Array]:
     """
     by_degree: dict[int, list[tuple[Array, Array]]] = defaultdict(list)
     for i, curve in enumerate(curves):
-        points = _bezier(curve)
+        points = bezier_points(curve)
         by_degree[curve.knots.degree].append((points, np.full(len(points), i)))
     found = []
     for parts in by_degree.values():
@@ -105,7 +105,7 @@ def _pieces(net: Net, curves: Sequence[Curve]) -> tuple[Array, Array, Array]:
     return boxes, chords, owners
 
 
-def _bezier(curve: Curve) -> Array:
+def bezier_points(curve: Curve) -> Array:
     """Homogeneous Bézier points ``(q, p + 1, 3)`` of a curve."""
     if curve.knots.spans == 1 and curve.knots.multiplicities[0] == curve.knots.degree + 1:
         poles, weights = curve.poles[None], None if curve.weights is None else curve.weights[None]
