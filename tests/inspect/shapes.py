@@ -58,3 +58,35 @@ def cylinder(radius=2.0, length=3.0, spans=4):
     poles[..., :2] = radius * CORNERS[:8, None]
     poles[..., 2] = v.greville()
     return Net(u, v, poles, np.tile(WEIGHTS[:8, None], (1, v.count)))
+
+
+def revolved(profile, weights, knots):
+    """The rational surface of revolution about z of a profile ``(n, 2)`` of radius and height."""
+    u = KnotVector.from_multiplicities(np.linspace(0, 1, 5), [2] * 5, 2, periodic=True)
+    profile = np.asarray(profile, float)
+    poles = np.empty((8, len(profile), 3))
+    poles[..., :2] = CORNERS[:8, None] * profile[:, :1]
+    poles[..., 2] = profile[:, 1]
+    return Net(u, knots, poles, WEIGHTS[:8, None] * weights)
+
+
+def sphere(radius=2.0):
+    """A whole sphere, degenerate at both ends of v."""
+    arc = radius * CORNERS[[6, 7, 0, 1, 2]]
+    knots = KnotVector.from_multiplicities([0, 1, 2], [3, 2, 3], 2)
+    return revolved(arc, WEIGHTS[:5], knots)
+
+
+def torus(ring=5.0, tube=2.0):
+    """A whole torus, periodic in both directions."""
+    knots = KnotVector.from_multiplicities(np.linspace(0, 1, 5), [2] * 5, 2, periodic=True)
+    return revolved(np.array([ring, 0]) + tube * CORNERS[:8], WEIGHTS[:8], knots)
+
+
+def roof(angle, gap=0.0):
+    """Two planes of 1 × 2 that meet at x = 1 at an angle, in one cubic net; ``gap`` parts the three knots there."""
+    knots = KnotVector(np.sort([0.0] * 4 + [1.0 - gap, 1.0, 1.0 + gap] + [2.0] * 4), 3)
+    v = KnotVector.clamped([0, 1, 2], 2)
+    x, y = np.meshgrid(knots.greville(), v.greville(), indexing="ij")
+    rise = np.where(x > 1 + gap, x - 1, 0.0) * np.tan(angle)
+    return Net(knots, v, np.stack([x, y, rise], axis=-1))

@@ -1,0 +1,97 @@
+"""How far the normal turns across the knot lines of a surface on which its derivatives may jump."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from mracad.bspline.knots import KnotVector, Side
+from mracad.bspline.net import Net
+from mracad.inspect.cells import inside_grid
+from mracad.model import Face
+from mracad.wavelet.ladder import arc_lengths
+
+Array = np.ndarray
+
+CLUSTER = 1e-4, 1e-6
+"""Knots closer than this, mm, or than this fraction of the surface, count as one."""
+
+BESIDE = 1e-5
+"""Where a face is looked for beside a knot line, as a fraction of the span there."""
+
+LIMITS: tuple[Side, Side] = "left", "right"
+
+
+def lines(net: Net, axis: int) -> Array:
+    """Knot lines at which tangents may jump.
+
+    Returns
+    -------
+    ndarray (k, 2)
+        Parameters at which a knot, or a cluster of knots, of multiplicity ``degree`` or more begins and ends.
+    """
+    kv = (net.u, net.v)[axis]
+    spans = np.diff(kv.breaks)
+    if kv.multiplicities[1:-1].max(initial=kv.multiplicities[0] * kv.periodic) < kv.degree and _even(spans):
+        return np.empty((0, 2))
+    lengths = arc_lengths(net, axis)
+    near = lengths < max(CLUSTER[0], CLUSTER[1] * float(lengths.sum()))
+    first = np.flatnonzero(np.append(True, ~near))
+    last = np.append(first[1:] - 1, kv.spans)
+    total = np.add.reduceat(kv.multiplicities, first)
+    inner = (first > 0) & (last < kv.spans)
+    if kv.periodic:
+        inner[0] = first[0] == last[0] == 0
+    found = inner & (total >= kv.degree)
+    return np.stack([kv.breaks[first[found]], kv.breaks[last[found]]], axis=1)
+
+
+def _even(spans: Array) -> bool:
+    """Whether no knots lie so close together that they may count as one."""
+    return bool(spans.min() > 1e-2 * spans.mean())
+
+
+def turns(net: Net, faces: Sequence[Face], axis: int, at: Array, places: Array) -> tuple[Array, Array]:
+    """Angles between the normals on either side of knot lines.
+
+    Parameters
+    ----------
+    net : Net
+    faces : sequence of Face
+        Of the surface.
+    axis : {0, 1}
+        0 for lines u = const.
+    at : ndarray (k, 2)
+        As :func:`lines` gives them, of this net or of one with fewer knots.
+    places : ndarray (q,)
+        Parameters along the lines.
+
+    Returns
+    -------
+    angle : ndarray (k, q)
+        Radians; NaN where the surface is degenerate.
+    seen : ndarray of bool (k, q)
+        Where one of the faces lies on both sides.
+    """
+    kv = (net.u, net.v)[axis]
+    seen = np.zeros((len(at), len(places)), dtype=bool)
+    normals = []
+    for face in faces:
+        seen |= np.logical_and(*(_present(face, net, axis, _aside(kv, at, side), places) for side in (0, 1)))
+    for side, limit in enumerate(LIMITS):
+        uv = np.stack(np.meshgrid(at[:, side], places, indexing="ij"), axis=-1).reshape(-1, 2)
+        normals.append(net.normals(uv, (limit, "right")) if axis == 0 else net.normals(uv[:, ::-1], ("right", limit)))
+    angle = 2 * np.arcsin(np.minimum(np.linalg.norm(normals[1] - normals[0], axis=1) / 2, 1.0))
+    return angle.reshape(seen.shape), seen
+
+
+def _aside(kv: KnotVector, at: Array, side: int) -> Array:
+    """Parameters just beside the lines, on the left (0) or on the right (1)."""
+    limit = at[:, side]
+    span, _ = kv.locate(limit, LIMITS[side])
+    return limit + (2 * side - 1) * BESIDE * (kv.knots[span + 1] - kv.knots[span])
+
+
+def _present(face: Face, net: Net, axis: int, at: Array, places: Array) -> Array:
+    return inside_grid(face, net, at, places) if axis == 0 else inside_grid(face, net, places, at).T

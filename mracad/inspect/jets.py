@@ -1,0 +1,73 @@
+"""Points and derivatives up to the third of a surface over the points of a quadrature."""
+
+from __future__ import annotations
+
+from math import comb
+
+import numpy as np
+
+from mracad.bspline.basis import jet
+from mracad.bspline.knots import KnotVector
+from mracad.bspline.net import Net
+
+Array = np.ndarray
+
+ORDERS = ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2), (3, 0), (2, 1), (1, 2), (0, 3))
+"""Derivatives, by how often they are taken along u and v, in the order in which they are given."""
+
+
+def jets(net: Net, u: Array, v: Array, mask: Array, centre: Array) -> Array:
+    """Points and derivatives at the products of parameters that a mask takes.
+
+    Parameters
+    ----------
+    net : Net
+    u, v : ndarray (pieces, points)
+        Parameters; each piece lies in one knot span.
+    mask : ndarray of bool (u.size, v.size)
+    centre : ndarray (3,)
+        Points are given relative to it: what is close to the origin keeps more digits.
+
+    Returns
+    -------
+    ndarray (10, 3, q)
+        By ``ORDERS``, coordinate and point, v slowest.
+    """
+    poles = net.poles - centre
+    if net.weights is not None:
+        poles = np.concatenate([poles * net.weights[..., None], net.weights[..., None]], axis=2)
+    k = poles.shape[2]
+    rows, in_u = _local(net.u, u)
+    columns, in_v = _local(net.v, v)
+    along = np.matmul(in_u.reshape(len(u), -1, in_u.shape[-1]), poles[rows].reshape(*rows.shape, -1))
+    along = along.reshape(u.size, 4, net.v.count, k).transpose(1, 2, 3, 0)  # order, column, coordinate, u
+    inside = slice(None) if mask.all() else np.flatnonzero(mask.T)
+    found = np.empty((len(ORDERS), k, np.count_nonzero(mask)))
+    for r in range(4):
+        windows = along[r][columns].reshape(*columns.shape, -1)
+        taken = in_v[:, :, : 4 - r]
+        grid = np.matmul(taken.reshape(len(v), -1, taken.shape[-1]), windows)
+        grid = grid.reshape(v.size, 4 - r, k, u.size).transpose(1, 2, 0, 3).reshape(4 - r, k, -1)
+        for s in range(4 - r):
+            found[ORDERS.index((r, s))] = grid[s][:, inside]
+    return found if net.weights is None else _quotient(found)
+
+
+def _local(kv: KnotVector, x: Array) -> tuple[Array, Array]:
+    """Control points ``(pieces, d + 1)`` and derivatives of their functions, ``(pieces, points, 4, d + 1)``."""
+    first, values = jet(kv, x.ravel(), range(4))
+    start = first.reshape(x.shape)[:, 0]
+    return (start[:, None] + np.arange(kv.degree + 1)) % kv.count, values.reshape(*x.shape, 4, -1)
+
+
+def _quotient(stack: Array) -> Array:
+    """Derivatives of ``A / w`` from those of ``(A, w)``, by Leibniz' rule."""
+    top, w = stack[:, :-1].copy(), stack[:, -1]
+    for place, (a, b) in enumerate(ORDERS):
+        for i in range(a + 1):
+            for j in range(b + 1):
+                if i or j:
+                    factor = comb(a, i) * comb(b, j)
+                    top[place] -= factor * w[ORDERS.index((i, j))] * top[ORDERS.index((a - i, b - j))]
+        top[place] /= w[0]
+    return top

@@ -1,0 +1,124 @@
+"""How rough faces are, and whether an edit made them rougher: the figures and their verdict."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+from math import sqrt
+
+
+class Rougher(Enum):
+    """In what a face got worse."""
+
+    BENDING = "bending"
+    VARIATION = "curvature variation"
+    CURVATURE = "largest curvature"
+    KINK = "kink"
+    FOLD = "fold"
+
+
+@dataclass(frozen=True)
+class Roughness:
+    """Figures of the faces of one surface, inside their trims.
+
+    Attributes
+    ----------
+    area : float
+        mm².
+    bending : float
+        ∫ κ₁² + κ₂² dA.
+    variation : float
+        ∫ |∇H|² dA, H the mean curvature, 1/mm².
+    curvature : float
+        Largest |κ₁| or |κ₂|, 1/mm, less what rounding may make of it.
+    kink : float
+        Largest angle between the normals on the two sides of a knot line, degrees.
+    """
+
+    area: float = 0.0
+    bending: float = 0.0
+    variation: float = 0.0
+    curvature: float = 0.0
+    kink: float = 0.0
+
+
+@dataclass(frozen=True)
+class Change:
+    """What an edit did to the faces of one surface.
+
+    Attributes
+    ----------
+    before, after : Roughness
+    noise : Roughness
+        The figures of a ripple that counts for nothing, see :data:`mracad.inspect.survey.RIPPLE`; ``kink`` is its
+        steepest slope.
+    opened : float
+        By how much the angle across a knot line grew, where it grew most, degrees.
+    turn : float
+        Largest angle between the normals before and after, degrees.
+    deviation : float
+        Largest motion along the normal, mm.
+    motion : float
+        Largest motion, mm.
+    """
+
+    before: Roughness
+    after: Roughness
+    noise: Roughness
+    opened: float = 0.0
+    turn: float = 0.0
+    deviation: float = 0.0
+    motion: float = 0.0
+
+
+@dataclass(frozen=True)
+class Growth:
+    """How much rougher an edit may make a face.
+
+    Attributes
+    ----------
+    bending, variation, curvature : float
+        Relative growth.
+    kink : float
+        By how much an angle across a knot line may grow, degrees.
+    fold : float
+        By how much a normal may turn, degrees.
+    """
+
+    bending: float = 0.0
+    variation: float = 0.0
+    curvature: float = 0.0
+    kink: float = 0.0
+    fold: float = 30.0
+
+
+@dataclass(frozen=True)
+class Worse:
+    """One figure of a face that got worse, before and after (of a fold: 0 and the angle, degrees)."""
+
+    what: Rougher
+    before: float
+    after: float
+
+
+def worse(change: Change, allowed: Growth) -> tuple[Worse, ...]:
+    """In what a change made faces rougher than allowed, in the order of :class:`Rougher`.
+
+    Notes
+    -----
+    √bending and √variation are norms of the second fundamental form and of its derivative, so that a ripple of norm n
+    on a face of norm b gives at most b + n: what is within that may be noise, however small b is.
+    """
+    before, after, noise = change.before, change.after, change.noise
+    found = []
+    for what, share in ((Rougher.BENDING, allowed.bending), (Rougher.VARIATION, allowed.variation)):
+        old, new, ripple = (float(getattr(each, what.name.lower())) for each in (before, after, noise))
+        if sqrt(new) > sqrt(old * (1 + share)) + sqrt(ripple):
+            found.append(Worse(what, old, new))
+    if after.curvature > before.curvature * (1 + allowed.curvature) + noise.curvature:
+        found.append(Worse(Rougher.CURVATURE, before.curvature, after.curvature))
+    if change.opened > allowed.kink + noise.kink:
+        found.append(Worse(Rougher.KINK, before.kink, after.kink))
+    if change.turn > allowed.fold:
+        found.append(Worse(Rougher.FOLD, 0.0, change.turn))
+    return tuple(found)

@@ -1,0 +1,209 @@
+"""Faces measured before and after an edit, at the same points of every knot span inside their trims."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mracad.bspline.knots import KnotVector
+from mracad.bspline.net import Net
+from mracad.inspect.cells import Quadrature, quadrature
+from mracad.inspect.creases import CLUSTER, lines, turns
+from mracad.inspect.curvature import Forms, forms
+from mracad.inspect.jets import jets
+from mracad.inspect.roughness import Change, Roughness
+from mracad.model import Face
+
+Array = np.ndarray
+
+POINTS = 4
+"""Gauss points a span in either direction."""
+
+RIPPLE = 1e-7
+"""Amplitude, mm, of a ripple one mean span long that counts for nothing: the kernel takes such points for one."""
+
+ROUNDING = 16 * float(np.finfo(float).eps)
+"""Error of a point of a surface, relative to its largest coordinate: a ripple as long as the span where it lies."""
+
+_BLOCK = 50_000
+
+
+@dataclass(frozen=True, eq=False)
+class Survey:
+    """Faces of a surface before an edit, with all that their later states are compared with.
+
+    Attributes
+    ----------
+    net : Net
+    faces : tuple of Face
+    rule : Quadrature
+    centre : ndarray (3,)
+        ``points`` are relative to it.
+    points, normals : ndarray (3, q)
+        At the points of the rule; normals in single precision.
+    regular : ndarray of bool (q,)
+        Where the surface is not degenerate and knots lie apart: only there curvature counts.
+    rounding : ndarray (q,)
+        Curvature that rounding may make, 1/mm.
+    roughness, noise : Roughness
+    """
+
+    net: Net
+    faces: tuple[Face, ...]
+    rule: Quadrature
+    centre: Array
+    points: Array
+    normals: Array
+    regular: Array
+    rounding: Array
+    roughness: Roughness
+    noise: Roughness
+
+
+def surveys(
+    surfaces: Iterable[tuple[Net, Sequence[Face], KnotVector, KnotVector]], points: int = POINTS
+) -> list[Survey]:
+    """Look at surfaces before an edit.
+
+    Parameters
+    ----------
+    surfaces : iterable of (Net, sequence of Face, KnotVector, KnotVector)
+        The surface, those of its faces that are to be seen as one, and the knots that it will have afterwards.
+    points : int
+        Gauss points a span of those knots, in either direction.
+    """
+    ready = [
+        (net, tuple(faces), _rule(faces, u, v, points), (u, v), net.poles.mean(axis=(0, 1)))
+        for net, faces, u, v in surfaces
+    ]
+    found = []
+    seen = _seen([(net, rule, centre) for net, _, rule, _, centre in ready])
+    for (net, faces, rule, knots, centre), (at, form) in zip(ready, seen, strict=True):
+        sides = form.speeds * _spans(rule, knots)
+        apart = sides.min(axis=0) >= max(CLUSTER[0], CLUSTER[1] * float(np.linalg.norm(np.ptp(net.poles, axis=(0, 1)))))
+        regular = form.regular & apart
+        areas = _areas(rule, form)
+        rounding = ROUNDING * float(np.abs(net.poles).max()) * _wavenumber(sides.min(axis=0)) ** 2
+        kink = max((float(np.nanmax(a, initial=0.0)) for a in _kinks(net, net, faces, rule)), default=0.0)
+        found.append(
+            Survey(
+                net, faces, rule, centre, at, form.normal.astype(np.float32), regular, rounding,
+                _roughness(areas, form, regular, rounding, kink), _noise(areas * regular, sides, rounding),
+            )
+        )  # fmt: skip
+    return found
+
+
+def changes(surveyed: Sequence[Survey], nets: Sequence[Net]) -> list[Change]:
+    """What became of surveyed surfaces.
+
+    Parameters
+    ----------
+    surveyed : sequence of Survey
+    nets : sequence of Net
+        Each surface as it is now, over the same domain.
+    """
+    found = []
+    seen = _seen([(net, survey.rule, survey.centre) for survey, net in zip(surveyed, nets, strict=True)])
+    for survey, net, (at, form) in zip(surveyed, nets, seen, strict=True):
+        motion = at - survey.points
+        both = form.regular & survey.regular
+        turned = np.linalg.norm(form.normal.astype(np.float32) - survey.normals, axis=0)[both]
+        old, new = (_kinks(net, each, survey.faces, survey.rule) for each in (survey.net, net))
+        opened = max((float(np.nanmax(b - a, initial=0.0)) for a, b in zip(old, new, strict=True)), default=0.0)
+        kink = max((float(np.nanmax(angle, initial=0.0)) for angle in new), default=0.0)
+        found.append(
+            Change(
+                survey.roughness,
+                _roughness(_areas(survey.rule, form), form, survey.regular, survey.rounding, kink),
+                survey.noise,
+                np.degrees(opened).item(),
+                np.degrees(2 * np.arcsin(min(float(turned.max(initial=0.0)) / 2, 1.0))).item(),
+                float(np.abs((motion * survey.normals).sum(axis=0)).max(initial=0.0)),
+                float(np.linalg.norm(motion, axis=0).max(initial=0.0)),
+            )
+        )
+    return found
+
+
+def _rule(faces: Sequence[Face], u: KnotVector, v: KnotVector, points: int) -> Quadrature:
+    return quadrature(Net(u, v, np.empty((u.count, v.count, 0))), faces, points)
+
+
+def _seen(surfaces: Sequence[tuple[Net, Quadrature, Array]]) -> Iterator[tuple[Array, Forms]]:
+    """Points and forms of each surface at the points of its rule; small ones are gone through together."""
+    sizes = np.array([int(rule.mask.sum()) for _, rule, _ in surfaces])
+    block = (sizes.cumsum() - sizes) // _BLOCK
+    for number in np.unique(block):
+        members = np.flatnonzero(block == number).tolist()
+        jet = np.concatenate(
+            [jets(net, rule.u, rule.v, rule.mask, centre) for net, rule, centre in (surfaces[i] for i in members)],
+            axis=2,
+        )
+        form = forms(jet)
+        ends = sizes[members].cumsum()
+        for begin, end in zip(ends - sizes[members], ends, strict=True):
+            yield jet[0, :, begin:end].copy(), form.part(slice(begin, end))
+
+
+def _areas(rule: Quadrature, form: Forms) -> Array:
+    """Area that each point of a rule stands for, mm²."""
+    return np.asarray(rule.weights.T[rule.mask.T] * form.density)
+
+
+def _spans(rule: Quadrature, knots: tuple[KnotVector, KnotVector]) -> Array:
+    """Length in parameters of the knot spans about each point of a rule, along u and v, ``(2, q)``."""
+    sizes = []
+    for kv, x in zip(knots, (rule.u, rule.v), strict=True):
+        span, _ = kv.locate(x.ravel())
+        sizes.append(kv.knots[span + 1] - kv.knots[span])
+    grid = np.broadcast_arrays(sizes[0], sizes[1][:, None])
+    return np.stack([each[rule.mask.T] for each in grid])
+
+
+def _kinks(lined: Net, net: Net, faces: Sequence[Face], rule: Quadrature) -> list[Array]:
+    """Angles of ``net`` across the knot lines on which tangents of ``lined`` may jump, inside the faces, radians."""
+    found = []
+    for axis, places in ((0, rule.v.ravel()), (1, rule.u.ravel())):
+        at = lines(lined, axis)
+        if len(at):
+            angle, seen = turns(net, faces, axis, at, places)
+            found.append(angle[seen])
+    return found
+
+
+def _roughness(areas: Array, form: Forms, counts: Array, rounding: Array, kink: float) -> Roughness:
+    counted = areas * counts
+    return Roughness(
+        float(areas.sum()),
+        float(counted @ form.bending),
+        float(counted @ form.variation),
+        float(((form.largest - rounding) * counts).max(initial=0.0)),
+        float(np.degrees(kink)),
+    )
+
+
+def _noise(areas: Array, sides: Array, rounding: Array) -> Roughness:
+    """Figures of a ripple z = a sin kx: ½ a² k⁴, ⅛ a² k⁶, a k² and slope a k, by :data:`RIPPLE` and rounding.
+
+    k is that of the mean span; where spans are shorter, only what rounding makes of a span is added.
+    """
+    total = float(areas.sum())
+    if not total:
+        return Roughness()
+    k = float(_wavenumber((sides @ areas).min() / total))
+    own = _wavenumber(sides.min(axis=0))
+    return Roughness(
+        total,
+        RIPPLE**2 * k**4 / 2 * total + float(areas @ rounding**2) / 2,
+        RIPPLE**2 * k**6 / 8 * total + float(areas @ (rounding * own) ** 2) / 8,
+        RIPPLE * k**2,
+        float(np.degrees(2 * RIPPLE * k)),
+    )
+
+
+def _wavenumber(length: Array) -> Array:
+    """2π over the length."""
+    return 2 * np.pi / np.maximum(length, np.finfo(float).tiny ** 0.2)
