@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 from OCP.BRep import BRep_Tool
 from OCP.Geom import Geom_BSplineSurface
@@ -23,6 +24,9 @@ from OCP.XCAFDoc import XCAFDoc_ColorTool, XCAFDoc_ColorType, XCAFDoc_DocumentTo
 
 from mracad.errors import FileError
 from mracad.occ.units import Units, metres
+
+if TYPE_CHECKING:
+    from mracad.occ.titles import Title
 
 
 @dataclass(eq=False)
@@ -97,6 +101,10 @@ class Document:
         ``"AP203"``, ``"AP214"``, ``"AP242"``, ``"IGES"``, ``"BREP"``, ``"BinBREP"`` or ``""``.
     annotations : dict
         The names of the dimensions, tolerances, datums and notes that the file states, by these words.
+    warnings : tuple of str
+        What had to be guessed or is lost of the file.
+    titles : dict
+        What a STEP file says of products and instances, by label (its key).
     conversions : dict
         Surfaces made by ``view(document, convert=…)``, by face index, for ``apply``.
     moved : set of str
@@ -110,6 +118,8 @@ class Document:
     units: Units = field(default_factory=Units)
     schema: str = ""
     annotations: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    warnings: tuple[str, ...] = ()
+    titles: dict[str, Title] = field(default_factory=dict)
     conversions: dict[int, Conversion] = field(default_factory=dict)
     moved: set[str] = field(default_factory=set)
     origins: dict[str, str] = field(default_factory=dict)

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
-#: What the kernel calls a product without a name, followed by a count.
-UNNAMED = b"mracad unnamed product"
+from mracad.occ.literals import decoded, encoded, escaped
+from mracad.occ.titles import Title
 
 _STYLES = b" = MECHANICAL_DESIGN_GEOMETRIC_PRESENTATION_REPRESENTATION("
 _ENTITY = re.compile(rb"#(\d+) = (?:[^';]|'[^']*')*;\n")
@@ -29,31 +29,47 @@ def pmi(text: bytes) -> dict[str, tuple[str, ...]]:
         names = []
         for match in (match for pattern in patterns for match in re.finditer(pattern, text)):
             texts = [name for name in _TEXTS.findall(_ARGUMENTS.match(text, match.end())[0]) if name]  # type: ignore[index]
-            names.append(texts[-1 if kind == "datums" else 0].decode(errors="replace") if texts else "")
+            names.append(decoded(texts[-1 if kind == "datums" else 0]) if texts else "")
         if names:
             found[kind] = tuple(names)
     return found
 
 
-def tidy(text: bytes) -> bytes:
-    """Take out of a STEP file what differs from process to process, and what says nothing.
+def tidy(text: bytes, titles: Mapping[bytes, Title] | None = None) -> bytes:
+    """Take out of a STEP file what differs from process to process, and what says nothing; put in the titles.
 
-    What the kernel counts through the life of the process is counted from 1, groups of styles come in the order of
-    the parts they colour, reals have no trailing zeros, points and what has a count no line breaks.
+    Groups of styles come in the order of the parts they colour, reals have no trailing zeros, points and strings no
+    line breaks, strings nothing beyond ASCII.
+
+    Parameters
+    ----------
+    text : bytes
+        As the kernel writes it.
+    titles : mapping, optional
+        By the marks that stand for the names of products and instances.
     """
     pieces = text.split(b"'")  # every second one is within quotes
-    products = usages = 0
-    for i in range(0, len(pieces) - 1, 2):
-        if pieces[i].endswith(b"PRODUCT(") and pieces[i + 1].startswith(UNNAMED):
-            products += 1
-            pieces[i + 1] = pieces[i + 3] = b"part %d" % products
-        elif pieces[i].endswith(b"NEXT_ASSEMBLY_USAGE_OCCURRENCE("):
-            usages += 1
-            pieces[i + 1] = b"%d" % usages
+    for i in range(1, len(pieces), 2):
+        if b"\n" in pieces[i] or not pieces[i].isascii():
+            pieces[i] = escaped(pieces[i].replace(b"\n", b"").decode())
+    _entitle(pieces, titles or {})
     plain = re.sub(rb"\n {4}(?=[-.0-9])", b"", b"'".join(pieces[::2]))
     plain = _COUNTED.sub(lambda found: re.sub(rb"\n *", b"", found[0]), plain)
     pieces[::2] = b"".join(re.split(rb"(\.(?:[0-9]*[1-9])?)0+(?=[,)E])", plain)).split(b"'")
     return _styles_in_order(b"'".join(pieces))
+
+
+def _entitle(pieces: list[bytes], titles: Mapping[bytes, Title]) -> None:
+    """Put titles in the place of marks: the name of a product is its identifier, too, that of an instance not."""
+    for i in range(1, len(pieces), 2):
+        title = titles.get(pieces[i])
+        if title is None:
+            continue
+        head = i if pieces[i - 1].endswith(b"PRODUCT(") else i - 2
+        if head == i or pieces[head - 1].endswith(b"NEXT_ASSEMBLY_USAGE_OCCURRENCE("):
+            pieces[head : head + 5 : 2] = map(encoded, (title.identifier, title.name, title.description))
+        else:
+            pieces[i] = encoded(title.name)
 
 
 def _styles_in_order(text: bytes) -> bytes:

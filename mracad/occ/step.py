@@ -20,9 +20,11 @@ from mracad.errors import FileError, UsageError
 from mracad.formats import by_content
 from mracad.occ.document import Document, empty, no_faces, set_unit
 from mracad.occ.load import load
-from mracad.occ.part21 import UNNAMED, pmi, tidy
+from mracad.occ.literals import conforming
+from mracad.occ.part21 import pmi, tidy
 from mracad.occ.properties import restated
 from mracad.occ.settings import all_digits, exchange, moment, quiet
+from mracad.occ.titles import marked, marking, put_names
 from mracad.occ.units import UNITS, of_file
 from mracad.output import put
 
@@ -32,7 +34,9 @@ _WRITE_MODES = ("Name", "Color", "Layer", "DimTol", "Material", "Props", "SHUO")
 _SCHEMAS = {"AP203": "AP203", "AP214": "AP214IS", "AP242": "AP242DIS"}
 
 
-def read_step(source: str | os.PathLike | BinaryIO, input_unit: str | None = None) -> Document:
+def read_step(
+    source: str | os.PathLike | BinaryIO, input_unit: str | None = None, encoding: str | None = None
+) -> Document:
     """Read a STEP file with its names, colours, layers, tolerances and properties.
 
     Parameters
@@ -40,6 +44,8 @@ def read_step(source: str | os.PathLike | BinaryIO, input_unit: str | None = Non
     source : path or binary stream
     input_unit : str, optional
         The length unit that the file's numbers are in, whatever it says itself; also that of the output.
+    encoding : str, optional
+        The character set of its texts; by default UTF-8 where that fits, otherwise the most likely one.
 
     Returns
     -------
@@ -50,7 +56,7 @@ def read_step(source: str | os.PathLike | BinaryIO, input_unit: str | None = Non
     FileError
         For a file that is missing, unreadable, truncated, not STEP, or without geometry.
     UsageError
-        For an unknown unit.
+        For an unknown unit or character set.
     """
     file = load(source)
     text, name = file.getvalue(), file.name
@@ -58,12 +64,14 @@ def read_step(source: str | os.PathLike | BinaryIO, input_unit: str | None = Non
         raise FileError(f"'{name}' is not a STEP file", "it must begin with ISO-10303-21: export it as STEP")
     if b"END-ISO-10303-21" not in text[-4096:]:
         raise FileError(f"'{name}' is truncated: its end is missing", "copy or export it again")
+    text, warning = conforming(text, name, encoding)
+    named, titles = marked(text)
     reader = STEPCAFControl_Reader()
     for mode in _READ_MODES:
         getattr(reader, f"Set{mode}Mode")(True)
     xcaf = empty()
     with quiet(), exchange(_READ_SETTINGS):
-        if reader.ReadStream(name, io.BytesIO(text)) != IFSelect_RetDone:
+        if reader.ReadStream(name, io.BytesIO(named)) != IFSelect_RetDone:
             raise FileError(f"'{name}' cannot be parsed as STEP", "the file is damaged: export it again")
         units = of_file(reader.Reader().StepModel(), text, input_unit)
         set_unit(xcaf, units.kernel_mm)
@@ -71,7 +79,9 @@ def read_step(source: str | os.PathLike | BinaryIO, input_unit: str | None = Non
         set_unit(xcaf, 1.0)
     if not done:
         raise no_faces(name)
-    return Document(xcaf, name, units, _schema(text), pmi(text)).checked()
+    document = Document(xcaf, name, units, _schema(text), pmi(text), (warning,) if warning else ())
+    put_names(document, titles)
+    return document.checked()
 
 
 def _schema(text: bytes) -> str:
@@ -117,11 +127,11 @@ def step(document: Document, name: str, schema: str = "", options_text: str = ""
     settings = {
         "write.step.schema": _SCHEMAS[schema],
         "write.step.unit": UNITS[document.unit][1],
-        "write.step.product.name": UNNAMED.decode(),
+        "write.step.product.name": "product",
         "write.stepcaf.subshapes.name": "On",
     }
     stream = io.BytesIO()
-    with quiet(), exchange(settings), restated(document):
+    with quiet(), exchange(settings), restated(document), marking(document) as titles:
         writer = STEPCAFControl_Writer()
         for mode in _WRITE_MODES:
             getattr(writer, f"Set{mode}Mode")(True)
@@ -134,19 +144,14 @@ def step(document: Document, name: str, schema: str = "", options_text: str = ""
         all_digits(printer.FloatWriter())
         printer.SendModel(writer.Writer().WS().Protocol())
         printer.Print(stream)
-    return tidy(stream.getvalue())
+    return tidy(stream.getvalue(), titles)
 
 
 def _head(model: StepData_StepModel, name: str, options_text: str) -> None:
     """Fill the header: nothing in it depends on where, when or how often it is written."""
     header = APIHeaderSection_MakeHeader(model)
-    header.SetName(TCollection_HAsciiString(_ascii(name)))
+    header.SetName(TCollection_HAsciiString(name))
     header.SetTimeStamp(TCollection_HAsciiString(moment().strftime("%Y-%m-%dT%H:%M:%S")))
     header.SetOriginatingSystem(TCollection_HAsciiString(f"mracad {__version__}"))
     header.SetPreprocessorVersion(TCollection_HAsciiString(f"mracad {__version__}"))
-    header.SetDescriptionValue(1, TCollection_HAsciiString(_ascii(options_text)))
-
-
-def _ascii(text: str) -> str:
-    """A text as STEP encodes it: what is not plain ASCII as ``\\X2\\…\\X0\\``."""
-    return re.sub(r"[^\x20-\x7e]+", lambda run: "\\X2\\" + run[0].encode("utf-16-be").hex().upper() + "\\X0\\", text)
+    header.SetDescriptionValue(1, TCollection_HAsciiString(options_text))

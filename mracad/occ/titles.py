@@ -1,0 +1,111 @@
+"""Products and their instances under the identifiers, names and descriptions that a STEP file gives them.
+
+The kernel keeps one name of each: it takes the identifier where the name has no letter of ASCII, and writes the name
+as the identifier, too.  So it gets marks instead of names, both ways; the names are put in here.
+"""
+
+from __future__ import annotations
+
+import itertools
+import re
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+from OCP.TCollection import TCollection_ExtendedString
+from OCP.TDataStd import TDataStd_Name
+from OCP.TDF import TDF_Label
+
+from mracad.occ.document import Document, components, label_key, label_name, labels
+from mracad.occ.literals import decoded
+
+_STRING = rb"'((?:[^']|'')*)'"
+_STATED = re.compile(
+    rb"\b(PRODUCT|NEXT_ASSEMBLY_USAGE_OCCURRENCE)(\s*\(\s*)" + _STRING + rb"(\s*,\s*)" + _STRING + rb"\s*,\s*"
+    rb"(?:" + _STRING + rb"|\$)"
+)
+_MARK = "mracad title "
+
+
+@dataclass(frozen=True)
+class Title:
+    """What a file says of a product or an instance."""
+
+    identifier: str
+    name: str
+    description: str = ""
+
+    @property
+    def shown(self) -> str:
+        """The name, or else the identifier."""
+        return self.name if self.name.strip() else self.identifier
+
+
+def marked(text: bytes) -> tuple[bytes, list[Title]]:
+    """A STEP file in which marks are the names of products and instances, and what these stand for."""
+    titles: list[Title] = []
+
+    def mark(found: re.Match[bytes]) -> bytes:
+        kind, opening, identifier, comma, name, description = found.groups()
+        titles.append(Title(*map(decoded, (identifier, name, description or b""))))
+        return b"%s%s'%s'%s'%s',''" % (kind, opening, identifier, comma, _mark(len(titles) - 1))
+
+    return _STATED.sub(mark, text), titles
+
+
+def put_names(document: Document, titles: list[Title]) -> None:
+    """Put names in the place of the marks that the kernel has read; the document keeps the titles."""
+    for label in _labels(document):
+        name = label_name(label)
+        if name.startswith(_MARK):
+            title = titles[int(name[len(_MARK) :])]
+            document.titles[label_key(label)] = title
+            _name(label, title.shown)
+
+
+@contextmanager
+def marking(document: Document) -> Iterator[Mapping[bytes, Title]]:
+    """Let marks be the names of products and instances, as the kernel writes them; yields what they stand for.
+
+    What no file has named is called after its label, or by a number.
+    """
+    tool = document.shape_tool
+    known = {document.titles[key].identifier for key in map(label_key, _labels(document)) if key in document.titles}
+    unused = (number for number in map(str, itertools.count(1)) if number not in known)
+    unnamed = (f"part {count}" for count in itertools.count(1))
+    titles: dict[bytes, Title] = {}
+    names: list[tuple[TDF_Label, str | None]] = []
+    for number, label in enumerate(_labels(document)):
+        title, name = document.titles.get(label_key(label)), label_name(label)
+        if title is None and tool.IsComponent_s(label):
+            title = Title(next(unused), name)
+        elif title is None:
+            own = name or next(unnamed)
+            title = Title(own, own)
+        titles[_mark(number)] = title
+        names.append((label, name if label.IsAttribute(TDataStd_Name.GetID_s()) else None))
+    try:
+        for number, (label, _) in enumerate(names):
+            _name(label, _mark(number).decode())
+        yield titles
+    finally:
+        for label, name in names:
+            if name is None:
+                label.ForgetAttribute(TDataStd_Name.GetID_s())
+            else:
+                _name(label, name)
+
+
+def _mark(number: int) -> bytes:
+    return f"{_MARK}{number}".encode()
+
+
+def _labels(document: Document) -> Iterator[TDF_Label]:
+    """The products of a document, each with the instances in it."""
+    for label in list(labels(document.shape_tool.GetShapes)):
+        yield label
+        yield from components(label)
+
+
+def _name(label: TDF_Label, name: str) -> None:
+    TDataStd_Name.Set_s(label, TCollection_ExtendedString(name, True))
