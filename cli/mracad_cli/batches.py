@@ -42,6 +42,7 @@ def run_batch(
     keep_going: bool,
     retry: int,
     input_unit: str | None,
+    encoding: str | None,
     format: str | None,
     schema: str | None,
     overwrite: bool,
@@ -56,7 +57,7 @@ def run_batch(
     """Take many files through a recipe; see :mod:`mracad_cli.commands.batch` for the parameters."""
     recipe.steps("model.step")  # what is wrong in it is said before anything is read
     settings = Settings(
-        input_unit, (schema or "").upper(), overwrite, if_changed, record, retry, fail_fast=not keep_going
+        input_unit, encoding, (schema or "").upper(), overwrite, if_changed, record, retry, fail_fast=not keep_going
     )
     limits = Limits(duration(time_limit, "time-limit"), size(memory_limit) if memory_limit else 0)
     check_reports(report, junit, depfile, overwrite=True)
@@ -81,6 +82,8 @@ def run_batch(
             progress(recipe.name, 0, len(items))
             for outcome in results:
                 outcomes.append(outcome)
+                for warning in outcome.warnings:
+                    print(f"warning: {outcome.file}: {warning}", file=sys.stderr)
                 if as_json and outcome.status != "not tried":
                     print(json_text(msgspec.to_builtins(outcome)), flush=True)
                 failed += outcome.status == "failed"

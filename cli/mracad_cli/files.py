@@ -26,13 +26,16 @@ def load(source: str) -> Text:
     return load_file(sys.stdin.buffer if source == "-" else source)
 
 
-def read(source: str | Text, input_unit: str | None) -> Document:
-    """Read a model, or standard input for ``-``."""
+def read(source: str | Text, input_unit: str | None, encoding: str | None) -> Document:
+    """Read a model, or standard input for ``-``; say what is lost on the way."""
     from mracad.occ.files import read as read_file
 
     text = load(source) if isinstance(source, str) else source
     guard.doing("reading", text.name)
-    return read_file(text, input_unit)
+    document = read_file(text, input_unit, encoding)
+    for warning in document.warnings:
+        print(f"warning: {warning}", file=sys.stderr)
+    return document
 
 
 def check_reports(*paths: str | None, overwrite: bool) -> None:

@@ -82,6 +82,12 @@ input_unit = click.option(
     metavar="UNIT",
     help="Length unit of the file's numbers, where it names a wrong one: mm, m, in …",
 )
+encoding = click.option(
+    "--encoding",
+    metavar="NAME",
+    help="Character set of the file's texts: utf-8, gb18030, cp932, latin-1 …  [default: UTF-8 where that fits, else "
+    "the most likely one]",
+)
 format = click.option(
     "--format",
     type=click.Choice(list(FORMATS)),
@@ -128,7 +134,7 @@ limiting = apply(
         "--memory-limit", metavar="SIZE", expose_value=False, help="Memory that the command may hold: 500MB, 2GB."
     ),
 )
-reading = apply(source, input_unit)
+reading = apply(source, input_unit, encoding)
 writing = apply(outputs, format, schema, chord, angle, ascii_stl, overwrite, if_changed)
 printing = apply(as_json, limiting, debug)
 reports = apply(

@@ -52,6 +52,7 @@ def run_steps(
     *,
     recipe: Recipe | None = None,
     input_unit: str | None,
+    encoding: str | None,
     outputs: tuple[str, ...],
     report: str | None,
     depfile: str | None,
@@ -70,11 +71,12 @@ def run_steps(
     with Progress() as progress:
         progress("reading", 0, 1)
         text = load(source)
-        document = read(text, input_unit)
+        document = read(text, input_unit, encoding)
         from mracad import job
+        from mracad.occ.files import read as read_again
 
         def original() -> Document:
-            return read(text, input_unit)
+            return read_again(text, input_unit, encoding)
 
         results = job.play(document, steps, original=original, progress=progress, apply=not dry_run)
         failed = isinstance(results[-1], job.Judged) and not results[-1].passed
@@ -83,7 +85,8 @@ def run_steps(
             progress("writing", 0, 1)
             targets.make(document, title(steps))
     body = _body(document.name, steps, results, recipe)
-    body |= {"written": targets.names() if written else [], "lost": render.plain(targets.lost)}
+    written_to = targets.names() if written else []
+    body |= {"written": written_to, "warnings": document.warnings, "lost": render.plain(targets.lost)}
     files: dict[str, str | None] = {report: render.json_text(body, 1) + "\n"} if report else {}
     if written:
         files |= dict.fromkeys(records, record_of(steps))

@@ -44,7 +44,7 @@ class Settings:
 
     Attributes
     ----------
-    input_unit : str or None
+    input_unit, encoding : str or None
     schema : str
         Of STEP files; by default AP242 for a file in AP242, else AP214.
     overwrite : bool
@@ -60,6 +60,7 @@ class Settings:
     """
 
     input_unit: str | None = None
+    encoding: str | None = None
     schema: str = ""
     overwrite: bool = False
     if_changed: bool = False
@@ -86,6 +87,8 @@ class Outcome:
     attempts : int
     steps : tuple of dict
         What each step did, in short.
+    warnings : tuple of str
+        What had to be guessed or is lost.
     """
 
     file: str
@@ -97,6 +100,7 @@ class Outcome:
     seconds: float = 0.0
     attempts: int = 0
     steps: tuple[dict[str, Any], ...] = ()
+    warnings: tuple[str, ...] = ()
 
 
 class Workers(Protocol):
@@ -244,6 +248,7 @@ class _Batch:
             data,
             steps,
             self.settings.input_unit,
+            self.settings.encoding,
             item.format,
             self.settings.schema,
             files,
@@ -294,7 +299,9 @@ class _Batch:
         files = {Path(name).name: digest(data) for name, data in work.files.items()}
         parts = [work.name, digest(work.data), record_of(work.steps), files]
         return digest(
-            json.dumps([*parts, work.input_unit, work.format, work.schema, work.epoch], sort_keys=True).encode()
+            json.dumps(
+                [*parts, work.input_unit, work.encoding, work.format, work.schema, work.epoch], sort_keys=True
+            ).encode()
         )
 
     def _written(self, task: _Task, product: Product) -> Outcome:
@@ -302,7 +309,13 @@ class _Batch:
         beside = self._record(task.item, task.work)
         self.manifest.write(output, task.key, product.data, beside, if_changed=self.settings.if_changed)
         return Outcome(
-            task.item.source, output, "done", seconds=product.seconds, attempts=task.attempts, steps=product.steps
+            task.item.source,
+            output,
+            "done",
+            seconds=product.seconds,
+            attempts=task.attempts,
+            steps=product.steps,
+            warnings=product.warnings,
         )
 
 

@@ -32,7 +32,7 @@ class Work:
     data : bytes
         Its content.
     steps : tuple of Step
-    input_unit : str or None
+    input_unit, encoding : str or None
     format, schema : str
         Of the output; see ``mracad.occ.files.write``.
     files : mapping
@@ -47,6 +47,7 @@ class Work:
     data: bytes = field(repr=False)
     steps: tuple[Step, ...]
     input_unit: str | None = None
+    encoding: str | None = None
     format: str = "step"
     schema: str = ""
     files: Mapping[str, bytes] = field(default_factory=dict, repr=False)
@@ -56,10 +57,11 @@ class Work:
 
 @dataclass(frozen=True)
 class Product:
-    """The file that came out, for each step what it did, in short, and the seconds that it took."""
+    """The file that came out, for each step what it did, in short, what was lost, and the seconds that it took."""
 
     data: bytes = field(repr=False)
     steps: tuple[dict[str, Any], ...]
+    warnings: tuple[str, ...]
     seconds: float
 
 
@@ -97,16 +99,17 @@ def do(work: Work) -> Product:
         more = f" (and {len(last.failures) - 1} more)" if len(last.failures) > 1 else ""
         raise MracadError(f"{work.steps[len(results) - 1].id}: {last.failures[0]}{more}", code=Code.FAILED_CHECK)
     written = io.BytesIO()
-    write(document, written, work.format, schema=work.schema, options_text=title(work.steps))
+    lost = write(document, written, work.format, schema=work.schema, options_text=title(work.steps))
     short = ({"step": step.id, **_short(result)} for step, result in zip(work.steps, results, strict=True))
-    return Product(written.getvalue(), tuple(short), time.perf_counter() - start)
+    warnings = (*document.warnings, *(f"the output lacks {what}" for what in lost))
+    return Product(written.getvalue(), tuple(short), warnings, time.perf_counter() - start)
 
 
 def _read(work: Work) -> Document:
     from mracad.occ import read
     from mracad.occ.load import Text
 
-    return read(Text(work.data, work.name), work.input_unit)
+    return read(Text(work.data, work.name), work.input_unit, work.encoding)
 
 
 def _here(work: Work, folder: Path) -> list[Step]:

@@ -13,7 +13,7 @@ from OCP.Geom2d import Geom2d_Curve
 from OCP.Quantity import Quantity_ColorRGBA
 from OCP.TCollection import TCollection_ExtendedString
 from OCP.TDataStd import TDataStd_Name
-from OCP.TDF import TDF_Label, TDF_LabelSequence
+from OCP.TDF import TDF_ChildIterator, TDF_Label, TDF_LabelSequence
 from OCP.TDocStd import TDocStd_Document
 from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE
 from OCP.TopExp import TopExp
@@ -223,6 +223,21 @@ def label_name(label: TDF_Label) -> str:
     attribute = TDataStd_Name()
     label.FindAttribute(TDataStd_Name.GetID_s(), attribute)
     return attribute.Get().ToExtString()
+
+
+def named_labels(document: Document) -> Iterator[TDF_Label]:
+    """Whatever may have a name: products, instances, faces."""
+    every = TDF_ChildIterator(document.shape_tool.Label(), True)
+    while every.More():
+        label = every.Value()
+        every.Next()
+        if label.IsAttribute(TDataStd_Name.GetID_s()):
+            yield label
+
+
+def name_label(label: TDF_Label, name: str) -> None:
+    """Give a label a name."""
+    TDataStd_Name.Set_s(label, TCollection_ExtendedString(name, True))
 
 
 def label_colour(label: TDF_Label) -> str:

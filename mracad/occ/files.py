@@ -9,7 +9,8 @@ from typing import BinaryIO
 
 from mracad.errors import FileError, UsageError
 from mracad.formats import FORMATS, by_content, by_ending
-from mracad.occ.document import Document
+from mracad.occ.document import Document, label_name, named_labels
+from mracad.occ.literals import known
 from mracad.occ.load import load
 from mracad.output import put
 
@@ -21,7 +22,8 @@ class Lost:
     Attributes
     ----------
     what : str
-        ``"faces"``, which the kernel could not mesh; ``"dimensions"``, ``"tolerances"``, ``"datums"`` or ``"notes"``.
+        ``"faces"``, which the kernel could not mesh; ``"names"``, ``"dimensions"``, ``"tolerances"``, ``"datums"`` or
+        ``"notes"``.
     stated, written : int
         How many there were, and are.
     names : tuple of str
@@ -39,7 +41,7 @@ class Lost:
         return f"{self.stated - self.written} of {self.stated} {self.what}" + (f" ({shown})" if shown else "")
 
 
-def read(source: str | os.PathLike | BinaryIO, input_unit: str | None = None) -> Document:
+def read(source: str | os.PathLike | BinaryIO, input_unit: str | None = None, encoding: str | None = None) -> Document:
     """Read a STEP, IGES, BREP or BinBREP file, which it is by its content.
 
     Parameters
@@ -47,25 +49,29 @@ def read(source: str | os.PathLike | BinaryIO, input_unit: str | None = None) ->
     source : path or binary stream
     input_unit : str, optional
         The length unit that the file's numbers are in, whatever it says itself; also that of the output.
+    encoding : str, optional
+        The character set of its texts; by default UTF-8 where that fits, otherwise the most likely one.
 
     Raises
     ------
     FileError
         For a file that is missing, unreadable, damaged, in another format, or without faces.
     UsageError
-        For an unknown unit.
+        For an unknown unit or character set.
     """
+    if encoding is not None:
+        encoding = known(encoding)
     file = load(source)
     format = by_content(file.getvalue(), file.name).name
     try:
         if format == "step":
             from mracad.occ.step import read_step
 
-            return read_step(file, input_unit)
+            return read_step(file, input_unit, encoding)
         if format == "iges":
             from mracad.occ.iges import read_iges
 
-            return read_iges(file, input_unit)
+            return read_iges(file, input_unit, encoding)
         from mracad.occ.brep import read_brep
 
         return read_brep(file, input_unit)
@@ -108,7 +114,7 @@ def write(
     Returns
     -------
     tuple of Lost
-        What could not be written: faces of a mesh, annotations of an exact model.
+        What could not be written: faces of a mesh, annotations of an exact model, names beyond ASCII in IGES.
 
     Raises
     ------
@@ -132,6 +138,7 @@ def write(
         from mracad.occ.iges import iges
 
         data = iges(document, name, options_text)
+        lost = _unwritten(document)
     elif format in ("brep", "binbrep"):
         from mracad.occ.brep import brep
 
@@ -150,6 +157,13 @@ def write(
 
         kept = pmi(data) if format == "step" else {}
         counts = {what: (names, len(kept.get(what, ()))) for what, names in document.annotations.items()}
-        lost = tuple(Lost(what, len(ns), count, ns) for what, (ns, count) in counts.items() if count < len(ns))
+        lost += tuple(Lost(what, len(ns), count, ns) for what, (ns, count) in counts.items() if count < len(ns))
     put(data, target)
     return lost
+
+
+def _unwritten(document: Document) -> tuple[Lost, ...]:
+    """The names that IGES, which is ASCII, does not take."""
+    names = [name for name in map(label_name, named_labels(document)) if name]
+    beyond = tuple(name for name in names if not name.isascii())
+    return (Lost("names", len(names), len(names) - len(beyond), beyond),) if beyond else ()

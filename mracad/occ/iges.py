@@ -19,7 +19,8 @@ from OCP.TCollection import TCollection_HAsciiString
 
 from mracad import __version__
 from mracad.errors import FileError
-from mracad.occ.document import Document, empty, no_faces
+from mracad.occ.document import Document, empty, label_name, name_label, named_labels, no_faces
+from mracad.occ.iges_text import prepared
 from mracad.occ.load import load
 from mracad.occ.settings import all_digits, exchange, moment, quiet
 from mracad.occ.units import UNITS, Units, named
@@ -28,7 +29,9 @@ _FLAGS = {1: "in", 2: "mm", 4: "ft", 5: "mi", 6: "m", 7: "km", 8: "mil", 9: "um"
 _MODES = ("Name", "Color", "Layer")
 
 
-def read_iges(source: str | os.PathLike | BinaryIO, input_unit: str | None = None) -> Document:
+def read_iges(
+    source: str | os.PathLike | BinaryIO, input_unit: str | None = None, encoding: str | None = None
+) -> Document:
     """Read an IGES file.
 
     Parameters
@@ -36,6 +39,8 @@ def read_iges(source: str | os.PathLike | BinaryIO, input_unit: str | None = Non
     source : path or binary stream
     input_unit : str, optional
         The length unit that the file's numbers are in, whatever it says itself; also that of the output.
+    encoding : str, optional
+        The character set of its names; by default UTF-8 where that fits, otherwise the most likely one.
 
     Raises
     ------
@@ -47,11 +52,12 @@ def read_iges(source: str | os.PathLike | BinaryIO, input_unit: str | None = Non
     file = load(source)
     _refuse_torn(file.getvalue(), file.name)
     unit = None if input_unit is None else named(input_unit)
+    ready = prepared(file.getvalue(), file.name, encoding)
     IGESControl_Controller.Init_s()
     xcaf = empty()
     with quiet(), exchange({}), tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "model.igs")  # the kernel reads no IGES from a stream
-        path.write_bytes(file.getvalue())
+        path.write_bytes(ready.text)
         reader = IGESCAFControl_Reader()
         for mode in _MODES:
             getattr(reader, f"Set{mode}Mode")(True)
@@ -65,7 +71,18 @@ def read_iges(source: str | os.PathLike | BinaryIO, input_unit: str | None = Non
         unit = _FLAGS.get(section.UnitFlag())
         if not reader.Transfer(xcaf):
             raise no_faces(file.name)
-    return Document(xcaf, file.name, Units(unit, UNITS[unit][0]) if unit else Units(), "IGES").checked()
+    units = Units(unit, UNITS[unit][0]) if unit else Units()
+    document = Document(xcaf, file.name, units, "IGES", warnings=ready.warnings)
+    if ready.names:
+        _put_names(document, ready.names)
+    return document.checked()
+
+
+def _put_names(document: Document, names: dict[str, str]) -> None:
+    """Give labels their names instead of marks."""
+    for label in named_labels(document):
+        if (mark := label_name(label)) in names:
+            name_label(label, names[mark])
 
 
 def iges(document: Document, name: str, options_text: str = "") -> bytes:

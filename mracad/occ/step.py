@@ -19,8 +19,8 @@ from mracad import __version__
 from mracad.errors import FileError, UsageError
 from mracad.formats import by_content
 from mracad.occ.document import Document, empty, no_faces, set_unit
-from mracad.occ.load import load
 from mracad.occ.literals import conforming
+from mracad.occ.load import load
 from mracad.occ.part21 import pmi, tidy
 from mracad.occ.properties import restated
 from mracad.occ.settings import all_digits, exchange, moment, quiet

@@ -12,11 +12,10 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 
-from OCP.TCollection import TCollection_ExtendedString
 from OCP.TDataStd import TDataStd_Name
 from OCP.TDF import TDF_Label
 
-from mracad.occ.document import Document, components, label_key, label_name, labels
+from mracad.occ.document import Document, components, label_key, label_name, labels, name_label
 from mracad.occ.literals import decoded
 
 _STRING = rb"'((?:[^']|'')*)'"
@@ -60,7 +59,7 @@ def put_names(document: Document, titles: list[Title]) -> None:
         if name.startswith(_MARK):
             title = titles[int(name[len(_MARK) :])]
             document.titles[label_key(label)] = title
-            _name(label, title.shown)
+            name_label(label, title.shown)
 
 
 @contextmanager
@@ -86,14 +85,14 @@ def marking(document: Document) -> Iterator[Mapping[bytes, Title]]:
         names.append((label, name if label.IsAttribute(TDataStd_Name.GetID_s()) else None))
     try:
         for number, (label, _) in enumerate(names):
-            _name(label, _mark(number).decode())
+            name_label(label, _mark(number).decode())
         yield titles
     finally:
-        for label, name in names:
-            if name is None:
+        for label, before in names:
+            if before is None:
                 label.ForgetAttribute(TDataStd_Name.GetID_s())
             else:
-                _name(label, name)
+                name_label(label, before)
 
 
 def _mark(number: int) -> bytes:
@@ -105,7 +104,3 @@ def _labels(document: Document) -> Iterator[TDF_Label]:
     for label in list(labels(document.shape_tool.GetShapes)):
         yield label
         yield from components(label)
-
-
-def _name(label: TDF_Label, name: str) -> None:
-    TDataStd_Name.Set_s(label, TCollection_ExtendedString(name, True))

@@ -42,6 +42,7 @@ from mracad_cli import options
         help="Try a file again after a crash or a limit.",
     ),
     options.input_unit,
+    options.encoding,
     click.option(
         "--format",
         type=click.Choice(list(FORMATS)),

@@ -20,6 +20,7 @@ from mracad_cli.progress import Progress
 def command(
     source: str,
     input_unit: str | None,
+    encoding: str | None,
     junit: str | None,
     sarif: str | None,
     overwrite: bool,
@@ -37,7 +38,7 @@ def command(
     with Progress() as progress:
         progress("reading", 0, 1)
         text = load(source)
-        document = read(text, input_unit)
+        document = read(text, input_unit, encoding)
         progress("checking", 0, 1)
         judged = job.check(document, limits, text=text.getvalue())
     return emit(judged.verdict, judged.failed, command="check", as_json=as_json, junit=junit, sarif=sarif)

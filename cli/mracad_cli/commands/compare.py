@@ -20,6 +20,7 @@ from mracad_cli.progress import Progress
     click.argument("reference", metavar="REF", type=click.Path(allow_dash=True)),
     click.argument("source", metavar="NEW", type=click.Path(allow_dash=True)),
     options.input_unit,
+    options.encoding,
     options.of(Compare, without="reference"),
     options.reports,
     options.printing,
@@ -28,6 +29,7 @@ def command(
     reference: str,
     source: str,
     input_unit: str | None,
+    encoding: str | None,
     junit: str | None,
     sarif: str | None,
     overwrite: bool,
@@ -44,7 +46,8 @@ def command(
 
     with Progress() as progress:
         progress("reading", 0, 1)
-        old, new = read(reference, limits.reference_unit), read(source, input_unit)
+        old = read(reference, limits.reference_unit, encoding)
+        new = read(source, input_unit, encoding)
         progress("comparing", 0, 1)
         judged = job.compare(new, limits, lambda: old)
     return emit(judged.verdict, judged.failed, command="compare", as_json=as_json, junit=junit, sarif=sarif)

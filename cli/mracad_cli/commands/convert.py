@@ -12,7 +12,9 @@ from mracad_cli.progress import Progress
 
 @click.command(help=__doc__)
 @options.apply(options.reading, options.writing, options.printing)
-def command(source: str, input_unit: str | None, as_json: bool, outputs: tuple[str, ...], **formats: Any) -> int:
+def command(
+    source: str, input_unit: str | None, encoding: str | None, as_json: bool, outputs: tuple[str, ...], **formats: Any
+) -> int:
     import time
 
     from mracad_cli.files import Outputs, read
@@ -22,11 +24,18 @@ def command(source: str, input_unit: str | None, as_json: bool, outputs: tuple[s
     targets = Outputs(outputs, **formats)
     with Progress() as progress:
         progress("reading", 0, 1)
-        document = read(source, input_unit)
+        document = read(source, input_unit, encoding)
         progress("writing", 0, 1)
         targets.make(document, "convert")
     line = f"{document.name}: wrote {targets.sizes()}, {time.perf_counter() - start:.1f} s"
     if as_json:
-        line = json_text({"file": document.name, "written": targets.names(), "lost": plain(targets.lost)})
+        line = json_text(
+            {
+                "file": document.name,
+                "written": targets.names(),
+                "warnings": document.warnings,
+                "lost": plain(targets.lost),
+            }
+        )
     targets.deliver({}, [line])
     return 0

@@ -20,13 +20,13 @@ def command() -> None:
 
 @command.command("list")
 @options.apply(options.reading, options.of(Selection, "instance hold keep edges"), options.printing)
-def list_(source: str, input_unit: str | None, faces: tuple[str, ...], as_json: bool) -> None:
+def list_(source: str, input_unit: str | None, encoding: str | None, faces: tuple[str, ...], as_json: bool) -> None:
     """Propose features: places where the detail of a face stands out, with size, height and scales."""
     from mracad import job
     from mracad.feature.find import found
     from mracad_cli.render import json_text, mm, plain
 
-    model, chosen, _ = job.looked_at(read(source, input_unit), faces, ())
+    model, chosen, _ = job.looked_at(read(source, input_unit, encoding), faces, ())
     features = found(model, chosen)
     if as_json:
         body = [{**plain(f), "face": f.face + 1, "feature": f.text} for f in features]
@@ -51,7 +51,14 @@ def list_(source: str, input_unit: str | None, faces: tuple[str, ...], as_json: 
     options.printing,
 )
 def extract(
-    source: str, input_unit: str | None, feature: str, output: str, overwrite: bool, as_json: bool, **given: Any
+    source: str,
+    input_unit: str | None,
+    encoding: str | None,
+    feature: str,
+    output: str,
+    overwrite: bool,
+    as_json: bool,
+    **given: Any,
 ) -> None:
     """Save a feature to a file: a library of details that mracad repeat and mracad transfer lay elsewhere."""
     from mracad import job
@@ -65,7 +72,7 @@ def extract(
         raise UsageError(f"cannot write {path}: unknown ending {path.suffix!r}", "end it in .feature")
     check_target(path, overwrite)
     chosen_options = options_of(Repeat, {**given, "feature": feature, "at": ("0,0,0",)})
-    model, chosen, _ = job.looked_at(read(source, input_unit), chosen_options.faces, ())
+    model, chosen, _ = job.looked_at(read(source, input_unit, encoding), chosen_options.faces, ())
     found = taken(model, chosen_options, chosen)
     body = {
         "file": model.name,

@@ -37,7 +37,9 @@ if TYPE_CHECKING:
     ),
     options.printing,
 )
-def command(source: str, input_unit: str | None, scale: str, keep: Any, everything: bool, as_json: bool) -> int:
+def command(
+    source: str, input_unit: str | None, encoding: str | None, scale: str, keep: Any, everything: bool, as_json: bool
+) -> int:
     from mracad.audit.continuity import seams, summary
     from mracad.audit.scales import scales
     from mracad.occ.check import check
@@ -48,7 +50,7 @@ def command(source: str, input_unit: str | None, scale: str, keep: Any, everythi
 
     with Progress() as progress:
         progress("reading", 0, 1)
-        document = read(source, input_unit)
+        document = read(source, input_unit, encoding)
         progress("looking at faces", 0, 1)
         model = view(document)
         width = length(scale, model.diagonal, "scale")

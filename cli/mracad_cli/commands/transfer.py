@@ -14,7 +14,14 @@ from mracad_cli.steps import run_steps
 @click.command("transfer", help=__doc__)
 @click.argument("source", metavar="SRC", type=click.Path())
 @click.argument("target", metavar="DST", type=click.Path(allow_dash=True))
-@options.apply(options.input_unit, options.of(Transfer, "source"), options.writing, options.editing, options.printing)
+@options.apply(
+    options.input_unit,
+    options.encoding,
+    options.of(Transfer, "source"),
+    options.writing,
+    options.editing,
+    options.printing,
+)
 def command(source: str, target: str, **given: Any) -> int:
     from mracad.recipe import Step
     from mracad.recipe import options as options_of
