@@ -6,8 +6,9 @@ import io
 import os
 import sys
 from collections.abc import Iterable, Mapping
+from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from mracad import guard
 from mracad.errors import FileError, UsageError
@@ -15,7 +16,7 @@ from mracad.formats import FORMATS, by_ending
 
 if TYPE_CHECKING:
     from mracad.occ.document import Document
-    from mracad.occ.files import Lost
+    from mracad.occ.files import Written
     from mracad.occ.load import Text
 
 
@@ -121,7 +122,7 @@ class Outputs:
         self.paths, self.schema = paths, (schema or "").upper()
         self.overwrite, self.if_changed = overwrite or if_changed, if_changed
         self.chord, self.angle, self.ascii_stl = chord, angle, ascii_stl
-        self.lost: dict[str, tuple[Lost, ...]] = {}
+        self.written: dict[str, Written] = {}
         self._made: dict[str, bytes] = {}
         if needed and not paths:
             raise UsageError("no output is named", "name a file with -o OUT.step, or - for standard output")
@@ -138,7 +139,7 @@ class Outputs:
         chord = self._chord(document) if meshed else None
         for path, format in self.formats.items():
             stream = io.BytesIO()
-            self.lost[self._name(path)] = write(
+            self.written[self._name(path)] = write(
                 document,
                 stream,
                 format.name,
@@ -154,9 +155,9 @@ class Outputs:
         """End the command: what was made, texts beside it and the lines of the result, all or nothing."""
         from mracad.output import holds
 
-        for name, lost in self.lost.items():
-            if lost:
-                print(f"warning: {name} lacks {', '.join(map(str, lost))}", file=sys.stderr)
+        for name, written in self.written.items():
+            if written.lost:
+                print(f"warning: {name} lacks {', '.join(map(str, written.lost))}", file=sys.stderr)
         made = {p: d for p, d in self._made.items() if p != "-" and not (self.if_changed and holds(Path(p), d))}
         stream = self._made.get("-", b"" if "-" in self.paths else None)
         deliver({**made, **files}, lines, stream=stream)
@@ -172,11 +173,21 @@ class Outputs:
         """The outputs that are files."""
         return [path for path in self.paths if path != "-"]
 
-    def names(self) -> list[str]:
-        return [self._name(path) for path in self.paths]
-
     def sizes(self) -> str:
-        return ", ".join(f"{self._name(path)}, {_size(len(data))}" for path, data in self._made.items())
+        """What was made: names, sizes, and the faces that are in parts."""
+        made = ((self._name(path), data) for path, data in self._made.items())
+        return ", ".join(", ".join([name, _size(len(data)), *map(str, self.written[name].cut)]) for name, data in made)
+
+    def body(self) -> dict[str, Any]:
+        """What was made, for a report; faces count from 1."""
+        return {
+            "written": list(self.written),
+            "lost": {name: [asdict(lost) for lost in each.lost] for name, each in self.written.items()},
+            "cut": {
+                name: [{"face": cut.face + 1, "parts": cut.parts} for cut in each.cut]
+                for name, each in self.written.items()
+            },
+        }
 
     @staticmethod
     def _name(path: str) -> str:

@@ -85,8 +85,7 @@ def run_steps(
             progress("writing", 0, 1)
             targets.make(document, title(steps))
     body = _body(document.name, steps, results, recipe)
-    written_to = targets.names() if written else []
-    body |= {"written": written_to, "warnings": document.warnings, "lost": render.plain(targets.lost)}
+    body |= {"warnings": document.warnings, **targets.body()}
     files: dict[str, str | None] = {report: render.json_text(body, 1) + "\n"} if report else {}
     if written:
         files |= dict.fromkeys(records, record_of(steps))

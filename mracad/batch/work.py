@@ -98,11 +98,12 @@ def do(work: Work) -> Product:
     if isinstance(last, Judged) and not last.passed:
         more = f" (and {len(last.failures) - 1} more)" if len(last.failures) > 1 else ""
         raise MracadError(f"{work.steps[len(results) - 1].id}: {last.failures[0]}{more}", code=Code.FAILED_CHECK)
-    written = io.BytesIO()
-    lost = write(document, written, work.format, schema=work.schema, options_text=title(work.steps))
+    output = io.BytesIO()
+    written = write(document, output, work.format, schema=work.schema, options_text=title(work.steps))
     short = ({"step": step.id, **_short(result)} for step, result in zip(work.steps, results, strict=True))
-    warnings = (*document.warnings, *(f"the output lacks {what}" for what in lost))
-    return Product(written.getvalue(), tuple(short), warnings, time.perf_counter() - start)
+    lost = (f"the output lacks {what}" for what in written.lost)
+    warnings = (*document.warnings, *lost, *(f"the output has {cut}" for cut in written.cut))
+    return Product(output.getvalue(), tuple(short), warnings, time.perf_counter() - start)
 
 
 def _read(work: Work) -> Document:

@@ -12,6 +12,7 @@ from mracad.formats import FORMATS, by_content, by_ending
 from mracad.occ.document import Document, label_name, named_labels
 from mracad.occ.literals import known
 from mracad.occ.load import load
+from mracad.occ.writable import Cut
 from mracad.output import put
 
 
@@ -39,6 +40,22 @@ class Lost:
         names = list(dict.fromkeys(name for name in self.names if name))
         shown = ", ".join(names[:3]) + (" …" if len(names) > 3 else "")
         return f"{self.stated - self.written} of {self.stated} {self.what}" + (f" ({shown})" if shown else "")
+
+
+@dataclass(frozen=True)
+class Written:
+    """What a written file has otherwise than the document.
+
+    Attributes
+    ----------
+    lost : tuple of Lost
+        What it lacks.
+    cut : tuple of Cut
+        The faces that it holds in several parts, because a reader would mistake them in one.
+    """
+
+    lost: tuple[Lost, ...] = ()
+    cut: tuple[Cut, ...] = ()
 
 
 def read(source: str | os.PathLike | BinaryIO, input_unit: str | None = None, encoding: str | None = None) -> Document:
@@ -93,7 +110,7 @@ def write(
     angle: float | None = None,
     ascii: bool = False,
     options_text: str = "",
-) -> tuple[Lost, ...]:
+) -> Written:
     """Write a document, whole or not at all; the same bytes every time.
 
     Parameters
@@ -113,11 +130,14 @@ def write(
 
     Returns
     -------
-    tuple of Lost
-        What could not be written: faces of a mesh, annotations of an exact model, names beyond ASCII in IGES.
+    Written
+        What could not be written (faces of a mesh, annotations of an exact model, names beyond
+        ASCII in IGES), and what only in parts.
 
     Raises
     ------
+    EditError
+        For a face that a reader of that format would not find again.
     FileError
         When the document cannot be expressed in that format, or the target cannot be written.
     UsageError
@@ -130,14 +150,15 @@ def write(
         raise UsageError(f"unknown format '{format}'", "use one of " + ", ".join(FORMATS))
     name = Path(target).name if named else document.name  # type: ignore[arg-type]
     lost: tuple[Lost, ...] = ()
+    cut: tuple[Cut, ...] = ()
     if format == "step":
         from mracad.occ.step import step
 
-        data = step(document, name, schema, options_text)
+        data, cut = step(document, name, schema, options_text)
     elif format == "iges":
         from mracad.occ.iges import iges
 
-        data = iges(document, name, options_text)
+        data, cut = iges(document, name, options_text)
         lost = _unwritten(document)
     elif format in ("brep", "binbrep"):
         from mracad.occ.brep import brep
@@ -159,7 +180,7 @@ def write(
         counts = {what: (names, len(kept.get(what, ()))) for what, names in document.annotations.items()}
         lost += tuple(Lost(what, len(ns), count, ns) for what, (ns, count) in counts.items() if count < len(ns))
     put(data, target)
-    return lost
+    return Written(lost, cut)
 
 
 def _unwritten(document: Document) -> tuple[Lost, ...]:

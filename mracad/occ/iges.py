@@ -12,10 +12,11 @@ from typing import BinaryIO
 from OCP.IFSelect import IFSelect_RetDone
 from OCP.IGESBasic import IGESBasic_Name
 from OCP.IGESCAFControl import IGESCAFControl_Reader, IGESCAFControl_Writer
-from OCP.IGESControl import IGESControl_Controller
+from OCP.IGESControl import IGESControl_Controller, IGESControl_Reader, IGESControl_Writer
 from OCP.IGESData import IGESData_IGESEntity, IGESData_IGESModel, IGESData_IGESWriter
 from OCP.IGESSelect import IGESSelect_WorkLibrary
 from OCP.TCollection import TCollection_HAsciiString
+from OCP.TopoDS import TopoDS_Shape
 
 from mracad import __version__
 from mracad.errors import FileError
@@ -24,6 +25,7 @@ from mracad.occ.iges_text import prepared
 from mracad.occ.load import load
 from mracad.occ.settings import all_digits, exchange, moment, quiet
 from mracad.occ.units import UNITS, Units, named
+from mracad.occ.writable import Cut, writable
 
 _FLAGS = {1: "in", 2: "mm", 4: "ft", 5: "mi", 6: "m", 7: "km", 8: "mil", 9: "um", 10: "cm", 11: "uin"}
 _MODES = ("Name", "Color", "Layer")
@@ -85,8 +87,8 @@ def _put_names(document: Document, names: dict[str, str]) -> None:
             name_label(label, names[mark])
 
 
-def iges(document: Document, name: str, options_text: str = "") -> bytes:
-    """A document as IGES 5.3 in its own unit, solids as such.
+def iges(document: Document, name: str, options_text: str = "") -> tuple[bytes, tuple[Cut, ...]]:
+    """A document as IGES 5.3 in its own unit, solids as such; and the faces that it holds in parts.
 
     Parameters
     ----------
@@ -98,12 +100,15 @@ def iges(document: Document, name: str, options_text: str = "") -> bytes:
 
     Raises
     ------
+    EditError
+        For a face that the kernel cannot express.
     FileError
-        When the kernel cannot express it.
+        When the kernel cannot express anything.
     """
     IGESControl_Controller.Init_s()
     stream = io.BytesIO()
-    with quiet(), exchange({"write.iges.brep.mode": 1, "write.iges.unit": UNITS[document.unit][1]}):
+    settings: dict[str, str | int] = {"write.iges.brep.mode": 1, "write.iges.unit": UNITS[document.unit][1]}
+    with quiet(), exchange(settings), writable(document, _copy) as cuts:
         writer = IGESCAFControl_Writer()
         for mode in _MODES:
             getattr(writer, f"Set{mode}Mode")(True)
@@ -113,11 +118,30 @@ def iges(document: Document, name: str, options_text: str = "") -> bytes:
         model = writer.Model()
         _names_in_order(model)
         _head(model, name, options_text)
-        printer = IGESData_IGESWriter(model)
-        all_digits(printer.FloatWriter())
-        printer.SendModel(IGESSelect_WorkLibrary.DefineProtocol_s())
-        printer.Print(stream)
-    return stream.getvalue()
+        _print(model, stream)
+    return stream.getvalue(), cuts
+
+
+def _print(model: IGESData_IGESModel, stream: BinaryIO) -> None:
+    printer = IGESData_IGESWriter(model)
+    all_digits(printer.FloatWriter())
+    printer.SendModel(IGESSelect_WorkLibrary.DefineProtocol_s())
+    printer.Print(stream)
+
+
+def _copy(shape: TopoDS_Shape) -> TopoDS_Shape:
+    """A bare shape as it is read from the file that it is written to."""
+    writer = IGESControl_Writer()
+    writer.AddShape(shape)
+    writer.ComputeModel()
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, "shape.igs")
+        with path.open("wb") as stream:
+            _print(writer.Model(), stream)
+        reader = IGESControl_Reader()
+        reader.ReadFile(str(path))
+    reader.TransferRoots()
+    return reader.OneShape()
 
 
 def _refuse_torn(text: bytes, name: str) -> None:

@@ -114,19 +114,19 @@ def _copied(document: Document, product: TDF_Label) -> TDF_Label:
             # a location of its own: the writer tells instances apart by shape and location
             location = TopLoc_Location(XCAFDoc_ShapeTool.GetLocation_s(component).Transformation())
             twin = tool.AddComponent(copy, referred(component), location)
-            _say(document, component, twin)
+            say(document, component, twin)
     else:
         copier = BRepBuilderAPI_Copy(XCAFDoc_ShapeTool.GetShape_s(product), True, False)
         copy = tool.AddShape(copier.Shape(), False)
         for sub in list(labels(lambda found: XCAFDoc_ShapeTool.GetSubShapes_s(product, found))):
             twin = tool.AddSubShape(copy, copier.ModifiedShape(XCAFDoc_ShapeTool.GetShape_s(sub)))
             if not twin.IsNull():
-                _say(document, sub, twin)
-    _say(document, product, copy)
+                say(document, sub, twin)
+    say(document, product, copy)
     return copy
 
 
-def _say(document: Document, old: TDF_Label, new: TDF_Label) -> None:
+def say(document: Document, old: TDF_Label, new: TDF_Label) -> None:
     """Say of a label what is said of another: name, properties, colours, material, layers."""
     link = XCAFDoc.ShapeRefGUID_s()
     for kind in _VALUES:

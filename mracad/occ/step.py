@@ -11,9 +11,10 @@ from typing import BinaryIO
 from OCP.APIHeaderSection import APIHeaderSection_MakeHeader
 from OCP.IFSelect import IFSelect_RetDone
 from OCP.STEPCAFControl import STEPCAFControl_Reader, STEPCAFControl_Writer
-from OCP.STEPControl import STEPControl_AsIs
+from OCP.STEPControl import STEPControl_AsIs, STEPControl_Reader, STEPControl_Writer
 from OCP.StepData import StepData_StepModel, StepData_StepWriter
 from OCP.TCollection import TCollection_HAsciiString
+from OCP.TopoDS import TopoDS_Shape
 
 from mracad import __version__
 from mracad.errors import FileError, UsageError
@@ -26,6 +27,7 @@ from mracad.occ.properties import restated
 from mracad.occ.settings import all_digits, exchange, moment, quiet
 from mracad.occ.titles import marked, marking, put_names
 from mracad.occ.units import UNITS, of_file
+from mracad.occ.writable import Cut, writable
 from mracad.output import put
 
 _READ_MODES = ("Name", "Color", "Layer", "GDT", "Mat", "Props", "View", "SHUO", "Meta", "ProductMeta")
@@ -110,17 +112,22 @@ def write_step(
 
     Raises
     ------
+    EditError
+        For a face that the kernel cannot express.
     FileError
         When the target cannot be written.
     UsageError
         For an unknown schema, or a SOURCE_DATE_EPOCH that is no number.
     """
     name = Path(target).name if isinstance(target, str | os.PathLike) else document.name
-    put(step(document, name, schema, options_text), target)
+    put(step(document, name, schema, options_text)[0], target)
 
 
-def step(document: Document, name: str, schema: str = "", options_text: str = "") -> bytes:
-    """The whole STEP file; ``name`` is that in its header, the rest as for :func:`write_step`."""
+def step(document: Document, name: str, schema: str = "", options_text: str = "") -> tuple[bytes, tuple[Cut, ...]]:
+    """The whole STEP file, and the faces that it holds in parts.
+
+    ``name`` is that in its header, the rest is as for :func:`write_step`.
+    """
     schema = schema or ("AP242" if document.schema == "AP242" else "AP214")
     if schema not in _SCHEMAS:
         raise UsageError(f"unknown STEP schema '{schema}'", "use one of " + ", ".join(_SCHEMAS))
@@ -131,7 +138,13 @@ def step(document: Document, name: str, schema: str = "", options_text: str = ""
         "write.stepcaf.subshapes.name": "On",
     }
     stream = io.BytesIO()
-    with quiet(), exchange(settings), restated(document), marking(document) as titles:
+    with (
+        quiet(),
+        exchange(settings),
+        writable(document, _copy) as cuts,
+        restated(document),
+        marking(document) as titles,
+    ):
         writer = STEPCAFControl_Writer()
         for mode in _WRITE_MODES:
             getattr(writer, f"Set{mode}Mode")(True)
@@ -140,11 +153,27 @@ def step(document: Document, name: str, schema: str = "", options_text: str = ""
         if not writer.Transfer(document.xcaf, STEPControl_AsIs):
             raise FileError(f"the kernel cannot express '{document.name}' as STEP", "check its geometry")
         _head(model, name, options_text)
-        printer = StepData_StepWriter(model)
-        all_digits(printer.FloatWriter())
-        printer.SendModel(writer.Writer().WS().Protocol())
-        printer.Print(stream)
-    return tidy(stream.getvalue(), titles)
+        _print(writer.Writer(), stream)
+    return tidy(stream.getvalue(), titles), cuts
+
+
+def _print(writer: STEPControl_Writer, stream: BinaryIO) -> None:
+    printer = StepData_StepWriter(writer.Model())
+    all_digits(printer.FloatWriter())
+    printer.SendModel(writer.WS().Protocol())
+    printer.Print(stream)
+
+
+def _copy(shape: TopoDS_Shape) -> TopoDS_Shape:
+    """A bare shape as it is read from the file that it is written to."""
+    stream = io.BytesIO()
+    writer = STEPControl_Writer()
+    writer.Transfer(shape, STEPControl_AsIs)
+    _print(writer, stream)
+    reader = STEPControl_Reader()
+    reader.ReadStream("", io.BytesIO(stream.getvalue()))
+    reader.TransferRoots()
+    return reader.OneShape()
 
 
 def _head(model: StepData_StepModel, name: str, options_text: str) -> None:

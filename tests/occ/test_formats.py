@@ -21,7 +21,7 @@ MESHES = [name for name, format in FORMATS.items() if format.kind == "mesh"]
 
 def written(document, format, **options):
     stream = io.BytesIO()
-    assert occ.write(document, stream, format, **options) == ()
+    assert occ.write(document, stream, format, **options).lost == ()
     return stream.getvalue()
 
 

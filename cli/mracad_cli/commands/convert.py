@@ -18,7 +18,7 @@ def command(
     import time
 
     from mracad_cli.files import Outputs, read
-    from mracad_cli.render import json_text, plain
+    from mracad_cli.render import json_text
 
     start = time.perf_counter()
     targets = Outputs(outputs, **formats)
@@ -29,13 +29,6 @@ def command(
         targets.make(document, "convert")
     line = f"{document.name}: wrote {targets.sizes()}, {time.perf_counter() - start:.1f} s"
     if as_json:
-        line = json_text(
-            {
-                "file": document.name,
-                "written": targets.names(),
-                "warnings": document.warnings,
-                "lost": plain(targets.lost),
-            }
-        )
+        line = json_text({"file": document.name, "warnings": document.warnings, **targets.body()})
     targets.deliver({}, [line])
     return 0

@@ -1,0 +1,236 @@
+"""What a format cannot express as it is: faces that a reader would lay anew otherwise are written in parts.
+
+A face that goes right round its surface has a closing edge.  STEP and IGES leave out what closes it at poles, and a
+reader guesses; where the face has other boundaries, too, it may guess wrong and keep the hole for the face.  Cut along
+a parameter line the parts close nowhere, and there is nothing to guess.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+import numpy as np
+from OCP.BRep import BRep_Tool
+from OCP.BRepAdaptor import BRepAdaptor_Curve2d
+from OCP.BRepCheck import BRepCheck_Analyzer
+from OCP.BRepGProp import BRepGProp
+from OCP.BRepTools import BRepTools
+from OCP.Geom import Geom_ElementarySurface, Geom_RectangularTrimmedSurface, Geom_Surface
+from OCP.GProp import GProp_GProps
+from OCP.ShapeAnalysis import ShapeAnalysis_ShapeTolerance
+from OCP.ShapeBuild import ShapeBuild_ReShape
+from OCP.ShapeFix import ShapeFix_ComposeShell
+from OCP.ShapeUpgrade import ShapeUpgrade_SplitSurface
+from OCP.TColStd import TColStd_HSequenceOfReal
+from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_FORWARD, TopAbs_WIRE
+from OCP.TopLoc import TopLoc_Location
+from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Shape
+from OCP.XCAFDoc import XCAFDoc_ShapeTool
+
+from mracad.errors import EditError
+from mracad.occ.document import Document, Part, labels
+from mracad.occ.instance import say
+from mracad.occ.topology import edge_uses, inside
+
+Array = np.ndarray
+Copier = Callable[[TopoDS_Shape], TopoDS_Shape]
+"""Writes a bare shape in some format and reads it back."""
+
+_NATURAL = 4  # edge uses of a face that is bounded by nothing but parameter lines
+_SAME = 1e-5  # relative difference of areas, and of centres to size, of one face
+_EXACT = 1e-7  # relative error of areas; those of the kernel's quick way are off by up to a hundredth on NURBS faces
+_LOOSER = 2.0, 1e-5  # a face read back may have so many times the tolerance, or so much (memory units)
+_ALL_THE_WAY = 0.9  # share of the whole range of a parameter
+_SAMPLES = 32  # points along an edge
+_PRECISION = 1e-7
+
+
+@dataclass(frozen=True)
+class Cut:
+    """A face that a file holds in several parts.
+
+    Attributes
+    ----------
+    face : int
+        Its index.
+    parts : int
+    """
+
+    face: int
+    parts: int
+
+    def __str__(self) -> str:
+        return f"#{self.face + 1} in {self.parts} parts"
+
+
+@contextmanager
+def writable(document: Document, copier: Copier) -> Iterator[tuple[Cut, ...]]:
+    """Let a document hold, inside the block, only faces that a format can express.
+
+    Parameters
+    ----------
+    document : Document
+        Its parts, and the labels in them, are put back when the block ends.
+    copier : callable
+        How a reader of that format sees a bare shape.
+
+    Yields
+    ------
+    tuple of Cut
+        The faces that are in several parts, which have its name, colour and layers.
+
+    Raises
+    ------
+    EditError
+        For a face that would not come back whole in parts either.
+    """
+    wrong: dict[int, list[int]] = {}
+    for number, part in enumerate(document.parts):
+        for index in range(part.first, part.first + part.faces.Extent()):
+            face = document.faces[index]
+            if _closes(face) and BRepCheck_Analyzer(face).IsValid() and not _kept(face, copier(face)):
+                wrong.setdefault(number, []).append(index)
+    if not wrong:
+        yield ()
+        return
+    document.xcaf.SetUndoLimit(1)
+    document.xcaf.OpenCommand()
+    try:
+        cuts = [
+            cut for number, faces in wrong.items() for cut in _rewrite(document, document.parts[number], faces, copier)
+        ]
+        document.shape_tool.UpdateAssemblies()
+        yield tuple(cuts)
+    finally:
+        document.xcaf.AbortCommand()
+        document.xcaf.SetUndoLimit(0)
+
+
+def _closes(face: TopoDS_Face) -> bool:
+    """Whether a face goes right round a surface that is no plain one, and has more than that surface's own bounds."""
+    forward = TopoDS.Face_s(face.Oriented(TopAbs_FORWARD))
+    if isinstance(_basis(BRep_Tool.Surface_s(forward, TopLoc_Location())), Geom_ElementarySurface):
+        return False
+    edges = list(edge_uses(forward))
+    if len(edges) <= _NATURAL and sum(1 for _ in inside(forward, TopAbs_WIRE)) == 1:
+        return False
+    return any(BRep_Tool.IsClosed_s(edge, forward) for edge in edges)
+
+
+def _basis(surface: Geom_Surface) -> Geom_Surface:
+    return surface.BasisSurface() if isinstance(surface, Geom_RectangularTrimmedSurface) else surface
+
+
+def _kept(face: TopoDS_Shape, copy: TopoDS_Shape) -> bool:
+    """Whether what was read back is what was written."""
+    loose, looser = _LOOSER
+    return (
+        len(_faces(copy)) == len(_faces(face))
+        and (_as_large(face, copy) or _as_large(face, copy, _EXACT))
+        and _tolerance(copy) <= max(loose * _tolerance(face), looser)
+        and BRepCheck_Analyzer(copy).IsValid()
+    )
+
+
+def _as_large(face: TopoDS_Shape, copy: TopoDS_Shape, *exact: float) -> bool:
+    """Whether two faces have the same area and centre; quickly, what says no to some that have, or exactly."""
+    old, new = GProp_GProps(), GProp_GProps()
+    for shape, found in ((face, old), (copy, new)):
+        BRepGProp.SurfaceProperties_s(shape, found, *exact)
+    off = old.CentreOfMass().Distance(new.CentreOfMass())
+    return abs(new.Mass() - old.Mass()) <= _SAME * abs(old.Mass()) and off <= _SAME * abs(old.Mass()) ** 0.5
+
+
+def _tolerance(shape: TopoDS_Shape) -> float:
+    return ShapeAnalysis_ShapeTolerance().Tolerance(shape, 1, TopAbs_EDGE)
+
+
+def _rewrite(document: Document, part: Part, faces: Sequence[int], copier: Copier) -> Iterator[Cut]:
+    """Put a part with some faces in parts in its own place in the document."""
+    context = ShapeBuild_ReShape()
+    for index in faces:
+        _divide(document, index, copier, context)
+        yield Cut(index, len(_faces(context.Apply(document.faces[index]))))
+    whole = context.Apply(part.shape)
+    if BRepCheck_Analyzer(part.shape).IsValid() and not BRepCheck_Analyzer(whole).IsValid():
+        raise _mistaken(document, faces[0])
+    tool = document.shape_tool
+    subs = list(labels(lambda found: XCAFDoc_ShapeTool.GetSubShapes_s(part.label, found)))
+    new = [context.Apply(XCAFDoc_ShapeTool.GetShape_s(label)) for label in subs]
+    tool.SetShape(part.label, whole)
+    for label, shape in zip(subs, new, strict=True):
+        is_face = XCAFDoc_ShapeTool.GetShape_s(label).ShapeType() == TopAbs_FACE
+        first, *others = _faces(shape) if is_face else [shape]
+        tool.SetShape(label, first)
+        for other in others:
+            say(document, label, tool.AddSubShape(part.label, other))
+
+
+def _divide(document: Document, index: int, copier: Copier, context: ShapeBuild_ReShape) -> None:
+    """Cut a face within a context, in one direction where that is enough, else in both; raises EditError."""
+    face = context.Apply(document.faces[index])
+    for directions in ((True, False), (False, True), (True, True)):
+        parts = _parts(face, directions, ShapeBuild_ReShape())
+        if parts is not None and _kept(parts, copier(parts)):
+            _parts(face, directions, context)
+            return
+    raise _mistaken(document, index)
+
+
+def _mistaken(document: Document, index: int) -> EditError:
+    what = "goes right round its surface in a way that readers of this format mistake"
+    return EditError(f"{document.name}: #{index + 1} {what}", "write BREP, or split the face")
+
+
+def _faces(shape: TopoDS_Shape) -> list[TopoDS_Shape]:
+    return list(inside(shape, TopAbs_FACE))
+
+
+def _parts(face: TopoDS_Shape, directions: tuple[bool, bool], context: ShapeBuild_ReShape) -> TopoDS_Shape | None:
+    """A face cut across the directions in which its surface closes."""
+    location = TopLoc_Location()
+    forward = TopoDS.Face_s(face.Oriented(TopAbs_FORWARD))
+    surface = BRep_Tool.Surface_s(forward, location)
+    basis = _basis(surface)
+    closed = basis.IsUClosed(), basis.IsVClosed()
+    if any(wanted and not closes for wanted, closes in zip(directions, closed, strict=True)):
+        return None
+    bounds = BRepTools.UVBounds_s(forward)
+    splitter = ShapeUpgrade_SplitSurface()
+    splitter.Init(surface, *bounds)
+    for axis, put in enumerate((splitter.SetUSplitValues, splitter.SetVSplitValues)):
+        if directions[axis]:
+            at = TColStd_HSequenceOfReal()
+            at.Append(_away(forward, axis, *bounds[2 * axis : 2 * axis + 2]))
+            put(at)
+    splitter.Perform(False)
+    shell = ShapeFix_ComposeShell()
+    shell.Init(splitter.ResSurfaces(), location, forward, _PRECISION)
+    shell.SetContext(context)
+    if not shell.Perform():
+        return None
+    context.Replace(forward, shell.Result())
+    return shell.Result()
+
+
+def _away(face: TopoDS_Face, axis: int, low: float, high: float) -> float:
+    """The middle of the widest stretch of a parameter into which no boundary comes but those that go all the way."""
+    taken = [(high, high)]
+    for edge in edge_uses(face):
+        values = _along(edge, face, axis)
+        if not BRep_Tool.IsClosed_s(edge, face) and np.ptp(values) < _ALL_THE_WAY * (high - low):
+            taken.append((values.min(), values.max()))
+    best, start = (0.0, (low + high) / 2), low
+    for first, last in sorted(taken):
+        best = max(best, (first - start, (first + start) / 2))
+        start = max(start, last)
+    return best[1]
+
+
+def _along(edge, face: TopoDS_Face, axis: int) -> Array:
+    """A parameter of the face along an edge."""
+    curve = BRepAdaptor_Curve2d(edge, face)
+    at = np.linspace(curve.FirstParameter(), curve.LastParameter(), _SAMPLES)
+    return np.array([curve.Value(t).Coord()[axis] for t in at.tolist()])

@@ -1,0 +1,135 @@
+"""What formats cannot express as it is: faces that go right round are read back whole, in parts where it takes that."""
+
+import contextlib
+import io
+import json
+
+import pytest
+from OCP.gp import gp_Ax1, gp_Dir, gp_Pnt, gp_Trsf, gp_Vec
+from OCP.Quantity import Quantity_Color, Quantity_TOC_sRGB
+from OCP.TCollection import TCollection_ExtendedString
+from OCP.TDataStd import TDataStd_Name
+from OCP.TopLoc import TopLoc_Location
+from OCP.XCAFDoc import XCAFDoc_ColorType, XCAFDoc_DocumentTool
+
+from mracad import occ
+from mracad.occ.load import Text
+from mracad.occ.measure import mass
+from mracad.occ.writable import Cut
+from tests import zoo
+from tests.occ import shapes
+
+GREEN = Quantity_Color(0.0, 1.0, 0.0, Quantity_TOC_sRGB)
+
+
+def written(document, format="step", **options):
+    stream = io.BytesIO()
+    result = occ.write(document, stream, format, **options)
+    assert result.lost == ()
+    return stream.getvalue(), result.cut
+
+
+def again(data):
+    return occ.read(Text(data, "again"))
+
+
+def assert_same(old, new, cut):
+    """Two documents hold the same bodies, but for faces that one of them has in parts."""
+    before, after = occ.check(old), occ.check(new)
+    assert after.valid and after.free_edges == before.free_edges
+    assert after.solids == before.solids
+    assert after.faces == before.faces + sum(each.parts - 1 for each in cut)
+    a, b = mass(old), mass(new)
+    assert (b.volume, b.area) == pytest.approx((a.volume, a.area), rel=5e-5)
+    assert b.centre == pytest.approx(a.centre, abs=1e-3)
+    assert max(after.edge_tolerance, after.vertex_tolerance) <= max(
+        2 * max(before.edge_tolerance, before.vertex_tolerance), 1e-5
+    )
+
+
+def said(document, face, name, colour=GREEN):
+    """Give a face a name, a colour and a layer."""
+    part = document.part_of(face)
+    label = document.shape_tool.AddSubShape(part.label, document.faces[face])
+    TDataStd_Name.Set_s(label, TCollection_ExtendedString(name, True))
+    main = document.xcaf.Main()
+    XCAFDoc_DocumentTool.ColorTool_s(main).SetColor(label, colour, XCAFDoc_ColorType.XCAFDoc_ColorSurf)
+    XCAFDoc_DocumentTool.LayerTool_s(main).SetLayer(label, TCollection_ExtendedString("trim"))
+
+
+def drilled_ball():
+    return zoo.nurbs(zoo.cut("sphere", "holes"))
+
+
+def nothing(document, copier):
+    return contextlib.nullcontext(())
+
+
+@pytest.mark.parametrize("schema", ["AP203", "AP214", "AP242"])
+def test_what_is_said_of_a_face_goes_to_its_parts(schema):
+    document = shapes.document(drilled_ball(), names={0: "ball"})
+    said(document, 0, "skin")
+    said(document, 1, "wall", Quantity_Color(1.0, 0.0, 0.0, Quantity_TOC_sRGB))
+    document.__dict__.pop("parts")
+    data, cut = written(document, schema=schema)
+    assert cut == (Cut(0, 2),)
+    found = again(data)
+    assert_same(document, found, cut)
+    named = sorted((face.name, face.colour) for face in occ.view(found).faces if face.name)
+    assert named == [("skin", "#00ff00"), ("skin", "#00ff00"), ("wall", "#ff0000")]
+    assert occ.view(found).products == ("ball",)
+    layer = data.index(b"PRESENTATION_LAYER_ASSIGNMENT('trim'")
+    assert data[layer : data.index(b";", layer)].count(b"#") == 3
+
+
+def test_the_document_stays_what_it_was():
+    document = shapes.document(drilled_ball(), names={0: "ball"})
+    said(document, 0, "skin")
+    document.__dict__.pop("parts")
+    old, whole = list(document.faces), document.shape
+    first, cut = written(document)
+    assert cut
+    second, _ = written(document)
+    assert second == first
+    assert document.shape.IsEqual(whole)
+    fresh = occ.Document(document.xcaf, document.name)
+    assert all(a.IsEqual(b) for a, b in zip(old, fresh.faces, strict=True))
+    assert [face.name for face in occ.view(fresh).faces] == ["skin", "", "", "", ""]
+
+
+def test_a_part_that_stands_in_several_places():
+    turn, move = gp_Trsf(), gp_Trsf()
+    turn.SetRotation(gp_Ax1(gp_Pnt(0, 0, 0), gp_Dir(0, 1, 1)), 0.7)
+    move.SetTranslation(gp_Vec(100, 0, 0))
+    document = shapes.assembly(drilled_ball(), TopLoc_Location(turn), TopLoc_Location(move))
+    data, cut = written(document)
+    found = again(data)
+    assert cut == (Cut(0, 2),)
+    assert [len(part.placements) for part in found.parts] == [2]
+    assert_same(document, found, cut)
+
+
+@pytest.mark.parametrize("name", ["bottle", "trimmed", "blade", "assembly"])
+@pytest.mark.parametrize("format", ["step", "iges"])
+def test_other_files_are_what_they_were(samples, monkeypatch, name, format):
+    document = occ.read(samples / f"{name}.step")
+    data, cut = written(document, format)
+    assert cut == ()
+    monkeypatch.setattr(f"mracad.occ.{format}.writable", nothing)
+    assert written(document, format)[0] == data
+
+
+def test_reports_say_which_faces_are_in_parts(mracad, tmp_path):
+    source = shapes.save(zoo.nurbs(zoo.cut("half_sphere", "hole")), tmp_path / "in.step")
+    occ.write(shapes.document(drilled_ball()), tmp_path / "in.brep")
+    done = mracad("convert", tmp_path / "in.brep", "-o", tmp_path / "out.step")
+    assert (done.code, done.err) == (0, "") and ", #1 in 2 parts, " in done.out
+    done = mracad("convert", tmp_path / "in.brep", "-o", tmp_path / "again.step", "-o", tmp_path / "out.stl", "--json")
+    assert json.loads(done.out)["cut"] == {"again.step": [{"face": 1, "parts": 2}], "out.stl": []}
+    report = tmp_path / "report.json"
+    words = ("--scale", "30%", "--refine", "--report", report, "-o", tmp_path / "smooth.step")
+    done = mracad("smooth", tmp_path / "in.brep", *words)
+    assert done.code == 0 and ", #1 in 2 parts, " in done.out
+    assert json.loads(report.read_text())["cut"] == {"smooth.step": [{"face": 1, "parts": 2}]}
+    done = mracad("convert", source, "-o", tmp_path / "half.step")
+    assert done.code == 0 and " parts" not in done.out
