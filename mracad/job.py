@@ -7,6 +7,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 from mracad import review
@@ -18,7 +19,8 @@ from mracad.edit.result import Edit
 from mracad.errors import EditError, UsageError
 from mracad.model import Model
 from mracad.options import Check, Compare, Selection, length
-from mracad.select import NURBS, select
+from mracad.select import Scope, every_nurbs
+from mracad.select import scope as select_scope
 
 if TYPE_CHECKING:
     from mracad.occ.check import Validity
@@ -199,7 +201,7 @@ def run(
     document : Document
         Changed in place unless ``apply`` is false.
     edit : callable
-        ``edit(model, options, *models, faces=…, held=…, progress=…) -> Edit``, ``models`` those that the options name.
+        ``edit(model, options, *models, scope=…, progress=…) -> Edit``, ``models`` those that the options name.
     options : Selection
         The edit's options, selectors among them.
     apply : bool
@@ -222,13 +224,13 @@ def run(
 
     start = time.perf_counter()
     stage("looking at faces")(0, 1)
-    model, chosen, held = looked_at(document, options.faces, options.hold, options.instance)
+    model, scope = looked_at(document, options)
     others = [view(read(file)) for file in options.models()]
     before: list[SeamMeasure] = []
     valid_before: Validity | None = None
     spoiled: dict[int, str] = {}
     while True:
-        result = edit(model, options, *others, faces=chosen, held=held | spoiled.keys(), progress=stage("editing"))
+        result = edit(model, options, *others, scope=scope.holding(spoiled), progress=stage("editing"))
         result = _named(result, spoiled)
         _refuse_if_stuck(model, result)
         if valid_before is None:
@@ -272,35 +274,26 @@ def run(
     )
 
 
-def looked_at(
-    document: Document, faces: Sequence[str], hold: Sequence[str], instance: str | None = None
-) -> tuple[Model, frozenset[int], frozenset[int]]:
-    """The view of a document for an edit, the faces that selectors name (all NURBS faces by default), and those held.
+def looked_at(document: Document, options: Selection) -> tuple[Model, Scope]:
+    """The view of a document for an edit, and what the edit may move.
 
-    Selected faces that are not NURBS are seen as such.  An ``instance`` is made a part of its own first.
+    Selected faces that are not NURBS are seen as such.  An instance is made a part of its own first.
     """
     from mracad.occ.instance import isolate
     from mracad.occ.select import select_cq
     from mracad.occ.view import view
 
-    own = isolate(document, instance) if instance else None
+    own = isolate(document, options.instance) if options.instance else None
     model = view(document)
-
-    def cadquery(expression: str) -> set[int]:
-        return select_cq(document, expression)
-
-    nurbs = [face.index for face in model.faces if face.kind in NURBS]
+    nurbs = [i for i in every_nurbs(model) if own is None or i not in own.copies]
+    scope = select_scope(model, options, partial(select_cq, document), nurbs)
     if own is not None:
-        copies = {own[face] for face in own if own[face] != face}
-        nurbs = [face for face in nurbs if face not in copies]
-    chosen = select(model, faces, nurbs, cadquery).faces if faces else frozenset(nurbs)
-    held = select(model, hold, nurbs, cadquery).faces if hold else frozenset()
-    if own is not None:
-        chosen, held = (frozenset(own[face] for face in each & own.keys()) for each in (chosen, held))
-        if faces and not chosen:
-            raise UsageError(f"no selected face is in '{instance}'", "leave out --faces, or select others")
-    convertible = {i for i in chosen - held if model.faces[i].surface is None}
-    return (view(document, convert=convertible) if convertible else model), chosen, held
+        faces, held = (frozenset(own.faces[i] for i in each & own.faces.keys()) for each in (scope.faces, scope.held))
+        scope = Scope(faces, held, frozenset(own.edges.get(i, i) for i in scope.edges))
+        if options.faces and not faces:
+            raise UsageError(f"no selected face is in '{options.instance}'", "leave out --faces, or select others")
+    convertible = {i for i in scope.chosen if model.faces[i].surface is None}
+    return (view(document, convert=convertible) if convertible else model), scope
 
 
 def _refuse_if_stuck(model: Model, result: Edit) -> None:

@@ -1,14 +1,15 @@
-"""Face selectors: the words by which users name faces and edges of a model."""
+"""Selectors: the words by which users name faces and edges of a model, and what an edit may move by them."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from mracad.errors import UsageError
 from mracad.model import Face, Model
+from mracad.options import Selection
 
 HINT = "select by #3, a product or face name, type:bspline, colour:#ff0000, near:X,Y,Z or cq:'>Z'; see mracad info"
 NURBS = frozenset({"bspline", "bezier"})
@@ -22,6 +23,68 @@ class Selected:
 
     faces: frozenset[int]
     edges: frozenset[int]
+
+
+@dataclass(frozen=True)
+class Scope:
+    """What an edit may move (indices).
+
+    Attributes
+    ----------
+    faces : frozenset of int
+        Faces that it is to change.
+    held : frozenset of int
+        Faces that must not move, whatever the others do.
+    edges : frozenset of int
+        Edges that must not move.
+    """
+
+    faces: frozenset[int]
+    held: frozenset[int] = frozenset()
+    edges: frozenset[int] = frozenset()
+
+    @property
+    def chosen(self) -> frozenset[int]:
+        """Faces that it may move."""
+        return self.faces - self.held
+
+    def holding(self, faces: Iterable[int]) -> Scope:
+        """The same with more faces held."""
+        return replace(self, held=self.held | frozenset(faces))
+
+
+def scope(
+    model: Model, options: Selection, cadquery: CadQuery | None = None, nurbs: Iterable[int] | None = None
+) -> Scope:
+    """What the options of an edit say that it may move.
+
+    Parameters
+    ----------
+    model : Model
+    options : Selection
+    cadquery : callable, optional
+        As for :func:`select`.
+    nurbs : iterable of int, optional
+        The faces that are edited by default: all NURBS faces.
+
+    Raises
+    ------
+    UsageError
+        For a selector that is malformed or matches nothing.
+    """
+    if options.instance and cadquery is None:
+        raise UsageError(f"instance: {options.instance!r} needs the document, not just the model", "use mracad.run")
+    default = every_nurbs(model) if nurbs is None else list(nurbs)
+    faces = select(model, options.faces, default, cadquery)
+    if faces.edges:
+        raise UsageError(f"faces: edge#{min(faces.edges) + 1} is not a face", "only --hold takes edges")
+    held = select(model, options.hold, default, cadquery)
+    return Scope(faces.faces if options.faces else frozenset(default), held.faces, held.edges)
+
+
+def every_nurbs(model: Model) -> list[int]:
+    """The NURBS faces, those that were converted included."""
+    return [face.index for face in model.faces if face.surface is not None or face.kind in NURBS]
 
 
 def select(
@@ -51,6 +114,8 @@ def select(
         exclude = word.startswith("!")
         text = word.removeprefix("!")
         if text.startswith("edge#"):
+            if exclude:
+                raise UsageError(f"{word!r}: edges cannot be left out", "name the edges that are meant, as edge#4")
             edges.add(_number(text, text[5:], len(model.edges), "edges"))
             continue
         found = _faces(model, text, cadquery)

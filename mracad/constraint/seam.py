@@ -28,6 +28,8 @@ _Jet = tuple[Array, ...]
 TRIMMED, UNEVEN = "trimmed", "parameters differ along the seam"
 """Reasons for which a seam cannot move exactly, though it may to a tolerance."""
 
+HELD = "held by --hold"
+
 WHOLE = 1e-2
 """Edges that coincide and differ by less than this in length coincide as a whole."""
 
@@ -58,11 +60,14 @@ class Wishes:
     fit : float
         Seams whose normals differ by up to this angle anywhere are made tangent.
     close_gaps : bool
+    hold : frozenset of int
+        Edges that must not move.
     """
 
     keep: str = "g1"
     fit: float = 0.0
     close_gaps: bool = False
+    hold: frozenset[int] = frozenset()
 
 
 @dataclass(frozen=True, eq=False)
@@ -220,7 +225,9 @@ def seams(model: Model, movable: Collection[int], wishes: Wishes) -> Seams:
     for edge in model.edges:
         if not any(side.face in movable for side in edge.sides):
             continue
-        if edge.degenerate:
+        if edge.index in wishes.hold:
+            frozen[edge.index] = HELD
+        elif edge.degenerate:
             frozen[edge.index] = "pole"
         elif len(edge.sides) == 1:
             frozen[edge.index] = "free edge"
@@ -242,6 +249,9 @@ def seams(model: Model, movable: Collection[int], wishes: Wishes) -> Seams:
             frozen[edge.index] = "coincides with a part of another edge"
             continue
         result.twins[edge.index] = other.index
+        if wishes.hold & {edge.index, other.index}:
+            frozen |= dict.fromkeys((edge.index, other.index), HELD)
+            continue
         seam = _seam(model, movable, wishes, (edge, other), (one, other.sides[0]))
         if isinstance(seam, Seam):
             found.append(seam)

@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from mracad.constraint.seam import Treatment
+from mracad.constraint.seam import Treatment, Wishes
 from mracad.edit.result import Edit, FaceOutcome
 from mracad.errors import EditError, UsageError
 from mracad.feature.character import at_scale, laid_on
@@ -23,6 +23,8 @@ from mracad.feature.pattern import along, grid, listed, polar, scattered
 from mracad.feature.place import Place, face_number, place, sheet_of, standing, window
 from mracad.model import Displacement, Model
 from mracad.options import Featured, Move, Repeat, Single, Transfer, band_of, length
+from mracad.select import Scope
+from mracad.select import scope as scope_of
 
 Array = np.ndarray
 
@@ -33,8 +35,7 @@ def move(
     model: Model,
     options: Move,
     *,
-    faces: Collection[int] | None = None,
-    held: Collection[int] = (),
+    scope: Scope | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Edit:
     """Move a feature; parameters as for :func:`mracad.edit.smooth.smooth`.
@@ -44,29 +45,30 @@ def move(
     EditError
         For a place or a window off the faces, or a feature that does not fit where it is or is to go.
     """
-    chosen = _chosen(model, faces, held)
+    scope = scope or scope_of(model, options)
+    chosen = _movable(model, scope)
     feature = extract(model, options, chosen)
     assert feature.origin is not None
     removed = {i: -offset for i, offset in feature.origin.offsets.items()}
     ground = _cleared(model, chosen, feature)
-    laid = _laid(ground, feature, [_target(ground, options.to, options)], options, "add", removed)
-    return _edit(model, laid, chosen, held)
+    laid = _laid(ground, feature, [_target(ground, options.to, options)], options, "add", removed, scope.edges)
+    return _edit(model, laid, scope)
 
 
 def repeat(
     model: Model,
     options: Repeat,
     *,
-    faces: Collection[int] | None = None,
-    held: Collection[int] = (),
+    scope: Scope | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Edit:
     """Lay copies of a feature; parameters and errors as for :func:`move`."""
-    chosen = _chosen(model, faces, held)
+    scope = scope or scope_of(model, options)
+    chosen = _movable(model, scope)
     feature = extract(model, options, chosen)
     ground = _cleared(model, chosen, feature)
-    laid = _laid(ground, feature, _places(ground, feature, options), options, options.overlap, {})
-    return _edit(model, laid, chosen, held)
+    laid = _laid(ground, feature, _places(ground, feature, options), options, options.overlap, {}, scope.edges)
+    return _edit(model, laid, scope)
 
 
 def transfer(
@@ -74,8 +76,7 @@ def transfer(
     options: Transfer,
     source: Model,
     *,
-    faces: Collection[int] | None = None,
-    held: Collection[int] = (),
+    scope: Scope | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Edit:
     """Carry the detail of a face, or a feature, of another model onto this one.
@@ -85,20 +86,21 @@ def transfer(
     source : Model
         The other one; the rest, and errors, as for :func:`move`.
     """
-    chosen = _chosen(model, faces, held)
+    scope = scope or scope_of(model, options)
+    chosen = _movable(model, scope)
     ground = Ground(model, chosen)
     every = {f.index for f in source.faces if f.surface is not None}
     if _is_window(options.from_):
         feature = extract(source, options, every, options.from_)
         feature = replace(feature, origin=None)
-        laid = _laid(ground, feature, [_target(ground, options.to, options)], options, "add", {})
-        return _edit(model, laid, chosen, held)
+        laid = _laid(ground, feature, [_target(ground, options.to, options)], options, "add", {}, scope.edges)
+        return _edit(model, laid, scope)
     if options.band is None:
         raise UsageError("band: the detail of a face needs one", "give --band 0mm:20mm")
     one = sheet_of(Ground(source, every), face_number(source, options.from_, "from", FACE), "from")
     two = sheet_of(ground, face_number(model, options.to, "to", FACE), "to")
     width = None if options.taper is None else length(options.taper, model.diagonal, "taper")
-    return _edit(model, laid_on(model, two, one, band_of(options.band, source.diagonal), options, width), chosen, held)
+    return _edit(model, laid_on(model, two, one, band_of(options.band, source.diagonal), options, width), scope)
 
 
 def _is_window(text: str) -> bool:
@@ -131,9 +133,8 @@ def extract(model: Model, options: Featured, chosen: Collection[int], text: str 
     return between_levels(Ground(model, chosen, coarse), bands, area, area.width, options.keep, label, text)
 
 
-def _chosen(model: Model, faces: Collection[int] | None, held: Collection[int]) -> set[int]:
-    every = range(len(model.faces)) if faces is None else faces
-    return {i for i in every if model.faces[i].surface is not None} - set(held)
+def _movable(model: Model, scope: Scope) -> set[int]:
+    return {i for i in scope.chosen if model.faces[i].surface is not None}
 
 
 def _cleared(model: Model, chosen: Collection[int], feature: Feature) -> Ground:
@@ -185,15 +186,16 @@ def _laid(
     options: Featured,
     overlap: str,
     removed: Mapping[int, Array],
+    hold: frozenset[int],
 ) -> Laid:
     feet = standing(ground, places, feature.reach)
     copies = Copies(ground, feature, places, feet, overlap, options.mirror)
-    return copies.laid(options.keep, options.edges == "coupled", options.clip, removed)
+    return copies.laid(Wishes(options.keep, hold=hold), options.edges == "coupled", options.clip, removed)
 
 
-def _edit(model: Model, laid: Laid, chosen: Collection[int], held: Collection[int]) -> Edit:
+def _edit(model: Model, laid: Laid, scope: Scope) -> Edit:
     """The edit with an outcome for every face."""
-    outcomes = []
+    outcomes, chosen = [], _movable(model, scope)
     touched = {f for copy in laid.copies for f in copy.faces}
     for face in model.faces:
         offset = None if face.surface is None else laid.offsets.get(face.surface)
@@ -202,7 +204,7 @@ def _edit(model: Model, laid: Laid, chosen: Collection[int], held: Collection[in
         moved = 0.0 if offset is None else float(np.linalg.norm(offset.poles, axis=-1).max())
         if face.surface is None:
             outcomes.append(FaceOutcome(face.index, "analytic", f"{face.kind}, not a NURBS face"))
-        elif face.index in held:
+        elif face.index in scope.held:
             outcomes.append(FaceOutcome(face.index, "held", "held"))
         elif face.index not in chosen:
             outcomes.append(FaceOutcome(face.index, "unselected", "not selected"))

@@ -102,6 +102,8 @@ class Setting:
         Arc lengths of the knot spans in u and v of each surface, mm.
     creases : mapping of int to pair of frozenset
         Crease lines of each surface.
+    held : frozenset of int
+        Edges that must not move.
     """
 
     model: Model
@@ -109,6 +111,7 @@ class Setting:
     options: Smooth
     spans: Mapping[int, tuple[Array, Array]]
     creases: Mapping[int, tuple[frozenset[float], frozenset[float]]]
+    held: frozenset[int] = frozenset()
 
     @cached_property
     def gap(self) -> float:

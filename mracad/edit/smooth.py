@@ -26,6 +26,8 @@ from mracad.edit.result import Edit, FaceOutcome, Status
 from mracad.edit.together import Together
 from mracad.model import Displacement, Face, Model, Offset, Surface
 from mracad.options import Smooth, length
+from mracad.select import Scope
+from mracad.select import scope as scope_of
 from mracad.wavelet.ladder import arc_lengths, finest_scale, ladder_for_scale, rungs_by_level
 from mracad.wavelet.project import projection
 
@@ -39,8 +41,7 @@ def smooth(
     model: Model,
     options: Smooth,
     *,
-    faces: Collection[int] | None = None,
-    held: Collection[int] = (),
+    scope: Scope | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Edit:
     """Smooth the NURBS faces of a model.
@@ -49,22 +50,24 @@ def smooth(
     ----------
     model : Model
     options : Smooth
-        ``faces`` and ``hold`` in it are the user's words for the next two parameters, not looked at here.
-    faces : collection of int, optional
-        Indices of the faces to smooth; all NURBS faces by default.
-    held : collection of int
-        Indices of faces that must not move.
+    scope : Scope, optional
+        Faces to smooth, faces and edges to hold; by default those that the options name.
     progress : callable, optional
         Called with surfaces done and surfaces in all.
+
+    Raises
+    ------
+    UsageError
+        For options that this model does not have or that need the document.
     """
-    selected = set(range(len(model.faces)) if faces is None else faces) - set(held)
+    scope = scope or scope_of(model, options)
     bound = None if options.max_deviation is None else length(options.max_deviation, model.diagonal, "max-deviation")
     scale = None if options.scale is None else length(options.scale, model.diagonal, "scale")
-    movable = {i for i in selected if model.faces[i].surface is not None}
+    movable = {i for i in scope.chosen if model.faces[i].surface is not None}
     works = [_SurfaceSmoothing(model, surface, movable, options) for surface in model.surfaces]
     coarser = {work.index for work in works if work.coarser_knots(scale)}
     spans, creases = {w.index: w.spans for w in works}, {w.index: w.creases for w in works}
-    together = Together(Setting(model, movable, options, spans, creases), coarser)
+    together = Together(Setting(model, movable, options, spans, creases, scope.edges), coarser)
     moved = together.smoothed(scale, bound)
     outcomes: dict[int, FaceOutcome] = {}
     offsets: dict[int, Offset] = {}
@@ -78,7 +81,7 @@ def smooth(
         if work.offset is not None:
             offsets[work.index] = work.offset
         for face in work.faces:
-            outcomes[face.index] = work.outcome(face, face.index in movable, face.index in held)
+            outcomes[face.index] = work.outcome(face, face.index in movable, face.index in scope.held)
     for face in model.faces:
         if face.index not in outcomes:
             outcomes[face.index] = FaceOutcome(face.index, "analytic", f"{face.kind}, not a NURBS face")
@@ -229,7 +232,7 @@ class _SurfaceSmoothing:
         coarse = tuple(rungs[min(level, len(rungs) - 1)] for rungs in ladders)
         spacing = [s.sum() / max(len(k.breaks) - 1, 1) for s, k in zip(self.spans, coarse, strict=True)]
         changed = [s for s, k, fine in zip(spacing, coarse, _pair(self.net), strict=True) if k != fine]
-        return self._projected(coarse, math.sqrt(2) * min(changed, default=0.0))
+        return self._projected(coarse, math.sqrt(2) * float(min(changed, default=0.0)))
 
     def _projected(self, coarse: tuple[KnotVector, ...], scale: float) -> _Target:
         poles = self.net.poles

@@ -42,7 +42,7 @@ class Together:
     def __init__(self, setting: Setting, coarser: Collection[int]) -> None:
         self.setting, self.model = setting, setting.model
         options = setting.options
-        self.wishes = Wishes(options.keep, math.radians(options.fit_g1 or 0.0), options.close_gaps)
+        self.wishes = Wishes(options.keep, math.radians(options.fit_g1 or 0.0), options.close_gaps, setting.held)
         self.trimmed: list[TrimmedSeam] = []
         self.freedom: dict[int, int] = {}
         known = seams(self.model, setting.movable, self.wishes) if options.edges == "coupled" else Seams()

@@ -254,12 +254,12 @@ class Copies:
             return None
         return np.asarray(turn)
 
-    def laid(self, keep: str, coupled: bool, clip: bool, removed: Mapping[int, Array]) -> Laid:
+    def laid(self, wishes: Wishes, coupled: bool, clip: bool, removed: Mapping[int, Array]) -> Laid:
         """The copies as offsets.
 
         Parameters
         ----------
-        keep : {"g0", "g1", "g2"}
+        wishes : Wishes
         coupled : bool
             Whether edges between faces of the ground may move.
         clip : bool
@@ -273,7 +273,7 @@ class Copies:
             For a copy that frozen points take too much of.
         """
         model = self.ground.model
-        known = seams(model, self.ground.chosen, Wishes(keep))
+        known = seams(model, self.ground.chosen, wishes)
         loose = {edge: "joint varies along the seam" for s in known.found if s.loose for edge in (s.edge, s.twin)}
         closing, frozen = known.closing, known.frozen | loose
         found = [s for s in known.found if not s.loose]
@@ -283,7 +283,7 @@ class Copies:
             if joined:
                 extra = self._refined(joined, extra)
             moving = set(closing) | {e for s, _ in joined for e in (s.edge, s.twin)}
-            offsets, before = self._offsets(extra, [s for s, _ in joined], moving, keep, removed)
+            offsets, before = self._offsets(extra, [s for s, _ in joined], moving, wishes.keep, removed)
             broken = self._broken([s for s, _ in joined], offsets)
             if not broken:
                 break

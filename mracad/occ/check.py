@@ -17,7 +17,7 @@ from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_FORWARD, TopAbs_SHELL, T
 from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Shape
 
 from mracad.occ.document import Document
-from mracad.occ.settings import quiet
+from mracad.occ.settings import quiet, threads
 from mracad.occ.topology import compound, edge_uses, inside
 
 _KINDS = {
@@ -94,7 +94,7 @@ def check(document: Document, faces: Iterable[int] | None = None, distances: boo
     members = [document.faces[index] for index in chosen]
     subject = compound(members if faces is not None else [part.shape for part in document.parts])
     with quiet():
-        analyzer = BRepCheck_Analyzer(subject, True, True)
+        analyzer = BRepCheck_Analyzer(subject, True, threads())
         failures = () if analyzer.IsValid() else tuple(_failures(analyzer, subject, chosen, members))
         tolerance = ShapeAnalysis_ShapeTolerance()
         shells = [shell for part in document.parts for shell in inside(part.shape, TopAbs_SHELL)]

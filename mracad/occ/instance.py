@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 from collections import Counter
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 from OCP.BRepBuilderAPI import BRepBuilderAPI_Copy
 from OCP.TDataStd import TDataStd_Name, TDataStd_NamedData, TDataStd_TreeNode
@@ -34,7 +35,20 @@ def instances(document: Document) -> dict[str, list[TDF_Label]]:
     return dict(_below(document.shape_tool.GetFreeShapes, "", []))
 
 
-def isolate(document: Document, path: str) -> dict[int, int]:
+@dataclass(frozen=True)
+class Own:
+    """The faces and edges of an instance, by their own numbers and those of the part that they were copied from."""
+
+    faces: dict[int, int]
+    edges: dict[int, int]
+
+    @property
+    def copies(self) -> set[int]:
+        """The faces that were made for it."""
+        return {new for old, new in self.faces.items() if old != new}
+
+
+def isolate(document: Document, path: str) -> Own:
     """Make one instance a part of its own, with all that was said of the part.
 
     What lies above it in the assembly is copied, too, where that is used elsewhere.
@@ -48,8 +62,8 @@ def isolate(document: Document, path: str) -> dict[int, int]:
 
     Returns
     -------
-    dict of int
-        The faces of the instance, by their own numbers and by those of the part that they were copied from.
+    Own
+        The faces and edges of the instance.
 
     Raises
     ------
@@ -64,7 +78,7 @@ def isolate(document: Document, path: str) -> dict[int, int]:
         raise UsageError(f"{document.name}: {what}", f"use one of {', '.join(near[:6])}; see mracad info --all")
     _, *chain = every[fitting[0]]
     if not chain:
-        return _faces(document, every[fitting[0]][0])
+        return _own(document, every[fitting[0]][0])
     for number, component in enumerate(chain):
         product = referred(component)
         if len(list(labels(lambda found, product=product: XCAFDoc_ShapeTool.GetUsers_s(product, found, False)))) > 1:
@@ -78,7 +92,7 @@ def isolate(document: Document, path: str) -> dict[int, int]:
     document.shape_tool.UpdateAssemblies()
     for cached in ("parts", "faces", "edges"):
         document.__dict__.pop(cached, None)
-    return _faces(document, referred(chain[-1]))
+    return _own(document, referred(chain[-1]))
 
 
 def _below(fill, path: str, above: list[TDF_Label]) -> Iterator[tuple[str, list[TDF_Label]]]:
@@ -95,14 +109,15 @@ def _below(fill, path: str, above: list[TDF_Label]) -> Iterator[tuple[str, list[
             yield place, [*above, label]
 
 
-def _faces(document: Document, product: TDF_Label) -> dict[int, int]:
-    """The faces of a part, by their own numbers and those of the part that it was copied from."""
+def _own(document: Document, product: TDF_Label) -> Own:
     parts = {label_key(part.label): part for part in document.parts}
     key = label_key(product)
     part, origin = parts[key], parts.get(document.origins.get(key, key))
-    count = range(part.faces.Extent())
-    copied = {origin.first + i: part.first + i for i in count} if origin else {}
-    return copied | {part.first + i: part.first + i for i in count}
+    found = Own({}, {})
+    for source in filter(None, (origin, part)):
+        found.faces.update((source.first + i, part.first + i) for i in range(part.faces.Extent()))
+        found.edges.update((source.first_edge + i, part.first_edge + i) for i in range(part.edges.Extent()))
+    return found
 
 
 def _copied(document: Document, product: TDF_Label) -> TDF_Label:

@@ -21,6 +21,16 @@ from mracad.errors import UsageError
 _libc = ctypes.CDLL("ucrtbase" if sys.platform == "win32" else None)
 
 
+_threaded = 0  # the process whose kernel has started threads
+
+
+def threads() -> bool:
+    """Whether the kernel may use its threads: not in a child of a process where it has, which would wait for those."""
+    global _threaded
+    _threaded = _threaded or os.getpid()
+    return _threaded == os.getpid()
+
+
 @contextmanager
 def quiet() -> Iterator[None]:
     """Keep whatever the kernel prints away from standard output.

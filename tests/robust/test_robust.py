@@ -10,7 +10,7 @@ import time
 
 import pytest
 
-from mracad import guard, output
+from mracad import guard, occ, output
 from mracad.batch.manifest import Manifest
 from mracad.errors import Code, EditError, FileError, MracadError
 from tests.robust import kill, mutate
@@ -80,6 +80,13 @@ def test_a_file_that_is_being_written_is_not_taken_for_one_that_was_left(tmp_pat
         assert slow.exists()
         slow.write_bytes(b"late")
     assert (tmp_path / "slow.step").read_bytes() == b"late"
+
+
+def test_a_child_checks_models_after_its_parent_has(samples):
+    """The threads that the kernel started in the parent are not in the child, which must not wait for them."""
+    document = occ.read(samples / "blade.step")
+    assert occ.check(document).valid
+    assert guard.run(lambda: occ.check(document).valid, seconds=60)
 
 
 def crash():

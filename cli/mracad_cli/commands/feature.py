@@ -26,8 +26,8 @@ def list_(source: str, input_unit: str | None, encoding: str | None, faces: tupl
     from mracad.feature.find import found
     from mracad_cli.render import json_text, mm, plain
 
-    model, chosen, _ = job.looked_at(read(source, input_unit, encoding), faces, ())
-    features = found(model, chosen)
+    model, scope = job.looked_at(read(source, input_unit, encoding), Selection(faces=faces))
+    features = found(model, scope.chosen)
     if as_json:
         body = [{**plain(f), "face": f.face + 1, "feature": f.text} for f in features]
         print(json_text({"file": model.name, "features": body}))
@@ -72,8 +72,8 @@ def extract(
         raise UsageError(f"cannot write {path}: unknown ending {path.suffix!r}", "end it in .feature")
     check_target(path, overwrite)
     chosen_options = options_of(Repeat, {**given, "feature": feature, "at": ("0,0,0",)})
-    model, chosen, _ = job.looked_at(read(source, input_unit, encoding), chosen_options.faces, ())
-    found = taken(model, chosen_options, chosen)
+    model, scope = job.looked_at(read(source, input_unit, encoding), chosen_options)
+    found = taken(model, chosen_options, scope.chosen)
     body = {
         "file": model.name,
         "radius": found.radius,
