@@ -14,11 +14,10 @@ from typing import Any
 import numpy as np
 
 from mracad import __version__
-from mracad.mesh.scene import Body, Node, Scene, rgba
+from mracad.mesh.scene import GREY, Body, Node, Scene, rgba
 
 _UPRIGHT = [-(0.5**0.5), 0.0, 0.0, 0.5**0.5]  # quaternion: Z up to Y up
 _FLOAT, _INDEX, _POINTS, _TRIANGLES = 5126, 5125, 34962, 34963  # component types and buffer targets
-_GREY = "#b3b3b3"
 
 
 def write(scene: Scene, binary: bool = True) -> bytes:
@@ -35,7 +34,7 @@ def write(scene: Scene, binary: bool = True) -> bytes:
 
 def _content(scene: Scene) -> tuple[bytes, dict[str, Any]]:
     """The buffer and the JSON that describes it."""
-    colours = list(dict.fromkeys(colour or _GREY for body in scene.bodies for colour in body.colours))
+    colours = list(dict.fromkeys(colour or GREY for body in scene.bodies for colour in body.colours))
     data = bytearray()
     views: list[dict[str, Any]] = []
     accessors: list[dict[str, Any]] = []
@@ -78,7 +77,7 @@ def _mesh(body: Body, colours: list[str], data: bytearray, views: list, accessor
             {
                 "attributes": {"POSITION": positions},
                 "indices": len(accessors) - 1,
-                "material": colours.index(body.colours[face] or _GREY),
+                "material": colours.index(body.colours[face] or GREY),
                 "extras": {"face": body.labels[face]},
             }
         )

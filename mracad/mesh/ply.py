@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from mracad import __version__
-from mracad.mesh.scene import Scene, rgba
+from mracad.mesh.scene import GREY, Scene, rgba
 
-_GREY = "#b3b3b3"
 _LAYOUT = np.dtype([("count", "u1"), ("corners", "<i4", 3), ("face", "<i4"), ("colour", "u1", 4)])
 _HEADER = """ply
 format binary_little_endian 1.0
@@ -36,7 +35,7 @@ def write(scene: Scene) -> bytes:
         table["count"] = 3
         table["corners"] = body.corners + before
         table["face"] = np.array([int(label.partition(" ")[0][1:]) for label in body.labels])[body.faces]
-        table["colour"] = np.array([rgba(colour or _GREY) for colour in body.colours], np.uint8)[body.faces]
+        table["colour"] = np.array([rgba(colour or GREY) for colour in body.colours], np.uint8)[body.faces]
         points.append(body.points)
         tables.append(table)
         before += len(body.points)

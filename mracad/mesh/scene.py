@@ -9,6 +9,9 @@ import numpy as np
 
 Array = np.ndarray
 
+GREY = "#b3b3b3"
+"""What has no colour of its own, where the format wants one."""
+
 
 @dataclass(frozen=True, eq=False)
 class Body:

@@ -13,7 +13,7 @@ from OCP.Geom2d import Geom2d_Curve
 from OCP.Quantity import Quantity_ColorRGBA
 from OCP.TCollection import TCollection_ExtendedString
 from OCP.TDataStd import TDataStd_Name
-from OCP.TDF import TDF_ChildIterator, TDF_Label, TDF_LabelSequence
+from OCP.TDF import TDF_AttributeSequence, TDF_ChildIterator, TDF_Label, TDF_LabelSequence
 from OCP.TDocStd import TDocStd_Document
 from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE
 from OCP.TopExp import TopExp
@@ -50,9 +50,11 @@ class Part:
     placements : list of TopLoc_Location
         Where its instances stand.
     colour : str
-        Of the whole part (or its first coloured instance), ``"#rrggbb"``, ``"#rrggbbaa"`` or ``""``.
-    face_names, face_colours : dict
-        By position in the part, from 0, where the document says something of the face.
+        Of the whole part, ``"#rrggbb"``, ``"#rrggbbaa"`` or ``""``.
+    tint : str
+        That of its first coloured instance.
+    face_names, face_colours, body_colours : dict
+        By position in the part, from 0, where the document says something of the face, or of the body it belongs to.
     """
 
     label: TDF_Label
@@ -64,8 +66,14 @@ class Part:
     edges: TopTools_IndexedMapOfShape
     placements: list[TopLoc_Location]
     colour: str
+    tint: str
     face_names: dict[int, str]
     face_colours: dict[int, str]
+    body_colours: dict[int, str]
+
+    def face_colour(self, position: int, tint: str = "") -> str:
+        """The colour of a face by its position, where an instance has that of ``tint``: its own goes before that."""
+        return self.face_colours.get(position) or tint or self.body_colours.get(position) or self.colour
 
 
 @dataclass(eq=False)
@@ -164,13 +172,13 @@ class Document:
             TopExp.MapShapes_s(shape, TopAbs_FACE, faces)
             for i in range(1, faces.Extent() + 1):
                 TopExp.MapShapes_s(faces.FindKey(i), TopAbs_EDGE, edges)
-            names, colours = _described(label, faces)
             key = label_key(label)
-            colour = label_colour(label) or tints.get(key, "")
-            places = placed.get(key, [])
             parts.append(
-                Part(label, shape, label_name(label), first, faces, first_edge, edges, places, colour, names, colours)
-            )
+                Part(
+                    label, shape, label_name(label), first, faces, first_edge, edges, placed.get(key, []),
+                    label_colour(label), tints.get(key, ""), *_described(label, faces),
+                )
+            )  # fmt: skip
             first += faces.Extent()
             first_edge += edges.Extent()
         return parts
@@ -249,6 +257,23 @@ def label_colour(label: TDF_Label) -> str:
     return ""
 
 
+def nested_colours(document: Document) -> Iterator[tuple[tuple[str, ...], str]]:
+    """Colours of single instances inside an assembly that is itself one of several: the path of labels, and which."""
+    for product in labels(document.shape_tool.GetShapes):
+        for component in components(product):
+            found = TDF_AttributeSequence()
+            if not XCAFDoc_ShapeTool.GetAllComponentSHUO_s(component, found):
+                continue
+            for i in range(1, found.Length() + 1):
+                node = found.Value(i)
+                colour, path = label_colour(node.Label()), [label_key(component)]
+                while node.NbChildren():
+                    node = node.GetChild(1)
+                    path.append(label_key(node.Label().Father()))
+                if colour:
+                    yield tuple(path), colour
+
+
 def colour_text(colour: Quantity_ColorRGBA) -> str:
     """``"#rrggbb"``, or ``"#rrggbbaa"`` where it is transparent."""
     text = Quantity_ColorRGBA.ColorToHex_s(colour).ToCString().lower()
@@ -298,8 +323,10 @@ def _walk(
         tints.setdefault(key, colour)
 
 
-def _described(label: TDF_Label, faces: TopTools_IndexedMapOfShape) -> tuple[dict[int, str], dict[int, str]]:
-    """Names and colours that the sub-shape labels of a part give its faces; a body's colour goes to its faces."""
+def _described(
+    label: TDF_Label, faces: TopTools_IndexedMapOfShape
+) -> tuple[dict[int, str], dict[int, str], dict[int, str]]:
+    """Names and colours that the sub-shape labels of a part give its faces, and colours that they give its bodies."""
     names: dict[int, str] = {}
     colours: dict[int, str] = {}
     inherited: dict[int, str] = {}
@@ -319,4 +346,4 @@ def _described(label: TDF_Label, faces: TopTools_IndexedMapOfShape) -> tuple[dic
             TopExp.MapShapes_s(shape, TopAbs_FACE, inside)
             for i in range(1, inside.Extent() + 1):
                 inherited[faces.FindIndex(inside.FindKey(i)) - 1] = colour
-    return names, inherited | colours
+    return names, colours, inherited

@@ -9,7 +9,7 @@ from typing import BinaryIO
 
 from mracad.errors import FileError, UsageError
 from mracad.formats import FORMATS, by_content, by_ending
-from mracad.occ.document import Document, label_name, named_labels
+from mracad.occ.document import Document, label_name, named_labels, nested_colours
 from mracad.occ.literals import known
 from mracad.occ.load import load
 from mracad.occ.writable import Cut
@@ -23,8 +23,8 @@ class Lost:
     Attributes
     ----------
     what : str
-        ``"faces"``, which the kernel could not mesh; ``"names"``, ``"dimensions"``, ``"tolerances"``, ``"datums"`` or
-        ``"notes"``.
+        ``"faces"``, which the kernel could not mesh; ``"names"``, ``"transparencies"``, ``"dimensions"``,
+        ``"tolerances"``, ``"datums"`` or ``"notes"``.
     stated, written : int
         How many there were, and are.
     names : tuple of str
@@ -131,8 +131,8 @@ def write(
     Returns
     -------
     Written
-        What could not be written (faces of a mesh, annotations of an exact model, names beyond
-        ASCII in IGES), and what only in parts.
+        What could not be written (faces of a mesh, annotations of an exact model, names beyond ASCII in IGES, in STEP the
+        transparency of single instances inside assemblies), and what only in parts.
 
     Raises
     ------
@@ -155,6 +155,7 @@ def write(
         from mracad.occ.step import step
 
         data, cut = step(document, name, schema, options_text)
+        lost = _opaque(document)
     elif format == "iges":
         from mracad.occ.iges import iges
 
@@ -181,6 +182,12 @@ def write(
         lost += tuple(Lost(what, len(ns), count, ns) for what, (ns, count) in counts.items() if count < len(ns))
     put(data, target)
     return Written(lost, cut)
+
+
+def _opaque(document: Document) -> tuple[Lost, ...]:
+    """The instances inside one use of an assembly that are transparent there: the kernel writes their colour alone."""
+    count = sum(len(colour) > len("#rrggbb") for _, colour in nested_colours(document))
+    return (Lost("transparencies", count, 0, ()),) if count else ()
 
 
 def _unwritten(document: Document) -> tuple[Lost, ...]:

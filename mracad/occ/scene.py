@@ -8,7 +8,16 @@ from OCP.XCAFDoc import XCAFDoc_ShapeTool
 
 from mracad.errors import FileError, UsageError
 from mracad.mesh.scene import Body, Node, Scene
-from mracad.occ.document import Document, Part, components, label_key, label_name, labels, referred
+from mracad.occ.document import (
+    Document,
+    components,
+    label_colour,
+    label_key,
+    label_name,
+    labels,
+    nested_colours,
+    referred,
+)
 from mracad.occ.topology import matrix
 from mracad.occ.triangles import Triangles, triangles
 
@@ -42,32 +51,60 @@ def scene(document: Document, chord: float | None = None, angle: float | None = 
     mesh = triangles(document, chord, angle)
     if not len(mesh.corners):
         raise FileError(f"'{document.name}' gives no triangles", "check its geometry")
-    bodies = {label_key(part.label): _body(mesh, number, part) for number, part in enumerate(document.parts)}
-    filled = {key: body for key, body in bodies.items() if len(body.corners)}
-    place = {key: number for number, key in enumerate(filled)}
-    nodes = (_node(label, place) for label in labels(document.shape_tool.GetFreeShapes))
-    return Scene(document.name, tuple(filled.values()), tuple(node for node in nodes if node)), mesh.missing
+    bodies = _Bodies(document, mesh)
+    nodes = [bodies.node(label) for label in labels(document.shape_tool.GetFreeShapes)]
+    return Scene(document.name, tuple(bodies.made), tuple(node for node in nodes if node)), mesh.missing
 
 
-def _body(mesh: Triangles, number: int, part: Part) -> Body:
-    """The mesh of one part."""
-    own = mesh.parts == number
-    used, corners = np.unique(mesh.corners[own], return_inverse=True)
-    count = part.faces.Extent()
-    return Body(
-        name=part.product,
-        points=mesh.points[used],
-        corners=corners.reshape(-1, 3),
-        faces=mesh.faces[own] - part.first,
-        labels=tuple(f"#{part.first + i + 1} {part.face_names.get(i, '')}".strip() for i in range(count)),
-        colours=tuple(part.face_colours.get(i, part.colour) for i in range(count)),
-    )
+class _Bodies:
+    """The meshes of parts: one for each colour that instances give a part.
 
+    Attributes
+    ----------
+    made : list of Body
+    """
 
-def _node(label: TDF_Label, place: dict[str, int]) -> Node | None:
-    """The tree from a label down; None where it holds no triangles."""
-    frame, name = matrix(XCAFDoc_ShapeTool.GetLocation_s(label)), label_name(label)
-    product = referred(label)
-    body = place.get(label_key(product))
-    children = tuple(node for node in (_node(part, place) for part in components(product)) if node)
-    return Node(name, frame, body, children) if children or body is not None else None
+    def __init__(self, document: Document, mesh: Triangles) -> None:
+        self.mesh = mesh
+        self.parts = {label_key(part.label): (number, part) for number, part in enumerate(document.parts)}
+        self.nested = dict(nested_colours(document))
+        self.made: list[Body] = []
+        self.place: dict[tuple[int, tuple[str, ...]], int] = {}
+
+    def node(self, label: TDF_Label, above: tuple[str, ...] = (), tint: str = "") -> Node | None:
+        """The tree from a label down; None where it holds no triangles.
+
+        ``above`` are the instances (their keys) that it belongs to, ``tint`` the colour that these give it.
+        """
+        frame, name = matrix(XCAFDoc_ShapeTool.GetLocation_s(label)), label_name(label)
+        product = referred(label)
+        if not product.IsEqual(label):
+            above = (*above, label_key(label))
+            given = next((self.nested[above[k:]] for k in range(len(above)) if above[k:] in self.nested), "")
+            tint = given or tint or label_colour(label)
+        children = tuple(node for node in (self.node(part, above, tint) for part in components(product)) if node)
+        body = self.body(label_key(product), tint)
+        return Node(name, frame, body, children) if children or body is not None else None
+
+    def body(self, key: str, tint: str) -> int | None:
+        """The position of the mesh of a part in a colour; None for what has no triangles."""
+        number, part = self.parts.get(key, (-1, None))
+        own = self.mesh.parts == number
+        if part is None or not own.any():
+            return None
+        count = part.faces.Extent()
+        colours = tuple(part.face_colour(i, tint) for i in range(count))
+        if (number, colours) not in self.place:
+            self.place[number, colours] = len(self.made)
+            used, corners = np.unique(self.mesh.corners[own], return_inverse=True)
+            self.made.append(
+                Body(
+                    name=part.product,
+                    points=self.mesh.points[used],
+                    corners=corners.reshape(-1, 3),
+                    faces=self.mesh.faces[own] - part.first,
+                    labels=tuple(f"#{part.first + i + 1} {part.face_names.get(i, '')}".strip() for i in range(count)),
+                    colours=colours,
+                )
+            )
+        return self.place[number, colours]

@@ -105,7 +105,7 @@ def view(document: Document, convert: Iterable[int] = ()) -> Model:
                 index, kinds[index], found.surface_of[index], trims.get(index, ()),
                 face.Orientation() == TopAbs_REVERSED, found.frames[index], boxes[index],
                 part.face_names.get(index - part.first, ""), part.product,
-                part.face_colours.get(index - part.first, part.colour), len(part.placements),
+                part.face_colour(index - part.first) or part.tint, len(part.placements),
             )
             for part in document.parts
             for index, face in enumerate(found.faces[part.first : part.first + part.faces.Extent()], part.first)
