@@ -131,8 +131,8 @@ def write(
     Returns
     -------
     Written
-        What could not be written (faces of a mesh, annotations of an exact model, names beyond ASCII in IGES, in STEP the
-        transparency of single instances inside assemblies), and what only in parts.
+        What could not be written (faces of a mesh, annotations of an exact model, names beyond ASCII in IGES, in STEP
+        the transparency of single instances inside assemblies), and what only in parts.
 
     Raises
     ------
