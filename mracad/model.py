@@ -193,20 +193,28 @@ class Model:
 
 @dataclass(frozen=True, eq=False)
 class Offset:
-    """Pole offsets of one surface, in its own spline space or an exact refinement of it.
+    """Pole offsets of one surface, in its own spline space or one that holds it exactly: of higher degree, finer.
 
     Attributes
     ----------
-    u_knots, v_knots : ndarray
-        Knots to insert first (with repetition), beyond those the surface has; empty for none.
     poles : ndarray (nu, nv, 3)
-        Offsets of the Euclidean control points of the (refined) net, mm; weights are kept.
+        Offsets of the Euclidean control points of the net that ``over`` gives, mm; weights are kept.
         Rows that are exactly zero are left bit-identical.
+    u_knots, v_knots : ndarray
+        Knots to insert first (with repetition), beyond those the (elevated) surface has; empty for none.
+    degrees : (int, int)
+        Degrees in u and v to which the surface is elevated before that; as it is where its own is no lower.
     """
 
     poles: Array
     u_knots: Array = field(default_factory=lambda: np.empty(0))
     v_knots: Array = field(default_factory=lambda: np.empty(0))
+    degrees: tuple[int, int] = (0, 0)
+
+    def over(self, net: Net) -> Net:
+        """The net of the undisplaced surface whose control points the offset moves; ``net`` itself where it does."""
+        u, v = (kv.elevated(degree) for kv, degree in zip((net.u, net.v), self.degrees, strict=True))
+        return net.over(u.refined(self.u_knots), v.refined(self.v_knots))
 
 
 @dataclass(frozen=True, eq=False)
@@ -217,14 +225,14 @@ class Displacement:
 
     def scaled(self, factor: float) -> Displacement:
         """The same displacement times ``factor``."""
-        return Displacement({i: Offset(factor * o.poles, o.u_knots, o.v_knots) for i, o in self.offsets.items()})
+        return Displacement({i: replace(o, poles=factor * o.poles) for i, o in self.offsets.items()})
 
     def applied(self, model: Model) -> Model:
         """The model with its surfaces displaced (baked sides stay where they are)."""
         surfaces = list(model.surfaces)
         for index, offset in self.offsets.items():
             old = surfaces[index]
-            net = old.net.refined(offset.u_knots, offset.v_knots)
+            net = offset.over(old.net)
             surfaces[index] = Surface(
                 index, Net(net.u, net.v, net.poles + offset.poles, net.weights), old.faces, old.origin
             )

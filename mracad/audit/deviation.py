@@ -43,7 +43,7 @@ def deviations(model: Model, displacement: Displacement) -> list[Deviation]:
     found = []
     for index, offset in displacement.offsets.items():
         surface = model.surfaces[index]
-        net = surface.net.refined(offset.u_knots, offset.v_knots)
+        net = offset.over(surface.net)
         delta = Net(net.u, net.v, offset.poles, net.weights)
         us, vs = net.u.greville(), net.v.greville()
         sizes = np.linalg.norm(delta.grid(us, vs), axis=-1)

@@ -218,6 +218,19 @@ class KnotVector:
             raise UsageError(f"a knot to be inserted lies outside ({low:g}, {high:g})")
         return KnotVector(np.sort(np.concatenate([self.knots, extra])), self.degree)
 
+    def elevated(self, degree: int) -> KnotVector:
+        """The least vector of that degree whose splines include all of this one's; itself where its degree suffices.
+
+        Every knot is repeated as many times more as the degree grows; unclamped ends become clamped ones.
+        """
+        more = degree - self.degree
+        if more <= 0:
+            return self
+        mults = self.multiplicities + more
+        if not self.periodic:
+            mults[[0, -1]] = degree + 1
+        return KnotVector.from_multiplicities(self.breaks, mults, degree, self.periodic)
+
     def with_multiplicities(self, mults: Array) -> KnotVector:
         """This vector with the multiplicities of its breaks replaced; 0 removes a break.
 

@@ -1,4 +1,4 @@
-"""NURBS curves and surfaces as plain arrays: evaluation, normals, exact knot insertion."""
+"""NURBS curves and surfaces as plain arrays: evaluation, normals, exact knot insertion and degree elevation."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ class Curve:
         return self if fine == self.knots else self.over(fine)
 
     def over(self, fine: KnotVector) -> Curve:
-        """The same curve over a finer knot vector."""
+        """The same curve over a finer knot vector, or one of higher degree."""
         poles = refinement(self.knots, fine).apply(_homogeneous(self.poles, self.weights))
         return Curve(fine, *_euclidean(poles, self.weights is not None))
 
@@ -237,11 +237,12 @@ class Net:
 
     def refined(self, u_knots: Array | Sequence[float], v_knots: Array | Sequence[float]) -> Net:
         """The same surface with more knots, exactly; itself when there is nothing to insert."""
-        u, v = self.u.refined(u_knots), self.v.refined(v_knots)
-        return self if u == self.u and v == self.v else self.over(u, v)
+        return self.over(self.u.refined(u_knots), self.v.refined(v_knots))
 
     def over(self, u: KnotVector, v: KnotVector) -> Net:
-        """The same surface over finer knot vectors."""
+        """The same surface over finer knot vectors, or such of higher degree, exactly; itself over its own."""
+        if (u, v) == (self.u, self.v):
+            return self
         poles = _homogeneous(self.poles, self.weights)
         if u != self.u:
             poles = refinement(self.u, u).apply(poles, 0)

@@ -525,7 +525,7 @@ class Copies:
         model = self.ground.model
         surfaces = list(model.surfaces)
         for i, o in offsets.items():
-            net = surfaces[i].net.refined(o.u_knots, o.v_knots)
+            net = o.over(surfaces[i].net)
             surfaces[i] = Surface(i, Net(net.u, net.v, net.poles + o.poles, net.weights), surfaces[i].faces)
         after = model.with_surfaces(surfaces)
         broken = []
@@ -548,7 +548,7 @@ class Copies:
             if i not in offsets or not self.touched[:, number].any():
                 continue
             own = self.ground.model.surfaces[i].net
-            net = own.refined(offsets[i].u_knots, offsets[i].v_knots)
+            net = offsets[i].over(own)
             taken = refined_offset(own, net, removed[i]) if i in removed else 0.0
             both = np.concatenate([(offsets[i].poles - taken) @ sheet.turn.T, before[i] @ sheet.turn.T], axis=-1)
             pair = Net(net.u, net.v, both, net.weights)

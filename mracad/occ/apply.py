@@ -6,14 +6,13 @@ import numpy as np
 from OCP.BRep import BRep_Tool
 from OCP.BRepTools import BRepTools
 from OCP.Geom import Geom_BezierSurface, Geom_BSplineSurface
-from OCP.GeomConvert import GeomConvert
 from OCP.TColStd import TColStd_Array1OfInteger, TColStd_Array1OfReal
 from OCP.TopAbs import TopAbs_FORWARD
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS
 
 from mracad.bspline.net import Net
-from mracad.errors import MracadError
+from mracad.errors import MracadError, UsageError
 from mracad.model import Displacement, Model, Offset, Surface
 from mracad.occ.convert import lay
 from mracad.occ.document import Document, label_key
@@ -29,9 +28,9 @@ _STILL = 1e-9  # mm: an edge that moves by less keeps its curve
 def apply(document: Document, model: Model, displacement: Displacement) -> None:
     """Displace the surfaces of a document, in place.
 
-    Knots are inserted exactly; then only those control points move whose offset is not zero, all others keep every
-    bit.  Faces that were seen as NURBS by ``view(document, convert=…)`` are put on their new surfaces first.  Edges
-    that move get new 3D curves and vertices.  Triangulations are dropped.
+    Degrees are raised and knots inserted exactly; then only those control points move whose offset is not zero, all
+    others keep every bit.  Faces that were seen as NURBS by ``view(document, convert=…)`` are put on their new surfaces
+    first.  Edges that move get new 3D curves and vertices.  Triangulations are dropped.
 
     Parameters
     ----------
@@ -39,16 +38,21 @@ def apply(document: Document, model: Model, displacement: Displacement) -> None:
     model : Model
         The view of the document that the displacement was made for.
     displacement : Displacement
+
+    Raises
+    ------
+    UsageError
+        For a degree above the kernel's highest.
     """
     if not displacement.offsets:
         return
+    highest, most = max(max(o.degrees) for o in displacement.offsets.values()), Geom_BSplineSurface.MaxDegree_s()
+    if highest > most:
+        raise UsageError(f"a surface of degree {highest} is beyond the kernel", f"ask for {most} at most")
     with quiet(), following(document, _moved_edges(model, displacement)):
         for index, offset in sorted(displacement.offsets.items()):
             surface = model.surfaces[index]
-            handle = _handle(document, surface, refined=bool(offset.u_knots.size or offset.v_knots.size))
-            if isinstance(handle, Geom_BSplineSurface):
-                _refine(handle, offset)
-            _move(handle, offset)
+            _move(_handle(document, surface, offset), offset)
         _forget(document)
         faces = (face for index in displacement.offsets for face in model.surfaces[index].faces)
         document.moved |= {label_key(document.part_of(face).label) for face in faces}
@@ -63,26 +67,34 @@ def restore(document: Document, model: Model, displacement: Displacement) -> Non
         for index in sorted(displacement.offsets):
             surface = model.surfaces[index]
             handle = basis(BRep_Tool.Surface_s(document.faces[surface.faces[0]], TopLoc_Location()))
-            if nets([handle])[0].poles.shape == surface.net.poles.shape:
+            now = nets([handle])[0]
+            if (now.u, now.v) == (surface.net.u, surface.net.v):
                 set_poles(handle, surface.net.poles)
             else:
                 _lay_all(document, surface, spline(surface.net))
         _forget(document)
 
 
-def _handle(document: Document, surface: Surface, refined: bool) -> Geom_BSplineSurface | Geom_BezierSurface:
-    """The kernel's surface to be moved, put on its faces where it is new to them."""
-    first = surface.faces[0]
+def _handle(document: Document, surface: Surface, offset: Offset) -> Geom_BSplineSurface | Geom_BezierSurface:
+    """The kernel's surface to be moved, refined as the offset asks, put on its faces where it is new to them.
+
+    The kernel cannot be asked to raise the degree: it gives other surfaces where they are periodic with uneven
+    multiplicities, and none where their ends are not clamped.
+    """
+    fine, first = offset.over(surface.net), surface.faces[0]
     if first in document.conversions:
         made = document.conversions.pop(first)
         lay(TopoDS.Face_s(document.faces[first].Oriented(TopAbs_FORWARD)), made.surface, made.pcurves, made.tolerances)
-        return made.surface
-    handle = basis(BRep_Tool.Surface_s(document.faces[first], TopLoc_Location()))
-    if not (refined and isinstance(handle, Geom_BezierSurface)):
-        return handle
-    converted = GeomConvert.SurfaceToBSplineSurface_s(handle)
-    _lay_all(document, surface, converted)
-    return converted
+        handle = made.surface
+    else:
+        handle = basis(BRep_Tool.Surface_s(document.faces[first], TopLoc_Location()))
+    raised = (fine.u.degree, fine.v.degree) != (surface.net.u.degree, surface.net.v.degree)
+    if raised or (fine is not surface.net and isinstance(handle, Geom_BezierSurface)):
+        handle = spline(fine)
+        _lay_all(document, surface, handle)
+    elif fine is not surface.net:
+        _refine(handle, offset)
+    return handle
 
 
 def _lay_all(document: Document, surface: Surface, handle: Geom_BSplineSurface) -> None:
@@ -125,7 +137,7 @@ def _moved_edges(model: Model, displacement: Displacement) -> dict[int, int]:
     moved: dict[int, int] = {}
     for index, offset in displacement.offsets.items():
         if sides[index]:
-            net = model.surfaces[index].net.refined(offset.u_knots, offset.v_knots)
+            net = offset.over(model.surfaces[index].net)
             change = Net(net.u, net.v, offset.poles, net.weights)
             along = change.evaluate(np.concatenate([uv for *_, uv in sides[index]]))
             far = np.linalg.norm(along, axis=1) > _STILL

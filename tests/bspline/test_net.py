@@ -113,6 +113,21 @@ def test_knot_insertion_changes_nothing(kind_u, rational):
     assert net.refined([], []) is net
 
 
+@pytest.mark.parametrize("kind_u", KINDS)
+@pytest.mark.parametrize("kind_v", KINDS)
+@pytest.mark.parametrize("rational", [False, True])
+def test_degree_elevation_changes_nothing(kind_u, kind_v, rational):
+    net = random_net(kind_u, kind_v, rational)
+    uv = places(net)
+    for degrees in ((5, 2), (3, 4), (4, 6)):
+        fine = net.over(net.u.elevated(degrees[0]), net.v.elevated(degrees[1]))
+        assert (fine.u.degree, fine.v.degree) == degrees
+        for a, b in zip(net.evaluate(uv, 1), fine.evaluate(uv, 1), strict=True):
+            np.testing.assert_allclose(b, a, rtol=0, atol=1e-12 * np.abs(a).max())
+        assert rational == (fine.weights is not None)
+    assert net.over(net.u.elevated(2), net.v.elevated(2)) is net
+
+
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("rational", [False, True])
 def test_bezier_pieces(kind, rational):

@@ -150,3 +150,42 @@ def test_wrong_sizes_are_refused():
         rows.apply(np.ones(2))
     with pytest.raises(UsageError):
         rows.apply_transposed(np.ones(3))
+
+
+@given(knot_vectors(7), st.integers(1, 4), st.integers(0, 1000))
+@settings(deadline=None, max_examples=120)
+def test_elevation_is_exact(kv, more, seed):
+    rng = np.random.default_rng(seed)
+    elevated = kv.elevated(kv.degree + more)
+    assert (elevated.degree, elevated.domain, elevated.periodic) == (kv.degree + more, kv.domain, kv.periodic)
+    inner = slice(0, -1) if kv.periodic else slice(1, -1)
+    np.testing.assert_array_equal(elevated.multiplicities[inner], kv.multiplicities[inner] + more)
+    c, t = rng.standard_normal((kv.count, 2)), np.concatenate([kv.breaks[:-1], rng.uniform(*kv.domain, 40)])
+    before = Curve(kv, c).evaluate(t, 2)
+    steepest = 2 * elevated.degree / np.diff(kv.breaks).min()  # of splines with control points up to 1
+    for fine in (elevated, elevated.refined(rng.uniform(*kv.domain, 3))):
+        p = refinement(kv, fine)
+        assert p.shape == (fine.count, kv.count)
+        assert p.values.min() > -1e-15
+        np.testing.assert_allclose(p.values.sum(axis=1), 1, atol=1e-14)
+        after = Curve(fine, p.apply(c)).evaluate(t, 2 if fine is elevated else 0)
+        for order, (a, b) in enumerate(zip(before, after, strict=False)):
+            np.testing.assert_allclose(b, a, rtol=0, atol=1e-12 * steepest**order)
+
+
+@pytest.mark.parametrize("degree", [1, 2, 5])
+def test_elevation_of_one_span(degree):
+    coarse, fine = (KnotVector.clamped([0, 1], d) for d in (degree, degree + 1))
+    share = np.arange(degree + 2)[:, None] / (degree + 1)
+    expected = share * np.eye(degree + 2, degree + 1, -1) + (1 - share) * np.eye(degree + 2, degree + 1)
+    np.testing.assert_allclose(refinement(coarse, fine).toarray(), expected, atol=1e-15)
+
+
+def test_a_degree_is_never_lowered():
+    kv = random_knots(4, "unclamped", 5, 7)
+    assert kv.elevated(0) is kv and kv.elevated(4) is kv
+    with pytest.raises(UsageError, match="nested"):
+        refinement(kv.elevated(5), kv)
+    smoother = KnotVector.clamped(kv.breaks, 5)
+    with pytest.raises(UsageError, match="nested"):
+        refinement(kv, smoother)

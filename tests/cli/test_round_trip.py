@@ -48,7 +48,7 @@ def round_trip(source, target):
         assert old.kind == new.kind or (old.kind, new.kind) == ("torus", "revolution")
     for old, new in zip(model.surfaces, seen.surfaces, strict=True):
         if old.index == surface.index:
-            refined = old.net.refined(offset.u_knots, offset.v_knots)
+            refined = offset.over(old.net)
             assert np.abs(new.net.poles - refined.poles).max() == pytest.approx(MOVED, rel=1e-6)
         else:
             assert np.abs(old.net.poles - new.net.poles).max() <= 1e-12 * model.diagonal
