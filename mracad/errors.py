@@ -69,3 +69,17 @@ class EditError(MracadError):
 
     def __init__(self, message: str, hint: str = "") -> None:
         super().__init__(message, hint, Code.CANNOT_EDIT)
+
+
+class LimitError(MracadError):
+    """Work that took more time or memory than it may."""
+
+    def __init__(self, message: str, hint: str = "") -> None:
+        super().__init__(message, hint, Code.LIMIT)
+
+
+class CrashError(MracadError):
+    """Work that ended in the middle, or in an error that nobody expected."""
+
+    def __init__(self, message: str, hint: str = "") -> None:
+        super().__init__(message, hint, Code.INTERNAL)

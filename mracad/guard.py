@@ -6,7 +6,6 @@ import contextlib
 import ctypes
 import mmap
 import os
-import pickle
 import re
 import select
 import signal
@@ -15,7 +14,8 @@ import time
 from collections.abc import Callable, Iterator
 from typing import Any, TypeVar
 
-from mracad.errors import Code, MracadError, UsageError
+from mracad import wire
+from mracad.errors import CrashError, LimitError, UsageError
 
 Result = TypeVar("Result")
 
@@ -82,12 +82,16 @@ def ending() -> None:
         _note.write(_note.stage, _note.subject, ending=True)
 
 
-def run(work: Callable[[], Result], seconds: float | None = None, memory: int | None = None) -> Result:
-    """What ``work()`` returns, computed in a child process; whatever it raises is raised here.
+def run(
+    work: Callable[[], Result], returns: type[Result], seconds: float | None = None, memory: int | None = None
+) -> Result:
+    """What ``work()`` returns, computed in a child process; a MracadError that it raises is raised here.
 
     Parameters
     ----------
     work : callable
+    returns : type
+        Of the result, which comes as MessagePack.
     seconds : float, optional
         Time that it may take.
     memory : int, optional
@@ -96,7 +100,8 @@ def run(work: Callable[[], Result], seconds: float | None = None, memory: int | 
     Raises
     ------
     MracadError
-        With the code of a limit when one was hit; with that of an internal error when the child crashed.
+        With the code of a limit when one was hit; with that of an internal error when the child crashed, or raised
+        anything else.
     """
     if not hasattr(os, "fork"):
         if seconds is None and memory is None:
@@ -114,7 +119,7 @@ def run(work: Callable[[], Result], seconds: float | None = None, memory: int | 
         _child(work, writer, memory)
     os.close(writer)
     try:
-        with _passing_on(child):
+        with _passing_on(child) as asked:
             data, finished = _received(reader, seconds, note)
     except BaseException:
         _end(child)
@@ -123,20 +128,17 @@ def run(work: Callable[[], Result], seconds: float | None = None, memory: int | 
         os.close(reader)
     if not finished:
         _end(child)
-        raise MracadError(f"time limit of {seconds:g} s exceeded{note}", "give more with --time-limit", Code.LIMIT)
+        raise LimitError(f"time limit of {seconds:g} s exceeded{note}", "give more with --time-limit")
     _, status, usage = os.wait4(child, 0)
+    if asked and not data.startswith(wire.DONE):
+        _terminated()
     if data:
-        good, value = pickle.loads(data)
-        if good:
-            return value
-        raise value
+        return wire.heard(data, returns)
     if memory and _peak(usage.ru_maxrss) > 0.7 * memory:
         raise _out_of_memory(memory)
     number = os.WTERMSIG(status) if os.WIFSIGNALED(status) else 0
     what = signal.Signals(number).name if number else f"exit code {os.WEXITSTATUS(status)}"
-    raise MracadError(
-        f"the CAD kernel crashed ({what}){note}", "the model may be damaged: see mracad check", Code.INTERNAL
-    )
+    raise CrashError(f"the CAD kernel crashed ({what}){note}", "the model may be damaged: see mracad check")
 
 
 _OUT_OF_MEMORY = ("failed to map segment", "error return without exception set", "bad_alloc")
@@ -154,46 +156,40 @@ def _child(work: Callable[[], Any], writer: int, memory: int | None) -> None:
     try:
         end_with_parent()
         signal.signal(signal.SIGTERM, _terminated)
-        message = _outcome(work, memory)
+        answer = _answer(work, memory)
         with contextlib.suppress(OSError, ValueError):
             sys.stdout.flush()
             sys.stderr.flush()
         with os.fdopen(writer, "wb") as pipe:
-            pipe.write(_packed(message))
+            pipe.write(answer)
     finally:
         os._exit(0)
 
 
-def _outcome(work: Callable[[], Any], memory: int | None) -> tuple[bool, Any]:
-    """Whether the work was done, and its result or error."""
+def _answer(work: Callable[[], Any], memory: int | None) -> bytes:
+    """What the work came to, packed."""
     if not memory:
-        try:
-            return True, work()
-        except BaseException as error:
-            return False, error
+        return wire.answer(work)
     import resource
 
     hard = resource.getrlimit(resource.RLIMIT_DATA)[1]
     resource.setrlimit(resource.RLIMIT_DATA, (memory, hard))
-    try:
-        return True, work()
-    except (MracadError, KeyboardInterrupt, SystemExit) as error:
-        return False, error
-    except BaseException as error:
-        resource.setrlimit(resource.RLIMIT_DATA, (hard, hard))  # room to say so
-        return False, _out_of_memory(memory) if _starved(error) else error
+
+    def starved() -> Any:
+        try:
+            return work()
+        except BaseException as error:
+            resource.setrlimit(resource.RLIMIT_DATA, (hard, hard))  # room to say so
+            if _starved(error):
+                raise _out_of_memory(memory) from error
+            raise
+
+    return wire.answer(starved)
 
 
 def _starved(error: BaseException) -> bool:
     """Whether an error says that memory was refused; a library that cannot be loaded for that says it in words."""
     return isinstance(error, MemoryError) or any(words in str(error) for words in _OUT_OF_MEMORY)
-
-
-def _packed(message: tuple[bool, Any]) -> bytes:
-    try:
-        return pickle.dumps(message)
-    except Exception:  # an error that cannot be sent is told in words
-        return pickle.dumps((False, RuntimeError(f"{type(message[1]).__name__}: {message[1]}")))
 
 
 def _terminated(*_: object) -> None:
@@ -219,15 +215,21 @@ def _received(reader: int, seconds: float | None, note: _Note) -> tuple[bytes, b
 
 
 @contextlib.contextmanager
-def _passing_on(child: int) -> Iterator[None]:
-    """Hand a request to end on to the child."""
+def _passing_on(child: int) -> Iterator[list[int]]:
+    """Hand requests to end on to the child; yields those that came."""
+    asked: list[int] = []
+
+    def end(number: int, _: object) -> None:
+        asked.append(number)
+        os.kill(child, signal.SIGTERM)
+
     try:
-        old = signal.signal(signal.SIGTERM, lambda *_: os.kill(child, signal.SIGTERM))
+        old = signal.signal(signal.SIGTERM, end)
     except ValueError:  # not the main thread
-        yield
+        yield asked
         return
     try:
-        yield
+        yield asked
     finally:
         signal.signal(signal.SIGTERM, old)
 
@@ -250,5 +252,5 @@ def _peak(value: int) -> int:
     return value if sys.platform == "darwin" else value * 1024
 
 
-def _out_of_memory(memory: int) -> MracadError:
-    return MracadError(f"memory limit of {memory / 1e6:g} MB exceeded", "give more with --memory-limit", Code.LIMIT)
+def _out_of_memory(memory: int) -> LimitError:
+    return LimitError(f"memory limit of {memory / 1e6:g} MB exceeded", "give more with --memory-limit")

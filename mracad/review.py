@@ -203,7 +203,7 @@ def _limited(name: str, make: Callable[[], Layer], limits: CheckLimits, slow: Co
     if limits.layer_seconds is None:
         return make()
     try:
-        return guard.run(make, limits.layer_seconds)
+        return guard.run(make, Layer, limits.layer_seconds)
     except MracadError as error:
         if error.code == Code.LIMIT:
             return Layer(name, "time limit", f"more than {limits.layer_seconds:g} s")

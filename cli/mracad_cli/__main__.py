@@ -7,12 +7,14 @@ import io
 import os
 import sys
 from collections.abc import Sequence
+from functools import partial
 
 import click
 
 import mracad
 from mracad import guard
 from mracad.errors import Code, MracadError
+from mracad.wire import internal
 from mracad_cli import commands, options
 from mracad_cli.steps import edit_command, edits
 
@@ -73,28 +75,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     arguments = list(sys.argv[1:] if arguments is None else arguments)
     try:
         return _limited(arguments, guarded)
-    except click.exceptions.NoArgsIsHelpError as error:
-        click.echo(error.format_message(), err=True)
-        return int(Code.USAGE)
-    except click.exceptions.Exit as error:
-        return error.exit_code
     except MracadError as error:
         if "--debug" in arguments:
             raise
         failure = error
-    except (KeyboardInterrupt, click.Abort):
+    except KeyboardInterrupt:
         failure = MracadError("interrupted", "nothing was written", Code.INTERRUPTED)
-    except BrokenPipeError:
-        failure = _unread()
-    except MemoryError:
-        failure = MracadError("out of memory", "use a smaller model or a machine with more memory", Code.LIMIT)
-    except Exception as error:
-        if "--debug" in arguments:
-            raise
-        failure = MracadError(
-            f"internal error: {type(error).__name__}: {' '.join(str(error).split())}",
-            "please report it with the output of --debug",
-        )
     if "--json" in arguments:
         from mracad_cli.render import json_text
 
@@ -106,31 +92,42 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _limited(arguments: list[str], guarded: bool) -> int:
     """Run a command; in a child process when it has a limit, or when a crash must not be the end of this one."""
-
-    def work() -> int:
-        try:
-            result = group.main(arguments, prog_name="mracad", standalone_mode=False)
-        except click.exceptions.NoArgsIsHelpError:
-            raise
-        except click.ClickException as error:
-            command = error.ctx.command_path if isinstance(error, click.UsageError) and error.ctx else "mracad"
-            raise MracadError(error.format_message().rstrip("."), f"see {command} --help", Code.USAGE) from error
-        except Exception as error:
-            if "--debug" in arguments or not type(error).__module__.startswith("OCP"):
-                raise
-            what = f"{type(error).__name__}: {error}"
-            hint = "the model may be damaged: see mracad check, or export it again"
-            raise MracadError(f"the CAD kernel failed{guard.now()} ({what})", hint) from error
-        sys.stdout.flush()
-        return result if isinstance(result, int) else 0
-
+    work = partial(_done, arguments)
     if arguments[:1] == ["batch"]:  # its limits are those of each file, and its workers are its guard
         return work()
     seconds, memory = options.limits(arguments)
     working = bool(arguments) and arguments[0] in group.list_commands(click.Context(group))
     if seconds is None and memory is None and not (guarded and working and "--debug" not in arguments):
         return work()
-    return guard.run(work, seconds, memory)
+    return guard.run(work, int, seconds, memory)
+
+
+def _done(arguments: list[str]) -> int:
+    """Run a command; its exit code, or what went wrong as a MracadError."""
+    try:
+        result = group.main(arguments, prog_name="mracad", standalone_mode=False)
+        sys.stdout.flush()
+    except click.exceptions.NoArgsIsHelpError as error:
+        click.echo(error.format_message(), err=True)
+        return int(Code.USAGE)
+    except click.exceptions.Exit as error:
+        return error.exit_code
+    except click.ClickException as error:
+        command = error.ctx.command_path if isinstance(error, click.UsageError) and error.ctx else "mracad"
+        raise MracadError(error.format_message().rstrip("."), f"see {command} --help", Code.USAGE) from error
+    except (KeyboardInterrupt, click.Abort):
+        raise KeyboardInterrupt from None
+    except BrokenPipeError as error:
+        raise _unread() from error
+    except Exception as error:
+        if "--debug" in arguments or isinstance(error, MracadError):
+            raise
+        if not type(error).__module__.startswith("OCP"):
+            raise internal(error) from error
+        what = f"{type(error).__name__}: {error}"
+        hint = "the model may be damaged: see mracad check, or export it again"
+        raise MracadError(f"the CAD kernel failed{guard.now()} ({what})", hint) from error
+    return result if isinstance(result, int) else 0
 
 
 if __name__ == "__main__":

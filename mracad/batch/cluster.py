@@ -13,9 +13,9 @@ from collections.abc import Callable
 from concurrent.futures import CancelledError, Executor, Future
 from typing import Any
 
-from mracad.batch.pool import CrashError, Limits, Pool
+from mracad.batch.pool import Limits, Pool
 from mracad.batch.work import warm
-from mracad.errors import FileError, UsageError
+from mracad.errors import CrashError, FileError, UsageError
 
 PATIENCE = 30
 """Seconds to wait for the scheduler and its first worker."""

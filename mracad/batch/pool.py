@@ -13,6 +13,7 @@ import os
 import pickle
 import queue
 import signal
+import struct
 import subprocess
 import sys
 import threading
@@ -25,7 +26,8 @@ from typing import Any
 
 import psutil
 
-from mracad.errors import Code, MracadError
+from mracad import wire
+from mracad.errors import CrashError, LimitError, MracadError
 from mracad.guard import end_with_parent
 
 TICK = 0.05
@@ -33,6 +35,8 @@ TICK = 0.05
 
 GRACE = 5
 """Seconds beyond its time limit after which a worker that nobody watches any more ends itself."""
+
+_SIZE = struct.Struct(">Q")  # of an answer, before it
 
 READY = 120.0
 """Seconds in which a worker must have started."""
@@ -53,22 +57,10 @@ class Limits:
     memory: int = 0
 
 
-class LimitError(MracadError):
-    """A task that took more time or memory than it may."""
-
-    def __init__(self, message: str, hint: str = "") -> None:
-        super().__init__(message, hint, Code.LIMIT)
-
-
-class CrashError(MracadError):
-    """A worker that ended in the middle of a task."""
-
-    def __init__(self, message: str, hint: str = "") -> None:
-        super().__init__(message, hint, Code.INTERNAL)
-
-
 class Pool(Executor):
     """Processes that do tasks, each within limits.
+
+    Tasks go to them as pickles; what they send back is MessagePack of the type that the function says it returns.
 
     Parameters
     ----------
@@ -94,7 +86,7 @@ class Pool(Executor):
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
         if self._closing:
             raise RuntimeError("the pool is closed")
-        task = _Task(pickle.dumps((fn, args, kwargs), protocol=5))
+        task = _Task(pickle.dumps((fn, args, kwargs), protocol=5), wire.returned(fn))
         self._tasks.put(task)
         with self._lock:
             self._open += 1
@@ -127,7 +119,7 @@ class Pool(Executor):
                 worker = self._usable(worker)
                 try:
                     worker = worker or self._started()
-                    tell = partial(task.future.set_result, worker.call(self._seconds, task.payload))
+                    tell = partial(task.future.set_result, worker.call(self._seconds, task.payload, task.returns))
                 except BaseException as error:
                     tell = partial(task.future.set_exception, error)
                 worker = self._usable(worker)
@@ -151,7 +143,7 @@ class Pool(Executor):
         worker = _Worker()
         self._workers.append(worker)
         try:
-            worker.call(READY, pickle.dumps((self._warm or bool, (), {})))
+            worker.call(READY, pickle.dumps((self._warm or bool, (), {})), Any)
         except BaseException:
             self._retire(worker)
             raise
@@ -176,10 +168,10 @@ class Pool(Executor):
 
 
 class _Task:
-    """A call, pickled, and the future of its result."""
+    """A call, pickled, and the type and future of its result."""
 
-    def __init__(self, payload: bytes) -> None:
-        self.payload = payload
+    def __init__(self, payload: bytes, returns: Any) -> None:
+        self.payload, self.returns = payload, returns
         self.future: Future[Any] = Future()
 
 
@@ -203,21 +195,22 @@ class _Worker:
         self.ready = 0  # bytes occupied before the first task
         self._process = psutil.Process(self.process.pid)
 
-    def call(self, seconds: float, payload: bytes) -> Any:
+    def call(self, seconds: float, payload: bytes, returns: Any) -> Any:
         """Do a task and return its result, or raise its error."""
         assert self.process.stdin and self.process.stdout
         self.seconds, self.deadline = seconds, time.monotonic() + seconds
         try:
             pickle.dump((seconds, payload), self.process.stdin, protocol=5)
             self.process.stdin.flush()
-            done, value = pickle.load(self.process.stdout)
-        except (EOFError, OSError, pickle.UnpicklingError) as error:
+            (size,) = _SIZE.unpack(self.process.stdout.read(_SIZE.size))
+            answer = self.process.stdout.read(size)
+        except (OSError, struct.error) as error:
             raise self._loss() from error
         finally:
             self.deadline = math.inf
-        if not done:
-            raise value
-        return value
+        if len(answer) < size:
+            raise self._loss()
+        return wire.heard(answer, returns)
 
     def lost(self) -> bool:
         return self.process.poll() is not None
@@ -262,24 +255,16 @@ def serve() -> None:
         while True:
             seconds, payload = pickle.load(requests)
             _alarm(seconds + GRACE)
-            answer = _attempt(payload)
+            answer = wire.answer(partial(_done, payload))
             _alarm(0)
-            pickle.dump(answer, replies, protocol=5)
+            replies.write(_SIZE.pack(len(answer)) + answer)
             replies.flush()
 
 
-def _attempt(payload: bytes) -> tuple[bool, Any]:
-    """Whether the task came to an end, and its value or error."""
-    try:
-        fn, args, kwargs = pickle.loads(payload)
-        return True, fn(*args, **kwargs)
-    except MemoryError:
-        return False, LimitError("out of memory", "use a machine with more memory, or fewer workers")
-    except MracadError as error:
-        return False, error
-    except BaseException as error:
-        text = " ".join(str(error).split())
-        return False, CrashError(f"internal error: {type(error).__name__}: {text}", "please report it with the file")
+def _done(payload: bytes) -> Any:
+    """Do a task."""
+    fn, args, kwargs = pickle.loads(payload)
+    return fn(*args, **kwargs)
 
 
 def _alarm(seconds: float) -> None:

@@ -6,9 +6,17 @@ import os
 import signal
 import time
 
+from mracad.batch.work import Product
 from mracad.errors import UsageError
 
 MB = 1_000_000
+
+
+class Trap:
+    """What would do harm were it unpickled."""
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return os.kill, (os.getppid(), signal.SIGKILL)
 
 
 def work(what: str) -> object:
@@ -28,6 +36,12 @@ def work(what: str) -> object:
         raise UsageError("no", "do better")
     elif what == "bug":
         raise EOFError("of a file")
+    elif what == "trap":
+        return Trap()
     elif what == "print":
         os.write(1, b"kernel chatter")
     return what
+
+
+def made(count: int) -> Product:
+    return Product(b"\xff\x00data", ({"edited": count, "valid": True},), ("lost",), 0.5)

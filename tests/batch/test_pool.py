@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import os
+import pickle
 import time
 
 import pytest
 
-from mracad.batch.pool import CrashError, LimitError, Limits, Pool
-from mracad.errors import UsageError
-from tests.batch.tasks import MB, work
+from mracad.batch.pool import Limits, Pool
+from mracad.batch.work import Product
+from mracad.errors import CrashError, LimitError, UsageError
+from tests.batch.tasks import MB, made, work
 
 
 def test_bad_tasks_cost_themselves_alone():
@@ -21,6 +23,7 @@ def test_bad_tasks_cost_themselves_alone():
         "eat": (LimitError, "memory limit of 400 MB"),
         "wrong": (UsageError, "no"),
         "bug": (CrashError, "EOFError: of a file"),
+        "trap": (CrashError, "internal error"),
     }
     with Pool(2, Limits(2.0, 400 * MB)) as pool:
         futures = {f"{what} {i}": pool.submit(work, what) for i, what in enumerate([*bad, "print"])}
@@ -39,6 +42,16 @@ def test_bad_tasks_cost_themselves_alone():
 def test_a_worker_does_one_task_after_another():
     with Pool(1) as pool:
         assert len({pool.submit(os.getpid).result() for _ in range(10)}) == 1
+
+
+def test_what_a_worker_sends_back_is_data(monkeypatch: pytest.MonkeyPatch):
+    """Of the type that the function says it returns; nothing in the client unpickles anything."""
+    for name in ("load", "loads", "Unpickler"):
+        monkeypatch.setattr(pickle, name, None)
+    with Pool(1) as pool:
+        product = pool.submit(made, 3).result()
+        assert product == Product(b"\xff\x00data", ({"edited": 3, "valid": True},), ("lost",), 0.5)
+        assert isinstance(pool.submit(work, "wrong").exception(), UsageError)
 
 
 def test_cancelling_ends_what_is_under_way():

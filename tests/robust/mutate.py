@@ -153,7 +153,7 @@ def verdict(number: int, seed: int = 0, limit: float = LIMIT) -> tuple[str, int,
             return cli.main([str(word) for word in words])
 
         try:
-            code = guard.run(work, limit + 10)
+            code = guard.run(work, int, limit + 10)
         except MracadError as error:
             return fault, int(error.code), f"the command itself ended: {error}"
         left = {path.name for path in out.parent.iterdir()}

@@ -11,6 +11,7 @@ import time
 import pytest
 
 from mracad import guard, occ, output
+from mracad.audit.verdict import Finding, Layer
 from mracad.batch.manifest import Manifest
 from mracad.errors import Code, EditError, FileError, MracadError
 from tests.robust import kill, mutate
@@ -86,7 +87,7 @@ def test_a_child_checks_models_after_its_parent_has(samples):
     """The threads that the kernel started in the parent are not in the child, which must not wait for them."""
     document = occ.read(samples / "blade.step")
     assert occ.check(document).valid
-    assert guard.run(lambda: occ.check(document).valid, seconds=60)
+    assert guard.run(lambda: occ.check(document).valid, bool, 60)
 
 
 def crash():
@@ -119,7 +120,7 @@ def hungry():
 def test_a_crash_or_an_endless_loop_is_an_error(work, code, says):
     start = time.monotonic()
     with pytest.raises(MracadError, match=says) as error:
-        guard.run(work, 0.3)
+        guard.run(work, object, 0.3)
     assert error.value.code == code and error.value.hint and time.monotonic() - start < 3
 
 
@@ -130,7 +131,7 @@ def test_a_crash_says_what_it_was_at():
         crash()
 
     with pytest.raises(MracadError, match=r"crashed \(SIGSEGV\) while editing 'bad.step'"):
-        guard.run(work)
+        guard.run(work, object)
 
 
 def test_outputs_that_take_their_places_are_not_cut_off(tmp_path):
@@ -139,32 +140,62 @@ def test_outputs_that_take_their_places_are_not_cut_off(tmp_path):
         time.sleep(0.6)
         return "done"
 
-    assert guard.run(work, 0.3) == "done"
+    assert guard.run(work, str, 0.3) == "done"
 
 
 def test_too_much_memory_is_an_error():
     with pytest.raises(MracadError, match="memory limit of 1 MB") as error:
-        guard.run(hungry, memory=guard.size("1MB"))
+        guard.run(hungry, int, memory=guard.size("1MB"))
     assert error.value.code == Code.LIMIT
-    assert guard.run(hungry, memory=guard.size("3GB")) == 10**8
+    assert guard.run(hungry, int, memory=guard.size("3GB")) == 10**8
 
 
 def test_results_and_errors_come_back():
-    assert guard.run(lambda: {"a": [1, 2]}, 60) == {"a": [1, 2]}
+    assert guard.run(lambda: {"a": [1, 2]}, dict, 60) == {"a": [1, 2]}
     for kind in (EditError, FileError):
 
         def work(kind=kind):
             raise kind("what", "why")
 
         with pytest.raises(kind) as error:
-            guard.run(work)
+            guard.run(work, object)
         assert (error.value.message, error.value.hint) == ("what", "why")
+
+
+class Trap:
+    """What would do harm were it unpickled."""
+
+    def __init__(self, path):
+        self.path = path
+
+    def __reduce__(self):
+        return os.mkdir, (str(self.path),)
+
+
+def test_what_a_child_sends_is_data(tmp_path):
+    def raising():
+        raise OSError(Trap(tmp_path / "trap"))
+
+    for work in (lambda: Trap(tmp_path / "trap"), raising):
+        with pytest.raises(MracadError, match="internal error") as error:
+            guard.run(work, object)
+        assert error.value.code == Code.INTERNAL and not list(tmp_path.iterdir())
+    layer = Layer("mesh", "fail", "text", (Finding("text", "rule", (1, 2), None, (1.0, 2.0, 3.0)),), {"a": {"b": 1}})
+    assert guard.run(lambda: layer, Layer) == layer
+
+
+def test_an_error_may_name_a_file_that_is_not_unicode():
+    def work():
+        raise FileError("cannot read 'caf\udce9.step'", "rename it")
+
+    with pytest.raises(FileError, match=r"caf\\udce9.step"):
+        guard.run(work, object)
 
 
 def test_a_limit_that_is_not_hit_costs_little():
     def once():
         start = time.perf_counter()
-        guard.run(lambda: None, 60, guard.size("4GB"))
+        guard.run(lambda: None, object, 60, guard.size("4GB"))
         return time.perf_counter() - start
 
     assert min(once() for _ in range(5)) < 0.2

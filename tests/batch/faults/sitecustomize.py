@@ -10,7 +10,7 @@ from mracad.batch import work
 real = work.do
 
 
-def do(task):
+def do(task) -> work.Product:
     if b"/* crash */" in task.data:
         os.kill(os.getpid(), signal.SIGSEGV)
     if b"/* hang */" in task.data:

@@ -1,0 +1,74 @@
+"""What processes of ours say to each other: MessagePack of declared types, so that nothing in it is ever run."""
+
+from __future__ import annotations
+
+import inspect
+import typing
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+import msgspec
+
+from mracad.errors import Code, CrashError, EditError, FileError, LimitError, MracadError, UsageError
+
+Value = TypeVar("Value")
+
+DONE, FAILED = b"+", b"-"
+
+_KINDS = {
+    Code.USAGE: UsageError,
+    Code.FILE: FileError,
+    Code.CANNOT_EDIT: EditError,
+    Code.LIMIT: LimitError,
+    Code.INTERNAL: CrashError,
+}
+
+
+class Failure(msgspec.Struct, frozen=True, array_like=True):
+    """An error on its way; see :class:`mracad.errors.MracadError`."""
+
+    message: str
+    hint: str
+    code: int
+
+
+def answer(work: Callable[[], Any]) -> bytes:
+    """Do some work; its result or error, packed."""
+    try:
+        return DONE + msgspec.msgpack.encode(work())
+    except BaseException as error:
+        return failed(error)
+
+
+def failed(error: BaseException) -> bytes:
+    """An error, packed; one that is not ours is told in words."""
+    if not isinstance(error, MracadError):
+        error = internal(error)
+    message, hint = (text.encode(errors="backslashreplace").decode() for text in (error.message, error.hint))
+    return FAILED + msgspec.msgpack.encode(Failure(message, hint, int(error.code)))
+
+
+def internal(error: BaseException) -> MracadError:
+    """The error for one that nobody expected."""
+    if isinstance(error, MemoryError):
+        return LimitError("out of memory", "use a smaller model or a machine with more memory")
+    text = " ".join(str(error).split())
+    return CrashError(f"internal error: {type(error).__name__}: {text}", "please report it with the output of --debug")
+
+
+def heard(data: bytes, kind: type[Value]) -> Value:
+    """The result in what another process sent; an error in it is raised."""
+    if data[:1] == DONE:
+        return msgspec.msgpack.decode(data[1:], type=kind)
+    failure = msgspec.msgpack.decode(data[1:], type=Failure)
+    code = Code(failure.code)
+    if code in _KINDS:
+        raise _KINDS[code](failure.message, failure.hint)
+    raise MracadError(failure.message, failure.hint, code)
+
+
+def returned(function: Callable[..., Any]) -> Any:
+    """The type that a function says it returns; anything where it says nothing."""
+    if not (inspect.isfunction(function) and "return" in function.__annotations__):
+        return Any
+    return typing.get_type_hints(function)["return"]
