@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from OCP.BRep import BRep_Tool
+from OCP.BRep import BRep_Builder, BRep_Tool
 from OCP.BRepTools import BRepTools
 from OCP.Geom import Geom_BezierSurface, Geom_BSplineSurface
 from OCP.TColStd import TColStd_Array1OfInteger, TColStd_Array1OfReal
@@ -102,7 +102,10 @@ def _lay_all(document: Document, surface: Surface, handle: Geom_BSplineSurface) 
     for face in (TopoDS.Face_s(document.faces[index].Oriented(TopAbs_FORWARD)) for index in surface.faces):
         edges = list(edge_uses(face))
         pcurves = [BRep_Tool.CurveOnSurface_s(edge, face, 0.0, 0.0) for edge in edges]
+        ranges = [BRep_Tool.Range_s(edge, face) for edge in edges]
         lay(face, handle, pcurves, [BRep_Tool.Tolerance_s(edge) for edge in edges])
+        for edge, (first, last) in zip(edges, ranges, strict=True):
+            BRep_Builder().Range(edge, face, first, last)  # of one without a 3D curve the kernel makes the pcurve's
 
 
 def _refine(surface: Geom_BSplineSurface, offset: Offset) -> None:

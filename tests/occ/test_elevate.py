@@ -179,6 +179,20 @@ def test_instances_share_a_higher_degree(tmp_path):
     )
 
 
+def test_an_edge_without_a_curve_in_space_keeps_its_range(tmp_path):
+    tip = sheet(even(5, 2), even(4, 2))
+    tip.poles[0] = [-3, 9, 0]
+    document = occ.read_step(shapes.save(shapes.face_on(spline(tip)), tmp_path / "in.step"))
+    model = occ.view(document)
+    assert any(edge.degenerate for edge in model.edges)
+    change = raised(model)
+    for step in (occ.apply, restore):
+        step(document, model, change)
+        for old, new in zip(model.edges, occ.view(document).edges, strict=True):
+            assert all(np.array_equal(a.uv, b.uv) for a, b in zip(old.sides, new.sides, strict=True))
+        assert occ.check(document).valid
+
+
 def test_a_bezier_face_is_elevated_too():
     document = shapes.document(shapes.face_on(shapes.bezier(shapes.wavy_poles(3, 2))))
     model = occ.view(document)
