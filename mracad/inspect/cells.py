@@ -79,7 +79,7 @@ def inside_grid(face: Face, net: Net, u: Array, v: Array) -> Array:
     return _covered(shape.chords, shape.box, (net.u, net.v), u, v)
 
 
-def quadrature(net: Net, faces: Sequence[Face], points: int | None = None) -> Quadrature:
+def quadrature(net: Net, faces: Sequence[Face], points: int | None = None, fewest: int = 1) -> Quadrature:
     """Gauss–Legendre points over faces of one surface.
 
     Parameters
@@ -90,17 +90,18 @@ def quadrature(net: Net, faces: Sequence[Face], points: int | None = None) -> Qu
     points : int, optional
         Points a piece in either direction; the degree + 1 of each direction by default, with which products of two
         functions of the net are integrated exactly.
+    fewest : int
+        Points along the faces in either direction, at least.
 
     Notes
     -----
     Exact over natural faces and others bounded by parameter lines; elsewhere the boundary is followed by whole points.
     """
-    counts = [points or kv.degree + 1 for kv in (net.u, net.v)]
     shapes = [outline(face, net) for face in faces]
     for halvings in range(HALVINGS + 1):
         (u, wu), (v, wv) = (
-            _gauss(_breaks(kv, axis, shapes, PIECES << halvings), count)
-            for axis, (kv, count) in enumerate(zip((net.u, net.v), counts, strict=True))
+            _gauss(_breaks(kv, axis, shapes, PIECES << halvings), points or kv.degree + 1, fewest)
+            for axis, kv in enumerate((net.u, net.v))
         )
         on = [inside_grid(face, net, u.ravel(), v.ravel()) for face in faces]
         if all(shape.natural or mask.sum() >= ENOUGH for shape, mask in zip(shapes, on, strict=True)):
@@ -108,7 +109,7 @@ def quadrature(net: Net, faces: Sequence[Face], points: int | None = None) -> Qu
     mask = np.logical_or.reduce(on)
     cells = mask.reshape(*u.shape, *v.shape).any(axis=(1, 3))
     keep_u, keep_v = cells.any(axis=1), cells.any(axis=0)
-    mask = mask[np.repeat(keep_u, counts[0])][:, np.repeat(keep_v, counts[1])]
+    mask = mask[np.repeat(keep_u, u.shape[1])][:, np.repeat(keep_v, v.shape[1])]
     return Quadrature(u[keep_u], v[keep_v], wu[keep_u], wv[keep_v], mask)
 
 
@@ -215,8 +216,8 @@ def _divided(kv: KnotVector, breaks: Array, limits: Array, pieces: int) -> Array
     return np.stack([starts[of] + place * size, starts[of] + (place + 1) * size], axis=1)
 
 
-def _gauss(pieces: Array, points: int) -> tuple[Array, Array]:
-    """Gauss–Legendre points and weights on intervals ``(s, 2)``: both ``(s, points)``."""
-    nodes, weights = legendre(points)
+def _gauss(pieces: Array, points: int, fewest: int) -> tuple[Array, Array]:
+    """Gauss–Legendre points and weights on intervals ``(s, 2)``, both ``(s, q)``; at least ``fewest`` in all."""
+    nodes, weights = legendre(max(points, -(-fewest // len(pieces))))
     half = 0.5 * (pieces[:, 1] - pieces[:, 0])[:, None]
     return pieces[:, :1] + half * (nodes + 1), half * weights

@@ -18,8 +18,8 @@ from mracad.model import Face
 
 Array = np.ndarray
 
-POINTS = 4
-"""Gauss points a span in either direction."""
+POINTS, FEWEST = 4, 24
+"""Gauss points a span, and at least along a face, in either direction."""
 
 RIPPLE = 1e-7
 """Amplitude, mm, of a ripple one mean span long that counts for nothing: the kernel takes such points for one."""
@@ -129,7 +129,7 @@ def changes(surveyed: Sequence[Survey], nets: Sequence[Net]) -> list[Change]:
 
 
 def _rule(faces: Sequence[Face], u: KnotVector, v: KnotVector, points: int) -> Quadrature:
-    return quadrature(Net(u, v, np.empty((u.count, v.count, 0))), faces, points)
+    return quadrature(Net(u, v, np.empty((u.count, v.count, 0))), faces, points, FEWEST)
 
 
 def _seen(surfaces: Sequence[tuple[Net, Quadrature, Array]]) -> Iterator[tuple[Array, Forms]]:
