@@ -6,8 +6,23 @@ import math
 from collections.abc import Callable, Iterator
 
 import cadquery as cq
-from OCP.BRepBuilderAPI import BRepBuilderAPI_NurbsConvert
-from OCP.TopoDS import TopoDS_Shape
+from OCP.BRep import BRep_Builder, BRep_Tool
+from OCP.BRepBuilderAPI import (
+    BRepBuilderAPI_MakeFace,
+    BRepBuilderAPI_MakeSolid,
+    BRepBuilderAPI_NurbsConvert,
+    BRepBuilderAPI_Sewing,
+    BRepBuilderAPI_Transform,
+)
+from OCP.BRepCheck import BRepCheck_Analyzer
+from OCP.BRepLib import BRepLib
+from OCP.BRepTools import BRepTools
+from OCP.gp import gp_Ax1, gp_Ax2, gp_Dir, gp_Pnt, gp_Trsf
+from OCP.ShapeFix import ShapeFix_Shape
+from OCP.TopAbs import TopAbs_FACE
+from OCP.TopExp import TopExp_Explorer
+from OCP.TopLoc import TopLoc_Location
+from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Shape, TopoDS_Shell
 
 Maker = Callable[[], TopoDS_Shape]
 
@@ -112,11 +127,88 @@ def cut(body: str, hole: str) -> TopoDS_Shape:
     made = BODIES[body]()
     for tool in HOLES[hole](height(body)):
         made = made.cut(tool)
-    return made.val().wrapped
+    return sound(made.val().wrapped)
 
 
-def zoo() -> Iterator[tuple[str, Maker]]:
+def sound(shape: TopoDS_Shape) -> TopoDS_Shape:
+    """A shape as the kernel heals it, where its booleans left it invalid."""
+    if BRepCheck_Analyzer(shape).IsValid():
+        return shape
+    healing = ShapeFix_Shape(shape)
+    healing.Perform()
+    return healing.Shape()
+
+
+def cavity(body: str, hole: str) -> TopoDS_Shape:
+    """A block with a body out of its middle, and channels to it."""
+    made = cq.Workplane().box(90, 90, 90).cut(BODIES[body]())
+    for tool in HOLES[hole](height(body)):
+        made = made.cut(tool)
+    return sound(made.val().wrapped)
+
+
+def mirrored(shape: TopoDS_Shape) -> TopoDS_Shape:
+    flip = gp_Trsf()
+    flip.SetMirror(gp_Ax2(gp_Pnt(1, 2, 3), gp_Dir(1, 1, 0)))
+    return BRepBuilderAPI_Transform(shape, flip, True).Shape()
+
+
+def placed(shape: TopoDS_Shape) -> TopoDS_Shape:
+    turn = gp_Trsf()
+    turn.SetRotation(gp_Ax1(gp_Pnt(1, 2, 3), gp_Dir(1, 2, 2)), 1.1)
+    return shape.Moved(TopLoc_Location(turn))
+
+
+def halved(body: str) -> TopoDS_Shape:
+    """A body whose faces are in two parts on the same surfaces."""
+    half = cq.Workplane().box(100, 50, 100)
+    left, right = (BODIES[body]().intersect(half.translate((0, y, 0))) for y in (25, -25))
+    return sound(left.union(right, clean=False).val().wrapped)
+
+
+def turned(shape: TopoDS_Shape, angle: float = 1.0) -> TopoDS_Shape:
+    """A whole body of revolution whose one closing edge lies elsewhere than that of its surface."""
+    made = BRepBuilderAPI_Sewing(1e-6)
+    for face in faces(shape):
+        surface = BRep_Tool.Surface_s(face)
+        low_u, high_u, low_v, high_v = BRepTools.UVBounds_s(face)
+        if surface.IsUPeriodic():
+            face = BRepBuilderAPI_MakeFace(surface, low_u + angle, high_u + angle, low_v, high_v, 1e-7).Face()
+        made.Add(face)
+    made.Perform()
+    builder, shell = BRep_Builder(), TopoDS_Shell()
+    builder.MakeShell(shell)
+    for face in faces(made.SewedShape()):
+        builder.Add(shell, face)
+    shell.Closed(True)
+    solid = BRepBuilderAPI_MakeSolid(shell).Solid()
+    BRepLib.OrientClosedSolid_s(solid)
+    return solid
+
+
+def faces(shape: TopoDS_Shape) -> Iterator[TopoDS_Face]:
+    explorer = TopExp_Explorer(shape, TopAbs_FACE)
+    while explorer.More():
+        yield TopoDS.Face_s(explorer.Current())
+        explorer.Next()
+
+
+def closed() -> Iterator[tuple[str, Maker]]:
+    """Every body with every hole, as it is and as NURBS; and more ways to have them."""
+
+    def both(name: str, maker: Maker) -> Iterator[tuple[str, Maker]]:
+        yield name, maker
+        yield f"{name}-nurbs", lambda: sound(nurbs(maker()))
+
     for body in BODIES:
         for hole in HOLES:
-            yield f"{body}-{hole}", lambda body=body, hole=hole: cut(body, hole)
-            yield f"{body}-{hole}-nurbs", lambda body=body, hole=hole: nurbs(cut(body, hole))
+            yield from both(f"{body}-{hole}", lambda body=body, hole=hole: cut(body, hole))
+        yield from both(f"{body}-halved", lambda body=body: halved(body))
+    for body in ("sphere", "egg", "vase", "cylinder", "cone"):
+        yield from both(f"{body}-turned", lambda body=body: turned(cut(body, "whole")))
+    for body in ("sphere", "egg", "ring", "vase"):
+        for hole in ("whole", "hole", "seam", "pole"):
+            yield from both(f"{body}-{hole}-cavity", lambda body=body, hole=hole: cavity(body, hole))
+        for hole in ("hole", "holes", "seam"):
+            yield from both(f"{body}-{hole}-mirrored", lambda body=body, hole=hole: mirrored(cut(body, hole)))
+            yield from both(f"{body}-{hole}-placed", lambda body=body, hole=hole: placed(cut(body, hole)))

@@ -12,10 +12,11 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
-from OCP.BRep import BRep_Tool
+from OCP.BRep import BRep_Builder, BRep_Tool
 from OCP.BRepAdaptor import BRepAdaptor_Curve2d
 from OCP.BRepCheck import BRepCheck_Analyzer
 from OCP.BRepGProp import BRepGProp
+from OCP.BRepLib import BRepLib
 from OCP.BRepTools import BRepTools
 from OCP.Geom import Geom_ElementarySurface, Geom_RectangularTrimmedSurface, Geom_Surface
 from OCP.GProp import GProp_GProps
@@ -26,7 +27,8 @@ from OCP.ShapeUpgrade import ShapeUpgrade_SplitSurface
 from OCP.TColStd import TColStd_HSequenceOfReal
 from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_FORWARD, TopAbs_WIRE
 from OCP.TopLoc import TopLoc_Location
-from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Shape
+from OCP.TopoDS import TopoDS, TopoDS_Edge, TopoDS_Face, TopoDS_Shape
+from OCP.TopTools import TopTools_MapOfShape
 from OCP.XCAFDoc import XCAFDoc_ShapeTool
 
 from mracad.errors import EditError
@@ -173,7 +175,7 @@ def _divide(document: Document, index: int, copier: Copier, context: ShapeBuild_
     face = context.Apply(document.faces[index])
     for directions in ((True, False), (False, True), (True, True)):
         parts = _parts(face, directions, ShapeBuild_ReShape())
-        if parts is not None and _kept(parts, copier(parts)):
+        if parts is not None and BRepCheck_Analyzer(parts).IsValid() and _kept(parts, copier(parts)):
             _parts(face, directions, context)
             return
     raise _mistaken(document, index)
@@ -191,7 +193,7 @@ def _faces(shape: TopoDS_Shape) -> list[TopoDS_Shape]:
 def _parts(face: TopoDS_Shape, directions: tuple[bool, bool], context: ShapeBuild_ReShape) -> TopoDS_Shape | None:
     """A face cut across the directions in which its surface closes."""
     location = TopLoc_Location()
-    forward = TopoDS.Face_s(face.Oriented(TopAbs_FORWARD))
+    forward = TopoDS.Face_s(face.Located(location).Oriented(TopAbs_FORWARD))
     surface = BRep_Tool.Surface_s(forward, location)
     basis = _basis(surface)
     closed = basis.IsUClosed(), basis.IsVClosed()
@@ -211,8 +213,23 @@ def _parts(face: TopoDS_Shape, directions: tuple[bool, bool], context: ShapeBuil
     shell.SetContext(context)
     if not shell.Perform():
         return None
+    known = TopTools_MapOfShape()
+    for edge in edge_uses(forward):
+        known.Add(edge)
+    for edge in inside(shell.Result(), TopAbs_EDGE):
+        if known.Add(edge):
+            _time(TopoDS.Edge_s(edge))
     context.Replace(forward, shell.Result())
     return shell.Result()
+
+
+def _time(edge: TopoDS_Edge) -> None:
+    """Let the curves of an edge run alike."""
+    builder = BRep_Builder()
+    builder.SameRange(edge, False)
+    builder.SameParameter(edge, False)
+    BRepLib.SameRange_s(edge, _PRECISION)
+    BRepLib.SameParameter_s(edge, _PRECISION)
 
 
 def _away(face: TopoDS_Face, axis: int, low: float, high: float) -> float:

