@@ -5,9 +5,10 @@ from __future__ import annotations
 import importlib
 import time
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from mracad import review
@@ -90,6 +91,7 @@ def play(
     original: Original | None = None,
     progress: Progress | None = None,
     apply: bool = True,
+    spoiled: Mapping[int, str] = MappingProxyType({}),
 ) -> list[Report | Judged]:
     """Take a document through steps, in memory, up to the first check that fails.
 
@@ -102,6 +104,8 @@ def play(
         Reads the document again as it was, for a comparison.
     apply : bool
         False for a dry run, after which the document must not be written: the last step is not put into it.
+    spoiled : mapping
+        Faces that no edit may touch, and why.
 
     Returns
     -------
@@ -120,7 +124,7 @@ def play(
         result: Report | Judged
         if isinstance(step.options, Selection):
             put = apply or step is not steps[-1]
-            result = run(document, function, step.options, progress=progress, apply=put)
+            result = run(document, function, step.options, progress=progress, apply=put, spoiled=spoiled)
         else:
             if progress:
                 progress(step.use, 0, 1)
@@ -193,6 +197,7 @@ def run(
     *,
     progress: Progress | None = None,
     apply: bool = True,
+    spoiled: Mapping[int, str] = MappingProxyType({}),
 ) -> Report:
     """Edit a document in memory.
 
@@ -206,6 +211,8 @@ def run(
         The edit's options, selectors among them.
     apply : bool
         False for a dry run.
+    spoiled : mapping
+        Faces that the edit may not touch, and why.
 
     Raises
     ------
@@ -228,10 +235,10 @@ def run(
     others = [view(read(file)) for file in options.models()]
     before: list[SeamMeasure] = []
     valid_before: Validity | None = None
-    spoiled: dict[int, str] = {}
+    spoiled = dict(spoiled)
     while True:
         result = edit(model, options, *others, scope=scope.holding(spoiled), progress=stage("editing"))
-        result = _named(result, spoiled)
+        result = _named(result, {face: spoiled[face] for face in spoiled.keys() & scope.chosen})
         _refuse_if_stuck(model, result)
         if valid_before is None:
             before = seams(model)
@@ -324,7 +331,7 @@ def _torn(before: list[SeamMeasure], after: list[SeamMeasure], edit: Edit, keep:
     }
 
 
-def _named(result: Edit, spoiled: dict[int, str]) -> Edit:
+def _named(result: Edit, spoiled: Mapping[int, str]) -> Edit:
     """The outcomes with the reasons for which ``spoiled`` faces were left."""
     if not spoiled:
         return result

@@ -45,6 +45,7 @@ def run_batch(
     encoding: str | None,
     format: str | None,
     schema: str | None,
+    verify: str,
     overwrite: bool,
     if_changed: bool,
     record: bool,
@@ -57,7 +58,15 @@ def run_batch(
     """Take many files through a recipe; see :mod:`mracad_cli.commands.batch` for the parameters."""
     recipe.steps("model.step")  # what is wrong in it is said before anything is read
     settings = Settings(
-        input_unit, encoding, (schema or "").upper(), overwrite, if_changed, record, retry, fail_fast=not keep_going
+        input_unit,
+        encoding,
+        (schema or "").upper(),
+        verify == "on",
+        overwrite,
+        if_changed,
+        record,
+        retry,
+        fail_fast=not keep_going,
     )
     limits = Limits(duration(time_limit, "time-limit"), size(memory_limit) if memory_limit else 0)
     check_reports(report, junit, depfile, overwrite=True)

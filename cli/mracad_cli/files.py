@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import io
 import os
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,11 +12,12 @@ from typing import TYPE_CHECKING, Any
 from mracad import guard
 from mracad.errors import FileError, UsageError
 from mracad.formats import FORMATS, by_ending
+from mracad_cli.render import read_back
 
 if TYPE_CHECKING:
     from mracad.occ.document import Document
-    from mracad.occ.files import Written
     from mracad.occ.load import Text
+    from mracad.produce import Made, Target
 
 
 def load(source: str) -> Text:
@@ -116,14 +116,15 @@ class Outputs:
         chord: str,
         angle: float,
         ascii_stl: bool,
+        verify: str,
         needed: bool = True,
         beside: Iterable[str | None] = (),
     ) -> None:
         self.paths, self.schema = paths, (schema or "").upper()
         self.overwrite, self.if_changed = overwrite or if_changed, if_changed
         self.chord, self.angle, self.ascii_stl = chord, angle, ascii_stl
-        self.written: dict[str, Written] = {}
-        self._made: dict[str, bytes] = {}
+        self.verify = verify == "on"
+        self.made: dict[str, Made] = {}
         if needed and not paths:
             raise UsageError("no output is named", "name a file with -o OUT.step, or - for standard output")
         if paths.count("-") > 1:
@@ -131,43 +132,30 @@ class Outputs:
         self.formats = {path: FORMATS[format] if path == "-" else by_ending(path) for path in paths}
         check_reports(*self.files(), *beside, overwrite=self.overwrite)
 
-    def make(self, document: Document, title: str) -> None:
-        """Make the content of every output; nothing is written yet."""
-        from mracad.occ.files import write
+    def targets(self) -> list[Target]:
+        """How each output is written."""
+        from mracad.produce import Target
 
-        meshed = any(format.kind == "mesh" for format in self.formats.values())
-        chord = self._chord(document) if meshed else None
-        for path, format in self.formats.items():
-            stream = io.BytesIO()
-            self.written[self._name(path)] = write(
-                document,
-                stream,
-                format.name,
-                schema=self.schema,
-                chord=chord,
-                angle=self.angle,
-                ascii=self.ascii_stl,
-                options_text=title,
-            )
-            self._made[path] = stream.getvalue()
+        return [
+            Target(self._name(path), format.name, self.schema, self.chord, self.angle, self.ascii_stl)
+            for path, format in self.formats.items()
+        ]
+
+    def take(self, made: Sequence[Made]) -> None:
+        """Keep the content of every output, in their order; nothing is written yet."""
+        self.made = dict(zip(self.formats, made, strict=True)) if made else {}
 
     def deliver(self, files: Mapping[str, str | None], lines: Iterable[str]) -> None:
         """End the command: what was made, texts beside it and the lines of the result, all or nothing."""
         from mracad.output import holds
 
-        for name, written in self.written.items():
-            if written.lost:
-                print(f"warning: {name} lacks {', '.join(map(str, written.lost))}", file=sys.stderr)
-        made = {p: d for p, d in self._made.items() if p != "-" and not (self.if_changed and holds(Path(p), d))}
-        stream = self._made.get("-", b"" if "-" in self.paths else None)
-        deliver({**made, **files}, lines, stream=stream)
-
-    def _chord(self, document: Document) -> float:
-        """The chord in millimetres; it may be a share of the diagonal."""
-        from mracad.occ.view import view
-        from mracad.options import length
-
-        return length(self.chord, view(document).diagonal, "chord")
+        for path, made in self.made.items():
+            if made.written.lost:
+                print(f"warning: {self._name(path)} lacks {', '.join(map(str, made.written.lost))}", file=sys.stderr)
+        data = {path: made.data for path, made in self.made.items()}
+        stream = data.pop("-", b"" if "-" in self.paths else None)
+        changed = {p: d for p, d in data.items() if not (self.if_changed and holds(Path(p), d))}
+        deliver({**changed, **files}, lines, stream=stream)
 
     def files(self) -> list[str]:
         """The outputs that are files."""
@@ -175,18 +163,20 @@ class Outputs:
 
     def sizes(self) -> str:
         """What was made: names, sizes, and the faces that are in parts."""
-        made = ((self._name(path), data) for path, data in self._made.items())
-        return ", ".join(", ".join([name, _size(len(data)), *map(str, self.written[name].cut)]) for name, data in made)
+        made = self.made.items()
+        return ", ".join(", ".join([self._name(p), _size(len(m.data)), *map(str, m.written.cut)]) for p, m in made)
 
     def body(self) -> dict[str, Any]:
         """What was made, for a report; faces count from 1."""
+        made = {self._name(path): each for path, each in self.made.items()}
         return {
-            "written": list(self.written),
-            "lost": {name: [asdict(lost) for lost in each.lost] for name, each in self.written.items()},
+            "written": list(made),
+            "lost": {name: [asdict(lost) for lost in each.written.lost] for name, each in made.items()},
             "cut": {
-                name: [{"face": cut.face + 1, "parts": cut.parts} for cut in each.cut]
-                for name, each in self.written.items()
+                name: [{"face": cut.face + 1, "parts": cut.parts} for cut in each.written.cut]
+                for name, each in made.items()
             },
+            "read_back": {name: read_back(each.read_back) for name, each in made.items()},
         }
 
     @staticmethod

@@ -120,6 +120,13 @@ overwrite = click.option("--overwrite", is_flag=True, help="Replace an existing 
 if_changed = click.option(
     "--if-changed", is_flag=True, help="Replace an existing output only where its content changes, as make likes it."
 )
+verify = click.option(
+    "--verify",
+    type=click.Choice(["on", "off"]),
+    default="on",
+    show_default=True,
+    help="Read outputs back before they take their place, and judge them; off: write them as they come.",
+)
 as_json = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 debug = click.option("--debug", is_flag=True, expose_value=False, help="Show the traceback of an error.")
 
@@ -135,7 +142,7 @@ limiting = apply(
     ),
 )
 reading = apply(source, input_unit, encoding)
-writing = apply(outputs, format, schema, chord, angle, ascii_stl, overwrite, if_changed)
+writing = apply(outputs, format, schema, chord, angle, ascii_stl, verify, overwrite, if_changed)
 printing = apply(as_json, limiting, debug)
 reports = apply(
     click.option("--junit", metavar="F.xml", type=click.Path(), help="Write the verdict as JUnit, a case a layer."),

@@ -6,6 +6,8 @@ import json
 import math
 import sys
 from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import msgspec
@@ -13,11 +15,13 @@ import msgspec
 from mracad.options import Selection
 
 if TYPE_CHECKING:
+    from mracad.audit.accept import Fault, ReadBack
     from mracad.audit.continuity import SeamMeasure, SeamSummary
     from mracad.constraint.seam import Treatment
     from mracad.edit.result import FaceOutcome
     from mracad.job import Judged, Report
     from mracad.occ.check import Validity
+    from mracad.produce import Made
     from mracad.recipe import Step
 
 SHOWN = 6
@@ -64,8 +68,26 @@ def step_lines(step: Step, result: Report | Judged) -> list[str]:
     return [f"{step.id}: failed: {failure}" for failure in result.failures]
 
 
-def edit_lines(report: Report, options: Selection, end: str) -> list[str]:
-    """The four lines after an edit; ``end`` is that of the last one."""
+@dataclass(frozen=True)
+class Found:
+    """What is said of files that were read back."""
+
+    valid: bool
+    how: str = "as read back"
+
+    @property
+    def words(self) -> str:
+        return f"{verdict(self.valid)}, {self.how}"
+
+
+def found(made: Sequence[Made]) -> Found | None:
+    """What is said of outputs; None where they were not read back."""
+    known = [each.read_back for each in made if each.read_back]
+    return Found(all(each.valid for each in known)) if known else None
+
+
+def edit_lines(report: Report, options: Selection, end: str, found: Found | None = None) -> list[str]:
+    """The four lines after an edit; ``end`` is that of the last one, ``found`` what its files are as read back."""
     from mracad.audit.continuity import key, summary
 
     edit, model = report.edit, report.model
@@ -104,7 +126,8 @@ def edit_lines(report: Report, options: Selection, end: str) -> list[str]:
         lines[-1] += f"; {len(worse)} less smooth"
     if edit.edges:
         lines[-1] += f"; {edge_words(edit.edges)}"
-    lines.append(f"valid: {verdict(report.valid_after.valid)} (was {verdict(report.valid_before.valid)}); {end}")
+    now = found or Found(report.valid_after.valid, "in memory")
+    lines.append(f"valid: {now.words} (was {verdict(report.valid_before.valid)}); {end}")
     return lines
 
 
@@ -231,6 +254,17 @@ def report(value: Report) -> dict[str, Any]:
         },
         "valid": {"before": validity(value.valid_before), "after": validity(value.valid_after)},
     }
+
+
+def read_back(value: ReadBack | None) -> dict[str, Any] | None:
+    """What an output is as read back; None where it was not."""
+    if value is None:
+        return None
+    return {**plain(value), "faults": _faults(value.faults), "forgiven": _faults(value.forgiven)}
+
+
+def _faults(faults: Sequence[Fault]) -> list[dict[str, Any]]:
+    return [{**plain(fault), "faces": [face + 1 for face in fault.faces]} for fault in faults]
 
 
 def validity(value: Validity) -> dict[str, Any]:

@@ -16,7 +16,6 @@ from mracad_cli.progress import Progress
 
 if TYPE_CHECKING:
     from mracad.job import Judged, Report
-    from mracad.occ import Document
     from mracad.recipe import Recipe, Step
 
 
@@ -72,36 +71,38 @@ def run_steps(
         progress("reading", 0, 1)
         text = load(source)
         document = read(text, input_unit, encoding)
-        from mracad import job
         from mracad.occ.files import read as read_again
+        from mracad.produce import produce
 
-        def original() -> Document:
-            return read_again(text, input_unit, encoding)
-
-        results = job.play(document, steps, original=original, progress=progress, apply=not dry_run)
-        failed = isinstance(results[-1], job.Judged) and not results[-1].passed
-        written = not (dry_run or failed)
-        if written:
-            progress("writing", 0, 1)
-            targets.make(document, title(steps))
-    body = _body(document.name, steps, results, recipe)
+        done = produce(
+            document,
+            lambda: read_again(text, input_unit, encoding),
+            steps,
+            () if dry_run else targets.targets(),
+            title=title(steps),
+            verify=targets.verify,
+            progress=progress,
+        )
+    targets.take(done.made)
+    body = _body(document.name, steps, done.results, recipe)
     body |= {"warnings": document.warnings, **targets.body()}
     files: dict[str, str | None] = {report: render.json_text(body, 1) + "\n"} if report else {}
-    if written:
+    if done.made:
         files |= dict.fromkeys(records, record_of(steps))
         needs = [source] * (source != "-") + needed(steps, recipe)
         files |= {depfile: depfile_text(targets.files(), needs)} if depfile else {}
-    end = f"wrote {targets.sizes()}" if written else f"{'dry run, ' if dry_run else ''}nothing written"
+    end = f"wrote {targets.sizes()}" if done.made else f"{'dry run, ' if dry_run else ''}nothing written"
     end += "" if dry_run else f", {time.perf_counter() - start:.1f} s"
+    found = render.found(done.made)
     if as_json:
         lines = [render.json_text(body)]
     elif recipe:
-        told = [line for step, result in zip(steps, results, strict=False) for line in render.step_lines(step, result)]
-        lines = [*(plan(steps) if dry_run else []), *told, end]
+        told = [line for step, result in zip(steps, done.results, strict=False) for line in render.step_lines(step, result)]
+        lines = [*(plan(steps) if dry_run else []), *told, f"valid: {found.words}; {end}" if found else end]
     else:
-        lines = render.edit_lines(results[0], steps[0].options, end)  # type: ignore[arg-type]  # it is an edit
+        lines = render.edit_lines(done.results[0], steps[0].options, end, found)  # type: ignore[arg-type]  # it is an edit
     targets.deliver(files, lines)
-    return 1 if failed else 0
+    return 0 if done.passed else 1
 
 
 def _body(

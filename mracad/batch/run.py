@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, Protocol
 
+from mracad.audit.accept import ReadBack
 from mracad.batch.cluster import lost
 from mracad.batch.manifest import Manifest, digest
 from mracad.batch.work import Product, Work, do
@@ -47,6 +48,8 @@ class Settings:
     input_unit, encoding : str or None
     schema : str
         Of STEP files; by default AP242 for a file in AP242, else AP214.
+    verify : bool
+        Read each output back and judge it.
     overwrite : bool
         Replace files in the output folder that no batch has made.
     if_changed : bool
@@ -62,6 +65,7 @@ class Settings:
     input_unit: str | None = None
     encoding: str | None = None
     schema: str = ""
+    verify: bool = True
     overwrite: bool = False
     if_changed: bool = False
     record: bool = False
@@ -89,6 +93,8 @@ class Outcome:
         What each step did, in short.
     warnings : tuple of str
         What had to be guessed or is lost.
+    read_back : ReadBack or None
+        What the output is as read back, where it was.
     """
 
     file: str
@@ -101,6 +107,7 @@ class Outcome:
     attempts: int = 0
     steps: tuple[dict[str, Any], ...] = ()
     warnings: tuple[str, ...] = ()
+    read_back: ReadBack | None = None
 
 
 class Workers(Protocol):
@@ -251,6 +258,7 @@ class _Batch:
             self.settings.encoding,
             item.format,
             self.settings.schema,
+            self.settings.verify,
             files,
             self._epoch,
         )
@@ -300,7 +308,7 @@ class _Batch:
         parts = [work.name, digest(work.data), record_of(work.steps), files]
         return digest(
             json.dumps(
-                [*parts, work.input_unit, work.encoding, work.format, work.schema, work.epoch], sort_keys=True
+                [*parts, work.input_unit, work.encoding, work.format, work.schema, work.verify, work.epoch], sort_keys=True
             ).encode()
         )
 
@@ -316,6 +324,7 @@ class _Batch:
             attempts=task.attempts,
             steps=product.steps,
             warnings=product.warnings,
+            read_back=product.read_back,
         )
 
 

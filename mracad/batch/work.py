@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib
-import io
 import os
 import tempfile
 import time
@@ -17,6 +16,7 @@ from mracad.options import STEPS
 from mracad.recipe import Step, relocated, title, versions
 
 if TYPE_CHECKING:
+    from mracad.audit.accept import ReadBack
     from mracad.job import Judged, Report
     from mracad.occ import Document
 
@@ -35,6 +35,8 @@ class Work:
     input_unit, encoding : str or None
     format, schema : str
         Of the output; see ``mracad.occ.files.write``.
+    verify : bool
+        Read the output back and judge it.
     files : mapping
         The content of the files that the steps name.
     epoch : str or None
@@ -50,6 +52,7 @@ class Work:
     encoding: str | None = None
     format: str = "step"
     schema: str = ""
+    verify: bool = True
     files: Mapping[str, bytes] = field(default_factory=dict, repr=False)
     epoch: str | None = None
     versions: Mapping[str, str] = field(default_factory=versions)
@@ -57,12 +60,14 @@ class Work:
 
 @dataclass(frozen=True)
 class Product:
-    """The file that came out, for each step what it did, in short, what was lost, and the seconds that it took."""
+    """The file that came out, for each step what it did, in short, what was lost, the seconds that it took, and what it is
+    as read back (None where it was not)."""
 
     data: bytes = field(repr=False)
     steps: tuple[dict[str, Any], ...]
     warnings: tuple[str, ...]
     seconds: float
+    read_back: ReadBack | None = None
 
 
 def warm() -> None:
@@ -79,8 +84,8 @@ def do(work: Work) -> Product:
     MracadError
         When a step cannot be done or a check fails.
     """
-    from mracad.job import Judged, play
-    from mracad.occ import write
+    from mracad.job import Judged
+    from mracad.produce import Target, produce
 
     start = time.perf_counter()
     for name, version in versions().items():
@@ -91,19 +96,22 @@ def do(work: Work) -> Product:
         os.environ.pop("SOURCE_DATE_EPOCH", None)
     else:
         os.environ["SOURCE_DATE_EPOCH"] = work.epoch
-    document = _read(work)
+    target = Target(work.name, work.format, work.schema)
     with tempfile.TemporaryDirectory() as folder:
-        results = play(document, _here(work, Path(folder)), original=lambda: _read(work))
-    last = results[-1]
+        steps = _here(work, Path(folder))
+        document = _read(work)
+        done = produce(
+            document, lambda: _read(work), steps, [target], title=title(work.steps), verify=work.verify
+        )
+    last = done.results[-1]
     if isinstance(last, Judged) and not last.passed:
         more = f" (and {len(last.failures) - 1} more)" if len(last.failures) > 1 else ""
-        raise MracadError(f"{work.steps[len(results) - 1].id}: {last.failures[0]}{more}", code=Code.FAILED_CHECK)
-    output = io.BytesIO()
-    written = write(document, output, work.format, schema=work.schema, options_text=title(work.steps))
-    short = ({"step": step.id, **_short(result)} for step, result in zip(work.steps, results, strict=True))
-    lost = (f"the output lacks {what}" for what in written.lost)
-    warnings = (*document.warnings, *lost, *(f"the output has {cut}" for cut in written.cut))
-    return Product(output.getvalue(), tuple(short), warnings, time.perf_counter() - start)
+        raise MracadError(f"{work.steps[len(done.results) - 1].id}: {last.failures[0]}{more}", code=Code.FAILED_CHECK)
+    made = done.made[0]
+    short = ({"step": step.id, **_short(result)} for step, result in zip(work.steps, done.results, strict=True))
+    lost = (f"the output lacks {what}" for what in made.written.lost)
+    warnings = (*document.warnings, *lost, *(f"the output has {cut}" for cut in made.written.cut))
+    return Product(made.data, tuple(short), warnings, time.perf_counter() - start, made.read_back)
 
 
 def _read(work: Work) -> Document:

@@ -49,6 +49,7 @@ from mracad_cli import options
         help="Format of the outputs, and their ending.  [default: that of each input]",
     ),
     options.schema,
+    options.verify,
     options.overwrite,
     options.if_changed,
     options.record,

@@ -17,18 +17,31 @@ def command(
 ) -> int:
     import time
 
-    from mracad_cli.files import Outputs, read
-    from mracad_cli.render import json_text
+    from mracad_cli import render
+    from mracad_cli.files import Outputs, load, read
 
     start = time.perf_counter()
     targets = Outputs(outputs, **formats)
     with Progress() as progress:
         progress("reading", 0, 1)
-        document = read(source, input_unit, encoding)
-        progress("writing", 0, 1)
-        targets.make(document, "convert")
-    line = f"{document.name}: wrote {targets.sizes()}, {time.perf_counter() - start:.1f} s"
+        text = load(source)
+        document = read(text, input_unit, encoding)
+        from mracad.occ.files import read as read_again
+        from mracad.produce import produce
+
+        done = produce(
+            document,
+            lambda: read_again(text, input_unit, encoding),
+            targets=targets.targets(),
+            title="convert",
+            verify=targets.verify,
+            progress=progress,
+        )
+    targets.take(done.made)
+    found = render.found(done.made)
+    valid = f"valid: {found.words}; " if found else ""
+    line = f"{document.name}: {valid}wrote {targets.sizes()}, {time.perf_counter() - start:.1f} s"
     if as_json:
-        line = json_text({"file": document.name, "warnings": document.warnings, **targets.body()})
+        line = render.json_text({"file": document.name, "warnings": document.warnings, **targets.body()})
     targets.deliver({}, [line])
     return 0

@@ -1,0 +1,241 @@
+"""From a file to files: read, taken through steps, written, read back and judged before anything takes its place."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+from mracad import review
+from mracad.audit import accept
+from mracad.audit.accept import Facts, Fault, ReadBack, Slack
+from mracad.errors import EditError
+from mracad.formats import FORMATS
+from mracad.job import Judged, Original, Progress, Report, play
+from mracad.options import length
+
+if TYPE_CHECKING:
+    from mracad.occ.document import Document
+    from mracad.occ.files import Written
+    from mracad.recipe import Step
+
+ROUNDS = 8
+"""How often an edit is done again, each time without the faces of which the file would be worse."""
+
+WORSE = "the file would be worse there"
+"""The reason for which such faces are left."""
+
+
+@dataclass(frozen=True)
+class Target:
+    """A file to be made: its name, and how it is written (see :func:`mracad.occ.files.write`).
+
+    Attributes
+    ----------
+    chord : str
+        Meshes: a length, which may be a share of the diagonal.
+    """
+
+    name: str
+    format: str = "step"
+    schema: str = ""
+    chord: str = "0.02%"
+    angle: float | None = None
+    ascii: bool = False
+
+
+@dataclass(frozen=True)
+class Made:
+    """The content of a file, what it has otherwise than the document, and what it is as read back (None where it was not).
+    """
+
+    target: Target
+    data: bytes = field(repr=False)
+    written: Written
+    read_back: ReadBack | None = None
+
+
+@dataclass(frozen=True)
+class Production:
+    """What came of a document: what each step did, and the files; none where a check failed or on a dry run."""
+
+    results: tuple[Report | Judged, ...] = ()
+    made: tuple[Made, ...] = ()
+
+    @property
+    def passed(self) -> bool:
+        """Whether every check held."""
+        last = self.results[-1] if self.results else None
+        return not isinstance(last, Judged) or last.passed
+
+
+def produce(
+    document: Document,
+    original: Original,
+    steps: Sequence[Step] = (),
+    targets: Sequence[Target] = (),
+    *,
+    title: str = "",
+    verify: bool = True,
+    progress: Progress | None = None,
+) -> Production:
+    """Take a document through steps, and make files of it.
+
+    Every file is read back and judged by the document.  Where it is worse, and worse than what the kernel alone makes
+    of the input, the steps are done again without the faces that cause it.
+
+    Parameters
+    ----------
+    document : Document
+        Changed in place.
+    original : callable
+        Reads it again as it was.
+    steps : sequence of Step
+    targets : sequence of Target
+        None for a dry run.
+    title : str
+        What was done, for the header of the files.
+    verify : bool
+        False to make the files as they come.
+
+    Raises
+    ------
+    EditError
+        When a step cannot be done, or a file would be worse whatever is left.
+    """
+    spoiled: dict[int, str] = {}
+    faults: tuple[tuple[Target, Fault], ...] = ()
+    copies = _Copies(original)
+    for number in range(ROUNDS):
+        if number:
+            document = original()
+        try:
+            results = play(document, steps, original=original, progress=progress, apply=bool(targets), spoiled=spoiled)
+        except EditError as error:
+            if faults:
+                raise _refused(document.name, faults) from error
+            raise
+        done = Production(tuple(results))
+        if not (targets and done.passed):
+            return done
+        if progress:
+            progress("writing", 0, 1)
+        made = tuple(_made(document, target, title) for target in targets)
+        if verify:
+            if progress:
+                progress("reading back", 0, 1)
+            memory = _Memory(document, results)
+            made = tuple(_judged(each, memory, copies) for each in made)
+        faults = tuple((each.target, fault) for each in made if each.read_back for fault in each.read_back.faults)
+        if not faults:
+            return replace(done, made=made)
+        edited = memory.edited - spoiled.keys()
+        if not edited:
+            break
+        left = accept.spoilt((fault for _, fault in faults), edited, memory.facts.model)
+        spoiled |= dict.fromkeys(left, WORSE)
+    raise _refused(document.name, faults)
+
+
+class _Memory:
+    """The document that was written."""
+
+    def __init__(self, document: Document, results: Sequence[Report | Judged]) -> None:
+        self.document = document
+        self.reports = [result for result in results if isinstance(result, Report)]
+        self.edited = {o.face for report in self.reports for o in report.edit.faces("edited")}
+
+    @cached_property
+    def facts(self) -> Facts:
+        from mracad.occ.facts import facts
+
+        return facts(self.document)
+
+    @cached_property
+    def open_faces(self) -> frozenset[int]:
+        """Faces of shells that are not closed."""
+        return review.open_faces(self.facts.model)
+
+    @property
+    def slack(self) -> Slack:
+        ways: dict[str, set[tuple[int, int]]] = {"coupled": set(), "mended": set(), "to tolerance": set()}
+        for report in self.reports:
+            for edge in report.edit.edges:
+                if edge.how in ways and len(edge.faces) == 2:
+                    ways[edge.how].add((min(edge.faces), max(edge.faces)))
+        return Slack(ways["coupled"] | ways["mended"], ways["to tolerance"])
+
+
+class _Copies:
+    """What the kernel alone makes of the input: read, written in the same format, read back; made where asked for."""
+
+    def __init__(self, original: Original) -> None:
+        self.original = original
+        self._made: dict[tuple[str, str], Facts] = {}
+
+    @cached_property
+    def input(self) -> Facts:
+        from mracad.occ.facts import facts
+
+        return facts(self.original())
+
+    def of(self, target: Target) -> tuple[Facts, Facts]:
+        """Facts of the input and of its copy."""
+        key = target.format, target.schema
+        if key not in self._made:
+            self._made[key] = _read_back(_made(self.original(), target, "").data, target)
+        return self.input, self._made[key]
+
+
+def _made(document: Document, target: Target, title: str) -> Made:
+    """A file of a document, as it comes."""
+    from mracad.occ.files import write
+
+    meshed = FORMATS[target.format].kind == "mesh"
+    stream = io.BytesIO()
+    written = write(
+        document,
+        stream,
+        target.format,
+        schema=target.schema,
+        chord=length(target.chord, review.diagonal(document), "chord") if meshed else None,
+        angle=target.angle,
+        ascii=target.ascii,
+        options_text=title,
+    )
+    return Made(target, stream.getvalue(), written)
+
+
+def _read_back(data: bytes, target: Target) -> Facts:
+    """The facts of a file, from its bytes alone."""
+    from mracad.occ.facts import facts
+    from mracad.occ.files import read
+    from mracad.occ.load import Text
+
+    return facts(read(Text(data, target.name)))
+
+
+def _judged(made: Made, memory: _Memory, copies: _Copies) -> Made:
+    """A file with what it is, read back."""
+    if FORMATS[made.target.format].kind == "mesh":
+        return made
+    file = _read_back(made.data, made.target)
+    faults = accept.judge(memory.facts, file, memory.slack)
+    forgiven: tuple[Fault, ...] = ()
+    if any(fault.reason not in accept.CONTENT for fault in faults):
+        copy = copies.of(made.target) if memory.edited else (memory.facts, file)
+        left = accept.judge(memory.facts, file, memory.slack, copy)
+        faults, forgiven = left, tuple(fault for fault in faults if fault not in left)
+    return replace(made, read_back=accept.read_back(file, faults, forgiven))
+
+
+def _refused(name: str, faults: Sequence[tuple[Target, Fault]]) -> EditError:
+    """The error that names what would be worse, the worst kind first."""
+    target, fault = min(faults, key=lambda each: list(accept.Reason).index(each[1].reason))
+    more = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
+    return EditError(
+        f"{name}: {target.format.upper()} would not keep it, as read back: {fault}{more}",
+        "write BREP, which the kernel does not alter" if target.format in ("step", "iges") else "leave these faces out",
+    )
