@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
 from mracad import review
@@ -48,8 +48,7 @@ class Target:
 
 @dataclass(frozen=True)
 class Made:
-    """The content of a file, what it has otherwise than the document, and what it is as read back (None where it was not).
-    """
+    """The content of a file, what it has otherwise than the document, what it is as read back (None: it was not)."""
 
     target: Target
     data: bytes = field(repr=False)
@@ -134,7 +133,7 @@ def produce(
         edited = memory.edited - spoiled.keys()
         if not edited:
             break
-        left = accept.spoilt((fault for _, fault in faults), edited, memory.facts.model)
+        left = accept.spoilt((fault for _, fault in faults), edited, memory.facts)
         spoiled |= dict.fromkeys(left, WORSE)
     raise _refused(document.name, faults)
 
@@ -152,11 +151,6 @@ class _Memory:
         from mracad.occ.facts import facts
 
         return facts(self.document)
-
-    @cached_property
-    def open_faces(self) -> frozenset[int]:
-        """Faces of shells that are not closed."""
-        return review.open_faces(self.facts.model)
 
     @property
     def slack(self) -> Slack:
@@ -222,13 +216,9 @@ def _judged(made: Made, memory: _Memory, copies: _Copies) -> Made:
     if FORMATS[made.target.format].kind == "mesh":
         return made
     file = _read_back(made.data, made.target)
-    faults = accept.judge(memory.facts, file, memory.slack)
-    forgiven: tuple[Fault, ...] = ()
-    if any(fault.reason not in accept.CONTENT for fault in faults):
-        copy = copies.of(made.target) if memory.edited else (memory.facts, file)
-        left = accept.judge(memory.facts, file, memory.slack, copy)
-        faults, forgiven = left, tuple(fault for fault in faults if fault not in left)
-    return replace(made, read_back=accept.read_back(file, faults, forgiven))
+    slack = replace(memory.slack, parts={cut.face: cut.parts for cut in made.written.cut})
+    copy = partial(copies.of, made.target) if memory.edited else None
+    return replace(made, read_back=accept.read_back(file, *accept.judge(memory.facts, file, slack, copy)))
 
 
 def _refused(name: str, faults: Sequence[tuple[Target, Fault]]) -> EditError:

@@ -97,7 +97,9 @@ def run_steps(
     if as_json:
         lines = [render.json_text(body)]
     elif recipe:
-        told = [line for step, result in zip(steps, done.results, strict=False) for line in render.step_lines(step, result)]
+        told = [
+            line for step, result in zip(steps, done.results, strict=False) for line in render.step_lines(step, result)
+        ]
         lines = [*(plan(steps) if dry_run else []), *told, f"valid: {found.words}; {end}" if found else end]
     else:
         lines = render.edit_lines(done.results[0], steps[0].options, end, found)  # type: ignore[arg-type]  # it is an edit

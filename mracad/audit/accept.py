@@ -7,7 +7,7 @@ well (the *copy*) is the kernel's own doing and is forgiven, but never that a fa
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import cached_property
@@ -15,10 +15,9 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from mracad.audit.continuity import SeamMeasure, summary
+from mracad.audit.continuity import SeamMeasure
 
 if TYPE_CHECKING:
-    from mracad.model import Model
     from mracad.occ.check import Validity
 
 Array = np.ndarray
@@ -62,6 +61,9 @@ class Reason(StrEnum):
 CONTENT = frozenset({Reason.LOST, Reason.AREA, Reason.VOLUME, Reason.BOX, Reason.OPEN})
 """What is not forgiven though the kernel's own copy has it, too."""
 
+_LAID = 1e-8  # mm: an edge of which no point lies farther off is the same
+_NEAR = 0.1  # share of the diagonal: faces that are farther apart are not the same
+
 _COUNTS = {
     Reason.SOLIDS: "solids", Reason.SHELLS: "shells", Reason.FACES: "faces", Reason.FREE_EDGES: "free_edges",
 }  # fmt: skip
@@ -102,7 +104,6 @@ class Fault:
     def key(self) -> tuple[Reason, tuple[int, ...], str]:
         """What identifies it in another file."""
         return self.reason, self.faces, self.status
-
 
     def __str__(self) -> str:
         where = " and ".join(f"#{face + 1}" for face in self.faces[:2]) + (" …" if len(self.faces) > 2 else "")
@@ -146,10 +147,10 @@ class ReadBack:
         In the document and in the file, mm³; None where no face is another one, so that it was not measured.
     tolerance : float
         The largest, mm.
-    seams, smooth : int
-        Seams, and those that are smooth.
+    seams : int
+        Seams that a reader lays otherwise than in the document, so that they were measured.
     gap, angle : float
-        The largest of all, mm, and of the smooth ones, degrees.
+        The largest of these, mm, and of the smooth ones among them, degrees.
     faults : tuple of Fault
         What is worse than in the document and than in the kernel's own copy of the input.
     forgiven : tuple of Fault
@@ -162,7 +163,6 @@ class ReadBack:
     volume: tuple[float, float] | None
     tolerance: float
     seams: int
-    smooth: int
     gap: float
     angle: float
     faults: tuple[Fault, ...]
@@ -171,32 +171,54 @@ class ReadBack:
 
 def read_back(file: Facts, faults: tuple[Fault, ...], forgiven: tuple[Fault, ...] = ()) -> ReadBack:
     """The figures of a file and the verdict on it."""
-    totals, validity = summary(file.seams), file.validity
+    measured = [f for f in (*faults, *forgiven) if f.reason in (Reason.GAP, Reason.ANGLE)]
     hull = _hull(file.spots).tolist()
     volume = next(((fault.was, fault.value) for fault in faults if fault.reason is Reason.VOLUME), None)
     return ReadBack(
-        valid=validity.valid and not faults,
+        valid=file.probe.validity().valid and not faults,
         counts=file.counts,
         box=(tuple(hull[:3]), tuple(hull[3:])),
         volume=volume,
-        tolerance=max(validity.edge_tolerance, validity.vertex_tolerance),
-        seams=totals.seams,
-        smooth=totals.smooth,
-        gap=totals.gap,
-        angle=totals.angle,
+        tolerance=file.tolerance,
+        seams=len({f.faces for f in measured}),
+        gap=max((f.value for f in measured if f.reason is Reason.GAP), default=0.0),
+        angle=max((f.value for f in measured if f.reason is Reason.ANGLE), default=0.0),
         faults=faults,
         forgiven=forgiven,
     )
 
 
 class Probe(Protocol):
-    """Exact measures that are taken only where something differs; see :class:`mracad.occ.facts.Probe`."""
+    """Measures that are taken only where something differs; see :class:`mracad.occ.facts.Probe`."""
 
-    def area(self, face: int) -> float: ...
+    def validity(self) -> Validity: ...
+
+    def seams(self, edges: Collection[int]) -> list[SeamMeasure]: ...
+
+    def area(self, face: int, exact: bool) -> float: ...
 
     def volume(self) -> float: ...
 
     def box(self) -> Array: ...
+
+
+@dataclass(frozen=True, eq=False)
+class Line:
+    """An edge at a few places.
+
+    Attributes
+    ----------
+    faces : tuple of int
+        Those that use it, once for each use.
+    points : ndarray (1 + n, k, 3)
+        Points of its own curve and of each face along it, in the part's frame, mm.
+    tolerance : float
+        mm.
+    """
+
+    faces: tuple[int, ...]
+    points: Array
+    tolerance: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -205,160 +227,230 @@ class Facts:
 
     Attributes
     ----------
-    model : Model
-    validity : Validity
-    seams : list of SeamMeasure
+    diagonal : float
+        mm.
+    counts : Counts
     spots : ndarray (p, 9)
         Where each placed face is: corners of its box, middle of its vertices, mm.
-    owners : ndarray (p,)
+    owners : ndarray of int (p,)
         The face that each of them is.
-    areas : ndarray (f,)
-        Of the faces, mm², by a quadrature that is the same for the same face, though it may be inexact.
-    vertex_tolerances : ndarray (f,)
-        The largest among the vertices of each face, mm.
-    counts : Counts
+    closing : frozenset of int
+        Faces on surfaces that close: their edges do not tell which side of them is meant.
+    vertices : ndarray (f,)
+        The largest tolerance among the vertices of each face, mm.
+    edges : tuple of Line
+        All that are not degenerate or, where they are, have no faces.
     probe : Probe
     """
 
-    model: Model
-    validity: Validity
-    seams: list[SeamMeasure]
+    diagonal: float
+    counts: Counts
     spots: Array
     owners: Array
-    areas: Array
-    vertex_tolerances: Array
-    counts: Counts
+    closing: frozenset[int]
+    vertices: Array
+    edges: tuple[Line, ...]
     probe: Probe
 
-    @cached_property
-    def borders(self) -> Array:
-        """Area that the tolerances of each face's edges leave open, ``(f,)``, mm²."""
-        found = np.zeros(len(self.areas))
-        for edge in self.model.edges:
-            if len(edge.points):
-                length = float(np.linalg.norm(np.diff(edge.points, axis=0), axis=1).sum())
-                for side in edge.sides:
-                    found[side.face] += 2 * edge.tolerance * length
-        return found
+    @property
+    def count(self) -> int:
+        """The number of faces, instances counted once."""
+        return len(self.vertices)
+
+    @property
+    def tolerance(self) -> float:
+        """The largest, mm."""
+        return max([*(edge.tolerance for edge in self.edges), float(self.vertices.max(initial=0.0))])
 
 
 @dataclass(frozen=True)
 class Slack:
-    """Pairs of faces whose seams moved, exactly or to the tolerance: these may differ by what that allows."""
+    """What may differ: pairs of faces whose seams moved, exactly or to the tolerance, and faces written in parts."""
 
     moved: Collection[Pair] = ()
     loose: Collection[Pair] = ()
+    parts: Mapping[int, int] = field(default_factory=dict)
 
 
-@dataclass(frozen=True)
-class _Known:
-    """The facts of a file by the faces of the document that it was written from."""
+class _File:
+    """A file by the faces of the document that it was written from."""
 
-    facts: Facts
-    partners: dict[int, int]
-    failures: Counter[tuple[str, str, int | None]] = field(default_factory=Counter)
-    seams: Mapping[Pair, list[SeamMeasure]] = field(default_factory=dict)
-    tolerances: Mapping[tuple[int, ...], float] = field(default_factory=dict)
+    def __init__(self, facts: Facts, document: Facts, parts: Collection[int] = ()) -> None:
+        self.facts = facts
+        self.partners = {i: i for i in range(facts.count)} if facts is document else match(document, facts, parts)
+        pairs = [tuple(sorted(self.partners.get(face, -1) for face in edge.faces)) for edge in facts.edges]
+        self.pairs: list[tuple[int, ...]] = pairs
+
+    @cached_property
+    def failures(self) -> Counter[tuple[str, str, int | None]]:
+        return Counter(
+            (f.kind, f.status, None if f.face is None else self.partners.get(f.face))
+            for f in self.facts.probe.validity().failures
+        )
+
+    def seams(self, pairs: Collection[tuple[int, ...]]) -> dict[tuple[int, ...], list[SeamMeasure]]:
+        """The seams between pairs of faces, measured."""
+        edges = [number for number, pair in enumerate(self.pairs) if pair in pairs]
+        open_ones = [number for number, edge in enumerate(self.facts.edges) if len(edge.faces) == 1]
+        if any(len(self.facts.edges[number].faces) == 1 for number in edges):
+            edges = sorted({*edges, *open_ones})
+        found: dict[tuple[int, ...], list[SeamMeasure]] = defaultdict(list)
+        for measure in self.facts.probe.seams(edges) if edges else ():
+            found[tuple(sorted(self.partners.get(face, -1) for face in measure.faces))].append(measure)
+        return found
+
+    def areas(self) -> Mapping[int, list[int]]:
+        """The faces that each face of the document is, one for each place."""
+        found: dict[int, list[int]] = defaultdict(list)
+        for face in self.facts.owners.tolist():
+            if face in self.partners:
+                found[self.partners[face]].append(face)
+        return found
 
 
-def judge(memory: Facts, file: Facts, slack: Slack, copy: tuple[Facts, Facts] | None = None) -> tuple[Fault, ...]:
-    """Where a file is worse than the document, and than the kernel's own copy of its input.
+def judge(
+    memory: Facts, file: Facts, slack: Slack, copy: Callable[[], tuple[Facts, Facts]] | None = None
+) -> tuple[tuple[Fault, ...], tuple[Fault, ...]]:
+    """Where a file is worse than the document: unforgivably, and only as the kernel's own copy of its input is.
 
     Parameters
     ----------
     memory, file : Facts
         Of the document that was written, and of the file.
     slack : Slack
-    copy : (Facts, Facts), optional
-        Of the input and of the kernel's own copy of it: without them nothing is forgiven.
+    copy : callable, optional
+        Gives the facts of the input and of the kernel's own copy of it, where they are needed; without it all that
+        is no loss of content is forgiven.
     """
-    known = _known(file, memory)
-    found = tuple(_faults(_known(memory, memory), known, slack))
-    if copy is None:
-        return found
-    own = _known(copy[1], copy[0])
-    again = Counter(fault.key for fault in _faults(own, known, slack, bodies=False))
-    return tuple(fault for fault in found if fault.reason in CONTENT or again[fault.key])
+    base, new = _File(memory, memory), _File(file, memory, slack.parts)
+    faults = tuple(_faults(base, new, slack))
+    soft = [fault for fault in faults if fault.reason not in CONTENT]
+    again: Counter[tuple[object, ...]] = Counter()
+    if soft and copy:
+        own = _File(copy()[1], copy()[0], slack.parts)
+        again = Counter(fault.key for fault in _beside(own, new, slack, {fault.faces for fault in soft}))
+    left = tuple(fault for fault in faults if fault.reason in CONTENT or again[fault.key])
+    return left, tuple(fault for fault in faults if fault not in left)
 
 
-def spoilt(faults: Iterable[Fault], edited: Collection[int], model: Model) -> set[int]:
-    """The edited faces to which faults are put down: those that they name, else their neighbours, else all."""
-    named = {face for fault in faults for face in fault.faces}
-    own = named & set(edited)
-    if own:
-        return own
-    beside = {
-        side.face
-        for edge in model.edges
-        if any(side.face in named for side in edge.sides)
-        for side in edge.sides
-    }
-    return beside & set(edited) or set(edited)
+def _faults(memory: _File, file: _File, slack: Slack) -> Iterator[Fault]:
+    """Where a file is worse than the document."""
+    changed = _changed(memory, file)
+    yield from _bodies(memory, file, slack, {face for pair in changed for face in pair})
+    yield from _beside(memory, file, slack, changed)
 
 
-def _faults(base: _Known, file: _Known, slack: Slack, bodies: bool = True) -> Iterator[Fault]:
-    """Where a file is worse than ``base``; ``bodies``: whether that has the same faces in the same places."""
-    for (_, status, face), count in (file.failures - base.failures).items():
-        yield Fault(Reason.INVALID, () if face is None else (face,), count, 0, status)
+def _beside(base: _File, file: _File, slack: Slack, pairs: Collection[tuple[int, ...]]) -> Iterator[Fault]:
+    """Where a file is worse than ``base``, its seams between some pairs of faces."""
+    if file.failures:
+        for (_, status, face), count in (file.failures - base.failures).items():
+            yield Fault(Reason.INVALID, () if face is None else (face,), count, 0, status)
+    more = sum(parts - 1 for parts in slack.parts.values())
     for reason, name in _COUNTS.items():
         value, was = getattr(file.facts.counts, name), getattr(base.facts.counts, name)
-        if value > was if reason is Reason.FREE_EDGES else value != was:
+        if value > was if reason is Reason.FREE_EDGES else not was <= value <= was + more * (reason is Reason.FACES):
             yield Fault(reason, (), value, was)
-    if bodies:
-        yield from _bodies(base.facts, file)
     yield from _tolerances(base, file, slack)
-    yield from _seams(base, file, slack)
+    yield from _seams(base, file, slack, pairs)
 
 
-def _bodies(memory: Facts, file: _Known) -> Iterator[Fault]:
+def _changed(memory: _File, file: _File) -> set[tuple[int, ...]]:
+    """The faces of edges that are not the same in the file."""
+    same: set[int] = set()
+    left: dict[tuple[int, ...], list[int]] = defaultdict(list)
+    for number, pair in enumerate(memory.pairs):
+        if number < len(file.pairs) and _same(memory, number, file, number):
+            same.add(number)
+        else:
+            left[pair].append(number)
+    changed = set()
+    for number, pair in enumerate(file.pairs):
+        if number in same:
+            continue
+        twin = next((other for other in left[pair] if _same(memory, other, file, number)), None)
+        if twin is None:
+            changed.add(pair)
+        else:
+            left[pair].remove(twin)
+    return changed | {pair for pair, numbers in left.items() if numbers}
+
+
+def _same(memory: _File, one: int, file: _File, other: int) -> bool:
+    a, b = memory.facts.edges[one], file.facts.edges[other]
+    if a.points.shape != b.points.shape:
+        return False
+    order = [b.faces.index(face) for face in sorted(set(b.faces), key=lambda face: file.partners.get(face, -1))]
+    if memory.pairs[one] != file.pairs[other]:
+        return False
+    sides = b.points if len(order) < len(b.faces) else b.points[[0, *(1 + i for i in order)]]
+    mine = a.points if len(order) < len(b.faces) else a.points[[0, *(1 + i for i in np.argsort(a.faces))]]
+    return float(np.abs(mine - sides).max(initial=0.0)) <= _LAID
+
+
+def _bodies(memory: _File, file: _File, slack: Slack, changed: Collection[int]) -> Iterator[Fault]:
     """Faces that are lost or others, and the volume and box of everything."""
-    found = file.facts
-    twins: dict[int, int] = {}
-    for new, old in file.partners.items():
-        twins.setdefault(old, new)
-    lost = [face for face in range(len(memory.areas)) if face not in twins]
-    yield from (Fault(Reason.LOST, (face,), 0.0, float(memory.areas[face])) for face in lost)
-    others = list(_areas(memory, found, twins))
+    old, new = memory.facts, file.facts
+    before, after = memory.areas(), file.areas()
+    lost = [face for face in range(old.count) if face not in after]
+    yield from (Fault(Reason.LOST, (face,), 0.0, old.probe.area(face, False)) for face in lost)
+    borders = _borders(old)
+    others = []
+    for face in sorted((old.closing | set(changed)) & after.keys()):
+        allowed = borders[face] * len(before[face])
+        for exact in (False, True):
+            value = sum(new.probe.area(twin, exact) for twin in after[face])
+            was = old.probe.area(face, exact) * len(before[face])
+            if abs(value - was) <= allowed + SAME * was:
+                break
+        else:
+            others.append(Fault(Reason.AREA, (face,), value, was))
     yield from others
-    if (lost or others or memory.counts != found.counts) and memory.counts.solids and found.counts.solids:
-        value, was = found.probe.volume(), memory.probe.volume()
+    solids = old.counts.solids and new.counts.solids
+    if solids and (lost or others or old.counts.solids != new.counts.solids):
+        value, was = new.probe.volume(), old.probe.volume()
         if abs(value - was) > SAME * abs(was):
-            yield Fault(Reason.VOLUME, tuple(lost) + tuple(f.faces[0] for f in others), value, was)
-    size = memory.model.diagonal
-    if not np.allclose(_hull(memory.spots), _hull(found.spots), rtol=0, atol=1e-9 * size):
-        far = float(np.abs(memory.probe.box() - found.probe.box()).max())
-        if far > SAME * size + 2 * max(memory.validity.edge_tolerance, memory.validity.vertex_tolerance):
+            yield Fault(Reason.VOLUME, (*lost, *(fault.faces[0] for fault in others)), value, was)
+    if not np.allclose(_hull(old.spots), _hull(new.spots), rtol=0, atol=1e-9 * old.diagonal):
+        far = float(np.abs(old.probe.box() - new.probe.box()).max())
+        if far > SAME * old.diagonal + 2 * old.tolerance:
             yield Fault(Reason.BOX, (), far, 0.0)
 
 
-def _areas(memory: Facts, found: Facts, twins: Mapping[int, int]) -> Iterator[Fault]:
-    """Faces whose area is another one."""
-    for face, twin in twins.items():
-        area = float(memory.areas[face])
-        allowed = SAME * area + float(memory.borders[face])
-        if abs(found.areas[twin] - area) > allowed:
-            value, was = found.probe.area(twin), memory.probe.area(face)
-            if abs(value - was) > allowed:
-                yield Fault(Reason.AREA, (face,), value, was)
+def _borders(facts: Facts) -> Array:
+    """Area that the tolerances of each face's edges leave open, ``(f,)``, mm²."""
+    found = np.zeros(facts.count)
+    for edge in facts.edges:
+        length = float(np.linalg.norm(np.diff(edge.points[0], axis=0), axis=1).sum())
+        for face in edge.faces:
+            found[face] += 2 * max(edge.tolerance, SLACK) * length
+    return found
 
 
 def _hull(spots: Array) -> Array:
     return np.concatenate([spots[:, :3].min(axis=0), spots[:, 3:6].max(axis=0)])
 
 
-def _tolerances(base: _Known, file: _Known, slack: Slack) -> Iterator[Fault]:
+def _tolerances(base: _File, file: _File, slack: Slack) -> Iterator[Fault]:
     """Edges and vertices with a larger tolerance than any had."""
-    limit = max(base.facts.validity.edge_tolerance, base.facts.validity.vertex_tolerance)
-    limit = max(limit, LOOSE if slack.loose else 0.0) + SLACK
-    for faces, value in file.tolerances.items():
-        if value > limit:
-            yield Fault(Reason.TOLERANCE, faces, value, limit - SLACK)
+    limit = max(base.facts.tolerance, LOOSE if slack.loose else 0.0)
+    found: dict[tuple[int, ...], float] = defaultdict(float)
+    for pair, edge in zip(file.pairs, file.facts.edges, strict=True):
+        found[pair] = max(found[pair], edge.tolerance)
+    for face, value in enumerate(file.facts.vertices.tolist()):
+        own = (file.partners.get(face, -1),)
+        found[own] = max(found[own], value)
+    for faces, value in found.items():
+        if value > limit + SLACK:
+            yield Fault(Reason.TOLERANCE, tuple(face for face in faces if face >= 0), value, limit)
 
 
-def _seams(base: _Known, file: _Known, slack: Slack) -> Iterator[Fault]:
+def _seams(base: _File, file: _File, slack: Slack, pairs: Collection[tuple[int, ...]]) -> Iterator[Fault]:
     """Seams that are gone, wider or less smooth."""
-    for pair, before in base.seams.items():
-        found = file.seams.get(pair, [])
+    new = file.seams(pairs)
+    for pair, before in base.seams(pairs).items():
+        if len(pair) != 2 or pair[0] < 0 or (pair not in pairs and pair not in new):
+            continue
+        found = new.get(pair, [])
         if not found:
             yield Fault(Reason.SEAM, pair, 0, len(before))
             continue
@@ -381,48 +473,44 @@ def _worst(found: list[SeamMeasure], before: list[SeamMeasure], what: str, room:
     return max(pairs, key=lambda p: p[0] - p[1], default=(0.0, 0.0))
 
 
-def _known(facts: Facts, document: Facts) -> _Known:
-    """Facts by the numbers that their faces have in a document."""
-    partners = {face: face for face in range(len(facts.areas))} if facts is document else match(document, facts)
-    failures = Counter(
-        (f.kind, f.status, None if f.face is None else partners.get(f.face)) for f in facts.validity.failures
-    )
-    seams: dict[Pair, list[SeamMeasure]] = defaultdict(list)
-    for measure in facts.seams:
-        pair = tuple(sorted(partners.get(face, -1) for face in measure.faces))
-        if pair[0] >= 0:
-            seams[pair].append(measure)  # type: ignore[index]
-    tolerances: dict[tuple[int, ...], float] = defaultdict(float)
-    for edge in facts.model.edges:
-        faces = tuple(sorted({partners[side.face] for side in edge.sides if side.face in partners}))
-        tolerances[faces] = max(tolerances[faces], edge.tolerance)
-    for face, value in enumerate(facts.vertex_tolerances.tolist()):
-        if face in partners:
-            tolerances[partners[face],] = max(tolerances[partners[face],], value)
-    return _Known(facts, partners, failures, seams, tolerances)
-
-
-def match(document: Facts, file: Facts) -> dict[int, int]:
+def match(document: Facts, file: Facts, parts: Collection[int] = ()) -> dict[int, int]:
     """The face of the document that each face of a file is.
 
-    Faces of the same number in the same place are; the others are those that are nearest.
+    Faces of the same number in the same place are; of the others those that are nearest; and what is left over and
+    lies within one of the ``parts`` is a part of that.
     """
     from scipy.optimize import linear_sum_assignment
 
-    scale = max(document.model.diagonal, 1e-300)
+    scale = max(document.diagonal, 1e-300)
     old, new = document.spots, file.spots
     same = min(len(old), len(new))
     alike = np.abs(old[:same] - new[:same]).max(axis=1) <= 1e-6 * scale
-    found = [(int(new), int(old)) for new, old in zip(file.owners[:same][alike], document.owners[:same][alike], strict=True)]
+    found = [*zip(file.owners[:same][alike].tolist(), document.owners[:same][alike].tolist(), strict=True)]
     rest_old, rest_new = (np.concatenate([np.flatnonzero(~alike), np.arange(same, len(each))]) for each in (old, new))
     if len(rest_old) and len(rest_new):
         apart = np.abs(new[rest_new][:, None] - old[rest_old][None]).max(axis=2)
         rows, columns = linear_sum_assignment(np.minimum(apart, scale))
-        near = apart[rows, columns] < 0.1 * scale
+        near = apart[rows, columns] < _NEAR * scale
         found += zip(
             file.owners[rest_new[rows[near]]].tolist(), document.owners[rest_old[columns[near]]].tolist(), strict=True
         )
     partners: dict[int, int] = {}
     for face, twin in found:
         partners.setdefault(face, twin)
+    whole = [(document.spots[place], face) for place, face in enumerate(document.owners.tolist()) if face in parts]
+    for place, face in enumerate(file.owners.tolist()):
+        if face not in partners:
+            spot, room = new[place], 1e-6 * scale
+            inside = [f for w, f in whole if (spot[:3] >= w[:3] - room).all() and (spot[3:6] <= w[3:6] + room).all()]
+            partners |= {face: inside[0]} if inside else {}
     return partners
+
+
+def spoilt(faults: Iterable[Fault], edited: Collection[int], memory: Facts) -> set[int]:
+    """The edited faces to which faults are put down: those that they name, else their neighbours, else all."""
+    named = {face for fault in faults for face in fault.faces}
+    own = named & set(edited)
+    if own:
+        return own
+    beside = {face for edge in memory.edges if named.intersection(edge.faces) for face in edge.faces}
+    return beside & set(edited) or set(edited)

@@ -308,7 +308,8 @@ class _Batch:
         parts = [work.name, digest(work.data), record_of(work.steps), files]
         return digest(
             json.dumps(
-                [*parts, work.input_unit, work.encoding, work.format, work.schema, work.verify, work.epoch], sort_keys=True
+                [*parts, work.input_unit, work.encoding, work.format, work.schema, work.verify, work.epoch],
+                sort_keys=True,
             ).encode()
         )
 

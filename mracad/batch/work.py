@@ -60,8 +60,8 @@ class Work:
 
 @dataclass(frozen=True)
 class Product:
-    """The file that came out, for each step what it did, in short, what was lost, the seconds that it took, and what it is
-    as read back (None where it was not)."""
+    """The file that came out, what each step did, in short, what was lost, the seconds that it took, and what the
+    file is as read back (None where it was not)."""
 
     data: bytes = field(repr=False)
     steps: tuple[dict[str, Any], ...]
@@ -100,9 +100,7 @@ def do(work: Work) -> Product:
     with tempfile.TemporaryDirectory() as folder:
         steps = _here(work, Path(folder))
         document = _read(work)
-        done = produce(
-            document, lambda: _read(work), steps, [target], title=title(work.steps), verify=work.verify
-        )
+        done = produce(document, lambda: _read(work), steps, [target], title=title(work.steps), verify=work.verify)
     last = done.results[-1]
     if isinstance(last, Judged) and not last.passed:
         more = f" (and {len(last.failures) - 1} more)" if len(last.failures) > 1 else ""

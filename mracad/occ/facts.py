@@ -1,45 +1,58 @@
-"""What the kernel says of a document, for :mod:`mracad.audit.accept`."""
+"""What the kernel says of a document, for :mod:`mracad.audit.accept`: a little of everything, the rest when asked."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from OCP.Bnd import Bnd_Box
 from OCP.BRep import BRep_Tool
+from OCP.BRepAdaptor import BRepAdaptor_Curve
 from OCP.BRepBndLib import BRepBndLib
 from OCP.BRepGProp import BRepGProp
+from OCP.Geom import Geom_ConicalSurface, Geom_CylindricalSurface, Geom_Plane
 from OCP.GProp import GProp_GProps
-from OCP.TopAbs import TopAbs_FACE, TopAbs_SHELL, TopAbs_SOLID, TopAbs_VERTEX
+from OCP.TopAbs import TopAbs_FACE, TopAbs_FORWARD, TopAbs_SHELL, TopAbs_SOLID, TopAbs_VERTEX
 from OCP.TopLoc import TopLoc_Location
-from OCP.TopoDS import TopoDS, TopoDS_Face
+from OCP.TopoDS import TopoDS, TopoDS_Edge, TopoDS_Face
 
-from mracad.audit.accept import Counts, Facts
-from mracad.audit.continuity import seams
-from mracad.model import Model
-from mracad.occ.check import check
+from mracad.audit.accept import Counts, Facts, Line
+from mracad.audit.continuity import SeamMeasure, seams
+from mracad.occ.check import Validity, check
 from mracad.occ.document import Document
 from mracad.occ.measure import mass
 from mracad.occ.settings import quiet
-from mracad.occ.topology import box, inside, matrix
+from mracad.occ.topology import box, edge_uses, inside, matrix
 from mracad.occ.view import view
 
 Array = np.ndarray
 _EXACT = 1e-6  # relative error of an area
+_PLACES = (0.03, 0.27, 0.5, 0.81, 0.98)  # of the range of an edge
 
 
 @dataclass(frozen=True, eq=False)
 class Probe:
-    """Exact measures of a document, taken when asked for."""
+    """Measures of a document that take long, taken when asked for."""
 
     document: Document
 
-    def area(self, face: int) -> float:
-        """Of a face, mm²."""
-        return _area(self.document.faces[face], _EXACT)
+    def validity(self) -> Validity:
+        """The kernel's verdict on everything."""
+        return self._validity
+
+    def seams(self, edges: Collection[int]) -> list[SeamMeasure]:
+        """The seams along some edges."""
+        return seams(view(self.document, edges=frozenset(edges)))
+
+    def area(self, face: int, exact: bool) -> float:
+        """Of a face, mm², by a quadrature that is the same for the same face, or exactly."""
+        surface = GProp_GProps()
+        with quiet():
+            BRepGProp.SurfaceProperties_s(self.document.faces[face], surface, *((_EXACT,) if exact else ()))
+        return surface.Mass()
 
     def volume(self) -> float:
         """Of all solids, placed, mm³."""
@@ -53,35 +66,89 @@ class Probe:
         return np.array([bounds.CornerMin().Coord(), bounds.CornerMax().Coord()])
 
     @cached_property
+    def _validity(self) -> Validity:
+        return check(self.document)
+
+    @cached_property
     def _volume(self) -> float:
         return mass(self.document).volume
 
 
 def facts(document: Document) -> Facts:
-    """Everything that a file is judged by."""
-    model = view(document)
+    """What a file is judged by."""
     with quiet():
+        lines, closing = _lines(document)
         places = list(_places(document))
-        areas = np.array([_area(face) for face in document.faces])
     spots, owners, loose = (np.array(each) for each in zip(*places, strict=True))
-    tolerances = np.zeros(len(document.faces))
-    tolerances[owners] = loose
+    vertices = np.zeros(len(document.faces))
+    vertices[owners] = loose
+    size = float(np.linalg.norm(spots[:, 3:6].max(axis=0) - spots[:, :3].min(axis=0)))
     return Facts(
-        model, check(document), seams(model), spots, owners, areas, tolerances, _counts(document, model), Probe(document)
+        size, _counts(document, lines), spots, owners, frozenset(closing), vertices, tuple(lines), Probe(document)
     )
 
 
-def _counts(document: Document, model: Model) -> Counts:
+def _counts(document: Document, lines: list[Line]) -> Counts:
     """What there is, placed."""
     times = [max(len(part.placements), 1) for part in document.parts]
-    free = Counter(edge.part for edge in model.edges if edge.free)
+    free: Counter[int] = Counter()
+    for number, part in enumerate(document.parts):
+        own = lines[part.first_edge : part.first_edge + part.edges.Extent()]
+        free[number] = sum(len(line.faces) == 1 for line in own)
 
     def placed(kind: object) -> int:
         return sum(n * sum(1 for _ in inside(part.shape, kind)) for n, part in zip(times, document.parts, strict=True))
 
     return Counts(
-        placed(TopAbs_SOLID), placed(TopAbs_SHELL), placed(TopAbs_FACE), sum(times[part] * n for part, n in free.items())
+        placed(TopAbs_SOLID), placed(TopAbs_SHELL), placed(TopAbs_FACE), sum(times[k] * n for k, n in free.items())
     )
+
+
+def _lines(document: Document) -> tuple[list[Line], list[int]]:
+    """Every edge at a few places, and the faces whose surfaces close."""
+    owners: list[list[int]] = [[] for _ in document.edges]
+    sides: list[list[Array]] = [[] for _ in document.edges]
+    whole = [BRep_Tool.Degenerated_s(edge) for edge in document.edges]
+    own = [np.empty((0, 3)) if lost else _along(edge) for edge, lost in zip(document.edges, whole, strict=True)]
+    closing = []
+    for part in document.parts:
+        for index in range(part.first, part.first + part.faces.Extent()):
+            face = TopoDS.Face_s(document.faces[index].Oriented(TopAbs_FORWARD))
+            surface = BRep_Tool.Surface_s(face, TopLoc_Location())
+            plane = _plane(face) if isinstance(surface, Geom_Plane) else None
+            if not isinstance(surface, Geom_Plane | Geom_CylindricalSurface | Geom_ConicalSurface) and (
+                surface.IsUClosed() or surface.IsVClosed()
+            ):
+                closing.append(index)
+            for edge in edge_uses(face):
+                number = part.first_edge + part.edges.FindIndex(edge) - 1
+                if not whole[number]:
+                    owners[number].append(index)
+                    sides[number].append(_along(edge, face) if plane is None else _onto(own[number], *plane))
+    lines = [
+        Line(tuple(faces), np.stack([points, *beside]), BRep_Tool.Tolerance_s(edge))
+        for faces, points, beside, edge in zip(owners, own, sides, document.edges, strict=True)
+    ]
+    return lines, closing
+
+
+def _along(edge: TopoDS_Edge, *face: TopoDS_Face) -> Array:
+    """Points of an edge, or of a face along it."""
+    curve = BRepAdaptor_Curve(edge, *face)
+    first, last = curve.FirstParameter(), curve.LastParameter()
+    return np.array([curve.Value(first + share * (last - first)).Coord() for share in _PLACES])
+
+
+def _plane(face: TopoDS_Face) -> tuple[Array, Array]:
+    """A point and the normal of a plane."""
+    location = TopLoc_Location()
+    surface = BRep_Tool.Surface_s(face, location)
+    plane = surface.Pln().Transformed(location.Transformation())
+    return np.array(plane.Location().Coord()), np.array(plane.Axis().Direction().Coord())
+
+
+def _onto(points: Array, origin: Array, normal: Array) -> Array:
+    return points - ((points - origin) @ normal)[:, None] * normal
 
 
 def _places(document: Document) -> Iterator[tuple[Array, int, float]]:
@@ -103,12 +170,3 @@ def _middle(points: Array, placement: TopLoc_Location, corners: Array) -> Array:
         return (corners[:3] + corners[3:]) / 2
     frame = matrix(placement)
     return points.mean(axis=0) @ frame[:3, :3].T + frame[:3, 3]
-
-
-def _area(face: TopoDS_Face, exact: float | None = None) -> float:
-    surface = GProp_GProps()
-    if exact is None:
-        BRepGProp.SurfaceProperties_s(face, surface)
-    else:
-        BRepGProp.SurfaceProperties_s(face, surface, exact)
-    return surface.Mass()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Container, Iterable, Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -70,7 +70,7 @@ class _Found:
     uses: list[_Use] = field(default_factory=list)
 
 
-def view(document: Document, convert: Iterable[int] = ()) -> Model:
+def view(document: Document, convert: Iterable[int] = (), edges: Container[int] | None = None) -> Model:
     """The geometry of a document as plain arrays, in mm.
 
     Parameters
@@ -79,6 +79,8 @@ def view(document: Document, convert: Iterable[int] = ()) -> Model:
     convert : iterable of int
         Faces on analytic, swept or offset surfaces that are to be seen as NURBS faces as well.  Their surfaces are
         put on them only by ``apply``, where they move.
+    edges : container of int, optional
+        Edges that are sampled, and whose faces have trims; by default all.
 
     Raises
     ------
@@ -99,7 +101,7 @@ def view(document: Document, convert: Iterable[int] = ()) -> Model:
         control = nets(list(found.surfaces))
         boxes = [box(face) for face in found.faces]
         _refuse_absurd(document.name, _stored(boxes, zip(found.surfaces.values(), control, strict=True)))
-        trims = _trims(found)
+        trims = _trims(found, edges)
         faces = tuple(
             Face(
                 index, kinds[index], found.surface_of[index], trims.get(index, ()),
@@ -114,11 +116,11 @@ def view(document: Document, convert: Iterable[int] = ()) -> Model:
             Surface(index, net, tuple(members), kinds[members[0]])
             for index, (net, members) in enumerate(zip(control, found.surfaces.values(), strict=True))
         )
-        edges = tuple(_edges(document, found))
+        lines = tuple(_edges(document, found, edges))
         diagonal = _diagonal(document, boxes)
-        _refuse_absurd(document.name, _seen(edges, found, diagonal))
+        _refuse_absurd(document.name, _seen(lines, found, diagonal))
     products = tuple(part.product for part in document.parts)
-    return Model(document.name, surfaces, faces, edges, diagonal, document.unit, document.schema, products)
+    return Model(document.name, surfaces, faces, lines, diagonal, document.unit, document.schema, products)
 
 
 def _refuse_absurd(name: str, numbers: Iterable[tuple[int, Array | float]]) -> None:
@@ -182,23 +184,28 @@ def _pcurve(edge: TopoDS_Edge, face: TopoDS_Face) -> Geom2d_Curve:
     return curve
 
 
-def _trims(found: _Found) -> dict[int, tuple[Trim, ...]]:
+def _trims(found: _Found, edges: Container[int] | None) -> dict[int, tuple[Trim, ...]]:
     """The boundaries of the NURBS faces, by face."""
-    uses = [use for use in found.uses if found.surface_of[use.face] is not None]
+    meant = {use.face for use in found.uses if edges is None or use.edge in edges}
+    uses = [use for use in found.uses if found.surface_of[use.face] is not None and use.face in meant]
     trims: dict[int, tuple[Trim, ...]] = {}
     for use, curve in zip(uses, curves([(u.pcurve, u.first, u.last) for u in uses]), strict=True):
         trims[use.face] = (*trims.get(use.face, ()), Trim(use.edge, curve))
     return trims
 
 
-def _edges(document: Document, found: _Found) -> Iterator[Edge]:
-    """All edges with their samples."""
+def _edges(document: Document, found: _Found, edges: Container[int] | None) -> Iterator[Edge]:
+    """All edges, those that are meant with their samples."""
     part_of = np.repeat(np.arange(len(document.parts)), [part.edges.Extent() for part in document.parts]).tolist()
     by_edge: list[list[_Use]] = [[] for _ in document.edges]
     for use in found.uses:
         by_edge[use.edge].append(use)
     walls = {use.face: _wall(found, use.face) for use in found.uses if found.surface_of[use.face] is None}
     for index, (edge, uses) in enumerate(zip(document.edges, by_edge, strict=True)):
+        if edges is not None and index not in edges:
+            unseen = tuple(Side(use.face, points=_NONE, normals=_NONE) for use in uses)
+            yield Edge(index, _NONE, _NONE, unseen, BRep_Tool.Tolerance_s(edge), True, part_of[index])
+            continue
         degenerate = BRep_Tool.Degenerated_s(edge)
         points, tangents = (_NONE, _NONE) if degenerate else _along(edge)
         sides = []

@@ -1,0 +1,72 @@
+"""Outputs are read back and judged before they take their place."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from mracad.occ import step as writer
+from tests.batch.runs import recipe
+
+SMOOTH = "--scale", "16mm"
+
+
+@pytest.fixture
+def lossy(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A writer that leaves the last face out of every STEP file."""
+    whole = writer.step
+
+    def step(document, *options, **settings):
+        data, cut = whole(document, *options, **settings)
+        head, _, tail = data.rpartition(b"OPEN_SHELL('',(")
+        faces, _, rest = tail.partition(b")")
+        return head + b"OPEN_SHELL('',(" + faces.rpartition(b",")[0] + b")" + rest, cut
+
+    monkeypatch.setattr(writer, "step", step)
+
+
+@pytest.mark.parametrize("words", [("smooth", *SMOOTH), ("convert",), ("pipeline", "smooth --scale 16mm ! check")])
+def test_a_file_that_lacks_a_face_is_not_written(mracad, samples: Path, tmp_path: Path, lossy, words) -> None:
+    source, target = samples / "panel.step", tmp_path / "out.step"
+    target.write_text("as it was")
+    command, *rest = words
+    given = (command, *rest, source) if command == "pipeline" else (command, source, *rest)
+    result = mracad(*given, "-o", target, "--overwrite")
+    assert result.code == 4 and result.out == ""
+    assert result.err.count("\n") == 1 and "#6 is lost" in result.err
+    assert target.read_text() == "as it was" and [p.name for p in tmp_path.iterdir()] == ["out.step"]
+    result = mracad(*given, "-o", target, "--overwrite", "--verify", "off")
+    assert result.code == 0 and "as read back" not in result.out
+    assert b"OPEN_SHELL" in target.read_bytes()
+
+
+def test_a_batch_does_not_write_it_either(mracad, samples: Path, tmp_path: Path) -> None:
+    """A batch says for each file what it is as read back; verification can be switched off there, too."""
+    steps = recipe(tmp_path, '[[step]]\nuse = "smooth"\nscale = "16mm"\n')
+    for verify in ("on", "off"):
+        result = mracad("batch", steps, samples / "panel.step", "-O", tmp_path / verify, "--json", "--verify", verify)
+        assert result.code == 0, result.err
+        outcome = json.loads(result.out.splitlines()[0])
+        assert (outcome["read_back"] is None) == (verify == "off")
+        assert verify == "off" or outcome["read_back"]["valid"]
+
+
+@pytest.mark.parametrize("ending", ["step", "igs", "brep", "bbrep"])
+def test_the_report_says_what_the_file_is(mracad, samples: Path, tmp_path: Path, ending: str) -> None:
+    target, report = tmp_path / f"out.{ending}", tmp_path / "report.json"
+    result = mracad("smooth", samples / "panel.step", *SMOOTH, "-o", target, "--report", report)
+    assert result.code == 0 and result.out.splitlines()[-1].startswith("valid: yes, as read back (was yes); wrote out")
+    found = json.loads(report.read_text())["read_back"][target.name]
+    assert found["valid"] and found["faults"] == [] and found["counts"]["faces"] == 6
+    assert found["counts"]["free_edges"] == 10 and found["tolerance"] < 1e-4
+    low, high = found["box"]
+    assert all(a < b for a, b in zip(low, high, strict=True))
+
+
+def test_a_dry_run_speaks_of_memory(mracad, samples: Path) -> None:
+    result = mracad("smooth", samples / "panel.step", *SMOOTH, "--dry-run")
+    assert (
+        result.code == 0 and result.out.splitlines()[-1] == "valid: yes, in memory (was yes); dry run, nothing written"
+    )
