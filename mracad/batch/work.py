@@ -11,12 +11,12 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from mracad.audit.accept import ReadBack
 from mracad.errors import Code, MracadError
 from mracad.options import STEPS
 from mracad.recipe import Step, relocated, title, versions
 
 if TYPE_CHECKING:
-    from mracad.audit.accept import ReadBack
     from mracad.job import Judged, Report
     from mracad.occ import Document
 
