@@ -47,13 +47,18 @@ SECONDS = {"s": 1.0, "min": 60.0, "h": 3600.0}
 """Units of time by name, in seconds."""
 
 
+LONGEST = 1e8
+"""The longest time that can be given, in seconds: three years."""
+
+
 def duration(text: str, name: str) -> float:
     """Seconds from ``"90"``, ``"90s"``, ``"10min"`` or ``"2h"``; raises UsageError."""
     match = _QUANTITY.fullmatch(text)
     units = {"": 1.0, **SECONDS}
-    if not match or match[2] not in units or not 0 < float(match[1]) < math.inf:
+    found = float(match[1]) * units.get(match[2], 0.0) if match else 0.0
+    if not 0 < found <= LONGEST:
         raise UsageError(f"{name}: {text!r} is not a time", "write it as 90s, 10min or 2h")
-    return float(match[1]) * units[match[2]]
+    return found
 
 
 Length = Annotated[
@@ -421,6 +426,8 @@ class Repeat(Single, frozen=True, kw_only=True, forbid_unknown_fields=True):
             raise UsageError("at: it is not said where the copies are to go", "give --at, --grid, --polar or --along")
         if sum(x is not None for x in (self.grid, self.polar, self.along)) > 1:
             raise UsageError("grid, polar and along exclude each other", "give one of them")
+        if not math.isfinite(self.spin):
+            raise UsageError(f"spin: {self.spin} is not an angle", "give --spin 180 for any turn")
 
     @property
     def done(self) -> str:

@@ -216,5 +216,12 @@ def test_limits_on_the_command_line(samples, tmp_path):
     full = command(*words, "--memory-limit", "120MB")
     assert full.returncode == 5 and "120 MB" in full.stderr and not list(tmp_path.iterdir())
     assert command(*words, "--time-limit", "1min", "--memory-limit", "4GB").returncode == 0 and out.exists()
-    for wrong in (["--time-limit", "0"], ["--time-limit", "soon"], ["--time-limit", "5mm"], ["--memory-limit", "much"]):
+    for wrong in (
+        ["--time-limit", "0"],
+        ["--time-limit", "soon"],
+        ["--time-limit", "5mm"],
+        ["--time-limit", "1e300"],
+        ["--memory-limit", "9" * 400],
+        ["--memory-limit", "much"],
+    ):
         assert command("info", samples / "panel.step", *wrong).returncode == 2
