@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -22,6 +23,9 @@ ENOUGH = 16
 """Fewest quadrature points on a face; pieces are halved until it has them, up to ``HALVINGS`` times."""
 
 HALVINGS = 5
+
+ASIDE = 1e-3
+"""How far inside a piece, as a fraction of it, a point on its end is taken to lie: boundaries run along ends."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,8 +83,10 @@ def inside_grid(face: Face, net: Net, u: Array, v: Array) -> Array:
     return _covered(shape.chords, shape.box, (net.u, net.v), u, v)
 
 
-def quadrature(net: Net, faces: Sequence[Face], points: int | None = None, fewest: int = 1) -> Quadrature:
-    """Gauss–Legendre points over faces of one surface.
+def quadrature(
+    net: Net, faces: Sequence[Face], points: int | None = None, fewest: int = 1, ends: bool = False
+) -> Quadrature:
+    """Gauss–Legendre or Gauss–Lobatto points over faces of one surface.
 
     Parameters
     ----------
@@ -92,6 +98,8 @@ def quadrature(net: Net, faces: Sequence[Face], points: int | None = None, fewes
         functions of the net are integrated exactly.
     fewest : int
         Points along the faces in either direction, at least.
+    ends : bool
+        Whether the ends of the pieces are among the points, from inside: Gauss–Lobatto.
 
     Notes
     -----
@@ -100,10 +108,10 @@ def quadrature(net: Net, faces: Sequence[Face], points: int | None = None, fewes
     shapes = [outline(face, net) for face in faces]
     for halvings in range(HALVINGS + 1):
         (u, wu), (v, wv) = (
-            _gauss(_breaks(kv, axis, shapes, PIECES << halvings), points or kv.degree + 1, fewest)
+            _gauss(_breaks(kv, axis, shapes, PIECES << halvings), points or kv.degree + 1, fewest, ends)
             for axis, kv in enumerate((net.u, net.v))
         )
-        on = [inside_grid(face, net, u.ravel(), v.ravel()) for face in faces]
+        on = [inside_grid(face, net, _drawn_in(u), _drawn_in(v)) for face in faces]
         if all(shape.natural or mask.sum() >= ENOUGH for shape, mask in zip(shapes, on, strict=True)):
             break
     mask = np.logical_or.reduce(on)
@@ -216,8 +224,26 @@ def _divided(kv: KnotVector, breaks: Array, limits: Array, pieces: int) -> Array
     return np.stack([starts[of] + place * size, starts[of] + (place + 1) * size], axis=1)
 
 
-def _gauss(pieces: Array, points: int, fewest: int) -> tuple[Array, Array]:
-    """Gauss–Legendre points and weights on intervals ``(s, 2)``, both ``(s, q)``; at least ``fewest`` in all."""
-    nodes, weights = legendre(max(points, -(-fewest // len(pieces))))
+def _gauss(pieces: Array, points: int, fewest: int, ends: bool) -> tuple[Array, Array]:
+    """Gauss points and weights on intervals ``(s, 2)``, both ``(s, q)``; at least ``fewest`` in all."""
+    count = max(points, -(-fewest // len(pieces)))
+    nodes, weights = lobatto(count) if ends else legendre(count)
     half = 0.5 * (pieces[:, 1] - pieces[:, 0])[:, None]
-    return pieces[:, :1] + half * (nodes + 1), half * weights
+    x = pieces[:, :1] + half * (nodes + 1)
+    if ends:
+        x[:, [0, -1]] = pieces
+    return x, half * weights
+
+
+@lru_cache(maxsize=32)
+def lobatto(points: int) -> tuple[Array, Array]:
+    """Nodes and weights of the Gauss–Lobatto rule on [-1, 1]."""
+    last = np.polynomial.Legendre.basis(points - 1)
+    nodes = np.concatenate([[-1.0], np.sort(last.deriv().roots().real), [1.0]])
+    return nodes, 2 / (points * (points - 1) * last(nodes) ** 2)
+
+
+def _drawn_in(x: Array) -> Array:
+    """Points of pieces, in one row, where it is asked whether they are inside: never on the pieces' ends."""
+    middle = x.mean(axis=1, keepdims=True)
+    return np.asarray((middle + (1 - ASIDE) * (x - middle)).ravel())

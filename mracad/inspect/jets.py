@@ -56,8 +56,11 @@ def jets(net: Net, u: Array, v: Array, mask: Array, centre: Array) -> Array:
 def _local(kv: KnotVector, x: Array) -> tuple[Array, Array]:
     """Control points ``(pieces, d + 1)`` and derivatives of their functions, ``(pieces, points, 4, d + 1)``."""
     first, values = jet(kv, x.ravel(), range(4))
-    start = first.reshape(x.shape)[:, 0]
-    return (start[:, None] + np.arange(kv.degree + 1)) % kv.count, values.reshape(*x.shape, 4, -1)
+    start, local = first.reshape(x.shape), values.reshape(*x.shape, 4, -1)
+    if (start[:, -1] != start[:, 0]).any():  # pieces that end on a knot
+        local = local.copy()
+        local[:, -1] = jet(kv, np.ascontiguousarray(x[:, -1]), range(4), "left")[1]
+    return (start[:, :1] + np.arange(kv.degree + 1)) % kv.count, local
 
 
 def _quotient(stack: Array) -> Array:

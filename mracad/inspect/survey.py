@@ -18,8 +18,8 @@ from mracad.model import Face
 
 Array = np.ndarray
 
-POINTS, FEWEST = 4, 24
-"""Gauss points a span, and at least along a face, in either direction."""
+POINTS, FEWEST = 5, 24
+"""Points a span, its ends among them, and at least along a face, in either direction: curvature peaks at knots."""
 
 RIPPLE = 1e-7
 """Amplitude, mm, of a ripple one mean span long that counts for nothing: the kernel takes such points for one."""
@@ -72,7 +72,7 @@ def surveys(
     surfaces : iterable of (Net, sequence of Face, KnotVector, KnotVector)
         The surface, those of its faces that are to be seen as one, and the knots that it will have afterwards.
     points : int
-        Gauss points a span of those knots, in either direction.
+        Points a span of those knots, in either direction.
     """
     ready = [
         (net, tuple(faces), _rule(faces, u, v, points), (u, v), net.poles.mean(axis=(0, 1)))
@@ -82,8 +82,9 @@ def surveys(
     seen = _seen([(net, rule, centre) for net, _, rule, _, centre in ready])
     for (net, faces, rule, knots, centre), (at, form) in zip(ready, seen, strict=True):
         sides = form.speeds * _spans(rule, knots)
-        apart = sides.min(axis=0) >= max(CLUSTER[0], CLUSTER[1] * float(np.linalg.norm(np.ptp(net.poles, axis=(0, 1)))))
-        regular = form.regular & apart
+        least = max(CLUSTER[0], CLUSTER[1] * float(np.linalg.norm(np.ptp(net.poles, axis=(0, 1)))))
+        regular = form.regular & (sides.min(axis=0) >= least)
+        sides = np.maximum(sides, least)
         areas = _areas(rule, form)
         rounding = ROUNDING * float(np.abs(net.poles).max()) * _wavenumber(sides.min(axis=0)) ** 2
         kink = max((float(np.nanmax(a, initial=0.0)) for a in _kinks(net, net, faces, rule)), default=0.0)
@@ -129,7 +130,7 @@ def changes(surveyed: Sequence[Survey], nets: Sequence[Net]) -> list[Change]:
 
 
 def _rule(faces: Sequence[Face], u: KnotVector, v: KnotVector, points: int) -> Quadrature:
-    return quadrature(Net(u, v, np.empty((u.count, v.count, 0))), faces, points, FEWEST)
+    return quadrature(Net(u, v, np.empty((u.count, v.count, 0))), faces, points, FEWEST, ends=True)
 
 
 def _seen(surfaces: Sequence[tuple[Net, Quadrature, Array]]) -> Iterator[tuple[Array, Forms]]:
@@ -206,4 +207,4 @@ def _noise(areas: Array, sides: Array, rounding: Array) -> Roughness:
 
 def _wavenumber(length: Array) -> Array:
     """2π over the length."""
-    return 2 * np.pi / np.maximum(length, np.finfo(float).tiny ** 0.2)
+    return 2 * np.pi / length

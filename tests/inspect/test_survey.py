@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.net import Net
 from mracad.inspect.roughness import Change, Growth, Rougher, Roughness, worse
-from mracad.inspect.survey import RIPPLE, changes, surveys
+from mracad.inspect.survey import POINTS, RIPPLE, changes, surveys
 from tests.inspect.shapes import circle, cylinder, face, graph, plane, rectangle, roof, sphere, torus
 
 
@@ -23,7 +23,7 @@ def rough(net, faces=None, points=8):
     return survey(net, faces, points).roughness
 
 
-def change(before, after, faces=None, points=4):
+def change(before, after, faces=None, points=POINTS):
     seen = surveys([(before, faces or [face()], after.u, after.v)], points)
     return changes(seen, [after])[0]
 
@@ -81,6 +81,15 @@ def test_a_ripple_of_small_slope(spans):
     assert found.bending == pytest.approx(a**2 * k**4 / 2, rel=1e-3)
     assert found.variation == pytest.approx(a**2 * k**6 / 8, rel=2e-3)
     assert found.curvature == pytest.approx(a * k**2, rel=1e-3)
+
+
+def test_the_largest_curvature_stands_on_a_knot():
+    """Second derivatives of cubics are linear between knots: a survey takes points that see their peaks."""
+    net = plane(9)
+    poles = net.poles.copy()
+    poles[..., 2] += np.random.default_rng(8).normal(0, 1e-4, poles.shape[:2])
+    own, dense = (rough(moved(net, poles), points=points).curvature for points in (POINTS, 60))
+    assert own == pytest.approx(dense, rel=1e-3)
 
 
 def test_only_the_inside_of_the_trims_counts():
