@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -27,6 +27,9 @@ from mracad.constraint.definite import definite
 from mracad.constraint.region import supported
 from mracad.constraint.trimmed import Trace, TrimmedSeam, across, collocation, fine_sites
 from mracad.wavelet.ladder import arc_lengths
+
+if TYPE_CHECKING:
+    from scipy.spatial import KDTree
 
 Array = np.ndarray
 
@@ -64,14 +67,12 @@ class Sheet:
     free: Array
     scale: float
 
-    def near(self, traces: Sequence[Trace], points: Array) -> Array:
-        """Free points (nu, nv) that traces on the surface depend on or within a wavelength of ``points`` (q, 3)."""
-        from scipy.spatial import KDTree
-
+    def near(self, traces: Sequence[Trace], points: KDTree) -> Array:
+        """Free points (nu, nv) that traces on the surface depend on or within a wavelength of ``points``."""
         cells = np.zeros((self.net.u.spans, self.net.v.spans), bool)
         for trace in traces:
             cells |= trace.cells(self.net, np.linspace(0.0, 1.0, 4 * max(cells.shape) + 1))
-        apart = KDTree(points).query(self.net.poles.reshape(-1, 3), distance_upper_bound=self.scale)[0]
+        apart = points.query(self.net.poles.reshape(-1, 3), distance_upper_bound=self.scale)[0]
         return self.free & (supported(self.net, cells) | np.isfinite(apart).reshape(self.free.shape))
 
     def form(self) -> Any:
@@ -105,11 +106,12 @@ def shut(
         How much of the edit is made.
     """
     from scipy.sparse import block_diag, diags_array, vstack
+    from scipy.spatial import KDTree
 
     nets = {i: sheet.net for i, sheet in sheets.items()}
     f = np.concatenate([net.poles.reshape(-1, 3) for net in nets.values()])
     f = f - f.mean(axis=0)
-    near = np.concatenate([nets[seam.a.surface].evaluate(seam.a.places(_EVENLY)) for seam in seams])
+    near = KDTree(np.concatenate([nets[seam.a.surface].evaluate(seam.a.places(_EVENLY)) for seam in seams]))
     masks = {
         i: sheet.near([t for seam in seams for t in (seam.a, seam.b) if t.surface == i], near)
         for i, sheet in sheets.items()

@@ -8,7 +8,7 @@ seams are then shut (:mod:`mracad.constraint.shut`); where one stays open, the s
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -46,8 +46,14 @@ BUMPIER = 1e-3
 HALVINGS = 4
 """How often the spans under a trimmed seam that stays open are halved."""
 
-MOST_POINTS = 40_000
-"""Most control points to which a surface is refined for that."""
+MOST_POINTS, MOST_GROWTH = 40_000, 4
+"""Most control points to which a surface is refined for that; a group may have as many, or so many times its own."""
+
+WORK, LEAST_WORK, LAST_WORK = 20, 300_000, 8
+"""A group may cost so much for each of its control points, or so much in all; and so much for each again once seams
+were given up for that.  Solving for one point of a bicubic net costs 1, its coupled projection PROJECTION."""
+
+PROJECTION = 3
 
 SHORTEST = 1e-2
 """Spans shorter than this, mm, are not halved."""
@@ -63,6 +69,25 @@ STUCK = "a face there has no free poles"
 
 LEAST = 0.5
 """A seam with less of the freedom of the smoother of its two sides is frozen."""
+
+
+@dataclass(frozen=True)
+class Allowance:
+    """What a group may still cost.
+
+    Attributes
+    ----------
+    work : float
+        What it may still cost, in solutions for one point of a bicubic net.
+    rounds : int
+        Rounds done so far.
+    given_up : bool
+        Whether trimmed seams were given up already because the allowance had run out.
+    """
+
+    work: float
+    rounds: int = 0
+    given_up: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,6 +162,10 @@ class Group:
 
     Attributes
     ----------
+    cost : float
+        Of solving once for all control points of the surfaces.
+    allowance : Allowance
+        What the group may cost; by default that of a new one.
     freedom : dict of int to int
         Degrees of freedom of seams, by edge.
     """
@@ -153,6 +182,9 @@ class Group:
         self.found, self.trimmed, self.closing = found, trimmed, closing
         self.surfaces = sorted({side.surface for seam in self._every() for side in (seam.a, seam.b)})
         self.moving = set(closing) | {edge for seam in self._every() for edge in (seam.edge, seam.twin)}
+        nets = [self.model.surfaces[i].net for i in self.surfaces]
+        self.cost, self.points = _cost(nets), _points(nets)
+        self.allowance = Allowance(max(WORK * self.points, LEAST_WORK))
         self.freedom: dict[int, int] = {}
         self.inserted: dict[int, tuple[Array, Array]] = {}
         self.scales: dict[int, float] = {}
@@ -167,6 +199,8 @@ class Group:
         bound : float or None
             On the displacement of any control point, mm.
         """
+        self.allowance = replace(self.allowance, rounds=self.allowance.rounds + 1)
+        self._spend(self.cost)
         joined, refused = strips(self.found, self._knots)
         if refused:
             return {}, refused
@@ -197,6 +231,20 @@ class Group:
             broken = self._overshot(moved, self.trimmed)
         broken = broken or self._broken(moved)
         return ({}, broken) if broken else (moved, {})
+
+    @property
+    def affordable(self) -> bool:
+        """Whether the allowance suffices for one more round."""
+        return self.allowance.work >= (1 + PROJECTION) * self.cost
+
+    def give_up(self) -> dict[int, str]:
+        """The trimmed seams, or all where that was done before, with the reason for leaving them as they are."""
+        some = self._every() if self.allowance.given_up or not self.trimmed else self.trimmed
+        self.allowance = Allowance(LAST_WORK * self.points, self.allowance.rounds, given_up=True)
+        return {seam.edge: f"given up after {self.allowance.rounds} rounds" for seam in some}
+
+    def _spend(self, work: float) -> None:
+        self.allowance = replace(self.allowance, work=self.allowance.work - work)
 
     def _every(self) -> list[Seam | TrimmedSeam]:
         return [*self.found, *self.trimmed]
@@ -290,6 +338,7 @@ class Group:
         self, couplings: list[tuple[float, Coupling]], separations: Mapping[int, Separation], bound: float | None
     ) -> dict[int, Moved]:
         coupling = couplings[0][1]
+        self._spend(PROJECTION * _cost(patch.net for patch in coupling.patches.values()))
         change: dict[int, Array] = {}
         for weight, each in couplings:
             for i, delta in each.displacement().items():
@@ -316,6 +365,7 @@ class Group:
                 i: Sheet(m.net, self._wanted(m.change, bound), m.offset, m.separation.free, self.scales[i])
                 for i, m in moved.items()
             }
+            self._spend(_cost(m.net for m in moved.values()))
             allowed = self.gap, STEEPER, BUMPIER / min(self.scales.values())
             offsets = shut(sheets, self.trimmed, coupling.fine.matrix, allowed, amount)
             free = {i: m.separation.free for i, m in moved.items()}
@@ -348,7 +398,7 @@ class Group:
             for trace in (seam.a, seam.b):
                 met = trace.cells(moved[trace.surface].net, open_at)
                 cells[trace.surface] = met | cells.get(trace.surface, False)
-        result = {}
+        result, total = {}, _points(m.net for m in moved.values())
         for i, met in cells.items():
             net = moved[i].net
             halves = [
@@ -357,8 +407,12 @@ class Group:
             ]
             points = math.prod(k.count + len(x) for k, x in zip((net.u, net.v), halves, strict=True))
             if any(map(len, halves)) and points <= MOST_POINTS:
-                result[i] = self._finer(i, moved[i], halves)
-        return result
+                total += points - _points([net])
+                result[i] = halves
+        if total > max(MOST_POINTS, MOST_GROWTH * self.points):
+            return {}
+        finer = {i: self._finer(i, moved[i], halves) for i, halves in result.items()}
+        return finer if _cost(m.net for m in {**moved, **finer}.values()) <= self.allowance.work else {}
 
     def _finer(self, surface: int, moved: Moved, halves: Sequence[Array]) -> Moved:
         """A surface with more knots."""
@@ -441,6 +495,16 @@ class Group:
             elif seam.joint.order and angle > seam.angle + (BENT if self.mending else STEEPER):
                 result[seam.edge] = "would kink"
         return result
+
+
+def _points(nets: Iterable[Net]) -> int:
+    """Control points of nets."""
+    return sum(math.prod(net.poles.shape[:2]) for net in nets)
+
+
+def _cost(nets: Iterable[Net]) -> float:
+    """What it costs to solve once for all control points of nets: each is joined to others by its degrees."""
+    return sum(_points([net]) * (net.u.degree + 1) * (net.v.degree + 1) / 16 for net in nets)
 
 
 def _within(offsets: dict[int, Array], bound: float | None) -> dict[int, Array]:

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping
+from dataclasses import replace
 
 import numpy as np
 
+from mracad import guard
 from mracad.constraint.seam import TRIMMED, UNEVEN, Seam, Seams, Treatment, Wishes, seams
 from mracad.constraint.trimmed import TrimmedSeam, beside, trimmed
 from mracad.edit.group import CLUSTER, CROWDED, Group, Moved, Setting
@@ -124,17 +126,28 @@ class Together:
             On the displacement of any control point, mm.
         """
         result: dict[int, Moved] = {}
-        waiting = self._groups(sorted({side.surface for seam in self._every() for side in (seam.a, seam.b)}))
-        while waiting:
-            group = waiting.pop()
-            moved, broken = group.smoothed(scale, bound)
-            result |= moved
-            self.freedom |= group.freedom
-            if broken:
-                self._freeze(broken)
-                self._try_trimmed()
-                waiting += self._groups(group.surfaces)
+        first = self._groups(sorted({side.surface for seam in self._every() for side in (seam.a, seam.b)}))
+        for number, whole in enumerate(first, 1):
+            waiting = [whole]
+            while waiting:
+                group = waiting.pop()
+                guard.doing(f"smoothing group {number} of {len(first)}, round {group.allowance.rounds + 1}")
+                moved, broken = group.smoothed(scale, bound) if group.affordable else ({}, group.give_up())
+                result |= moved
+                self.freedom |= group.freedom
+                if broken:
+                    self._freeze(broken)
+                    self._try_trimmed()
+                    waiting += self._parts(group)
         return result
+
+    def _parts(self, group: Group) -> list[Group]:
+        """The groups that are left of one, which share its allowance."""
+        parts = self._groups(group.surfaces)
+        total = sum(part.cost for part in parts)
+        for part in parts:
+            part.allowance = replace(group.allowance, work=group.allowance.work * part.cost / total)
+        return parts
 
     def _groups(self, surfaces: Collection[int]) -> list[Group]:
         """The groups that seams make of some surfaces."""
