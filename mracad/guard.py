@@ -28,10 +28,9 @@ _DEATH_SIGNAL = 1  # PR_SET_PDEATHSIG
 def size(text: str) -> int:
     """Bytes from ``"500MB"``, ``"2G"`` or ``"1.5GiB"``; raises UsageError."""
     match = re.fullmatch(r"(\d+\.?\d*)\s*([kmg]i?|)b?", text.strip().lower())
-    found = float(match[1]) * _SIZES[match[2]] if match else 0.0
-    if not 1 <= found < 2**60:
+    if not match or not float(match[1]):
         raise UsageError(f"memory-limit: {text!r} is not an amount of memory", "write it as 500MB or 2GB")
-    return int(found)
+    return int(float(match[1]) * _SIZES[match[2]])
 
 
 class _Note:
@@ -174,7 +173,7 @@ def _answer(work: Callable[[], Any], memory: int | None) -> bytes:
     import resource
 
     hard = resource.getrlimit(resource.RLIMIT_DATA)[1]
-    resource.setrlimit(resource.RLIMIT_DATA, (memory if hard < 0 else min(memory, hard), hard))
+    resource.setrlimit(resource.RLIMIT_DATA, (memory, hard))
 
     def starved() -> Any:
         try:

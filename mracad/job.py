@@ -11,7 +11,7 @@ from functools import partial
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-from mracad import review
+from mracad import guard, review
 from mracad.audit.compare import Limits
 from mracad.audit.continuity import SeamMeasure, key, remeasured, seams
 from mracad.audit.deviation import Deviation, deviations
@@ -126,6 +126,7 @@ def play(
             put = apply or step is not steps[-1]
             result = run(document, function, step.options, progress=progress, apply=put, spoiled=spoiled)
         else:
+            guard.doing(step.use)
             if progress:
                 progress(step.use, 0, 1)
             result = function(document, step.options, original)
@@ -227,7 +228,12 @@ def run(
     from mracad.occ.view import view
 
     def stage(name: str) -> Callable[[int, int], None]:
-        return (lambda done, total: progress(name, done, total)) if progress else (lambda done, total: None)
+        def tell(done: int, total: int) -> None:
+            guard.doing(name)
+            if progress:
+                progress(name, done, total)
+
+        return tell
 
     start = time.perf_counter()
     stage("looking at faces")(0, 1)
@@ -240,10 +246,12 @@ def run(
         result = edit(model, options, *others, scope=scope.holding(spoiled), progress=stage("editing"))
         result = _named(result, {face: spoiled[face] for face in spoiled.keys() & scope.chosen})
         _refuse_if_stuck(model, result)
+        stage("measuring seams")(0, 1)
         if valid_before is None:
             before = seams(model)
             stage("checking the input")(0, 1)
             valid_before = check(document)
+            stage("measuring seams")(0, 1)
         valid_after = valid_before
         offsets = result.displacement.offsets
         after = remeasured(result.displacement.applied(model), before, offsets) if offsets else before
@@ -254,6 +262,7 @@ def run(
             continue
         if not (apply and offsets):
             break
+        stage("changing the model")(0, 1)
         put(document, model, result.displacement)
         stage("checking the result")(0, 1)
         touched = {f for i in offsets for f in model.surfaces[i].faces}
@@ -269,6 +278,7 @@ def run(
                 "leave faces out with --faces '!#N', or use --amount 0.5",
             )
         spoiled |= dict.fromkeys(worse, "its result would not be valid")
+    stage("measuring the deviation")(0, 1)
     return Report(
         model,
         result,
