@@ -28,9 +28,10 @@ _DEATH_SIGNAL = 1  # PR_SET_PDEATHSIG
 def size(text: str) -> int:
     """Bytes from ``"500MB"``, ``"2G"`` or ``"1.5GiB"``; raises UsageError."""
     match = re.fullmatch(r"(\d+\.?\d*)\s*([kmg]i?|)b?", text.strip().lower())
-    if not match or not float(match[1]):
+    found = float(match[1]) * _SIZES[match[2]] if match else 0.0
+    if not 1 <= found < 2**60:
         raise UsageError(f"memory-limit: {text!r} is not an amount of memory", "write it as 500MB or 2GB")
-    return int(float(match[1]) * _SIZES[match[2]])
+    return int(found)
 
 
 class _Note:
@@ -173,7 +174,7 @@ def _answer(work: Callable[[], Any], memory: int | None) -> bytes:
     import resource
 
     hard = resource.getrlimit(resource.RLIMIT_DATA)[1]
-    resource.setrlimit(resource.RLIMIT_DATA, (memory, hard))
+    resource.setrlimit(resource.RLIMIT_DATA, (memory if hard < 0 else min(memory, hard), hard))
 
     def starved() -> Any:
         try:

@@ -7,12 +7,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
 from mracad.bspline.net import Curve, Net
 
 Array = np.ndarray
+
+SAME = 9
+"""Decimals in which the numbers of two frames that are the same agree."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,7 +142,7 @@ class Edge:
     degenerate : bool
         A pole: the edge is a point in space.
     part : int
-        Which part (shape definition) it belongs to; frames of different parts are unrelated.
+        Which part (shape definition) it belongs to.
     """
 
     index: int
@@ -175,6 +179,9 @@ class Model:
     schema : str
         STEP schema (``"AP203"``, ``"AP214"``, ``"AP242"``).
     products : tuple of str
+        By part.
+    places : tuple of tuple of ndarray (4, 4)
+        By part, the frames in which its instances stand; empty for a model of one part where it stands.
     """
 
     name: str
@@ -185,6 +192,17 @@ class Model:
     unit: str = "mm"
     schema: str = ""
     products: tuple[str, ...] = ()
+    places: tuple[tuple[Array, ...], ...] = ()
+
+    @cached_property
+    def spaces(self) -> tuple[int, ...]:
+        """By part, which space its numbers are in: parts that stand once and in the same place have one in common."""
+        first: dict[bytes, int] = {}
+        bases = [
+            first.setdefault((frames[0].round(SAME) + 0.0).tobytes(), part) if len(frames) == 1 else part
+            for part, frames in enumerate(self.places)
+        ]
+        return tuple(bases)
 
     def with_surfaces(self, surfaces: Sequence[Surface]) -> Model:
         """The model with other surfaces under the same faces (baked sides stay where they are)."""

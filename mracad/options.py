@@ -10,6 +10,8 @@ import math
 import re
 import types
 import typing
+from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import cache
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -45,13 +47,18 @@ SECONDS = {"s": 1.0, "min": 60.0, "h": 3600.0}
 """Units of time by name, in seconds."""
 
 
+LONGEST = 1e8
+"""The longest time that can be given, in seconds: three years."""
+
+
 def duration(text: str, name: str) -> float:
     """Seconds from ``"90"``, ``"90s"``, ``"10min"`` or ``"2h"``; raises UsageError."""
     match = _QUANTITY.fullmatch(text)
     units = {"": 1.0, **SECONDS}
-    if not match or match[2] not in units or not 0 < float(match[1]) < math.inf:
+    found = float(match[1]) * units.get(match[2], 0.0) if match else 0.0
+    if not 0 < found <= LONGEST:
         raise UsageError(f"{name}: {text!r} is not a time", "write it as 90s, 10min or 2h")
-    return float(match[1]) * units[match[2]]
+    return found
 
 
 Length = Annotated[
@@ -59,6 +66,34 @@ Length = Annotated[
     Meta(extra_json_schema={"pattern": rf"^\s*\+?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?\s*({'|'.join(MILLIMETRES)}|%)?\s*$"}),
 ]
 """The type of a field that :func:`length` reads."""
+
+
+@dataclass(frozen=True)
+class Naming:
+    """How the text of an option names a file: what stands before the path, and how it ends where it is one at all."""
+
+    prefix: str = ""
+    ending: str = ""
+
+    def file(self, text: str) -> str | None:
+        """The path in a text; None where it names no file."""
+        named = text.startswith(self.prefix) and text.endswith(self.ending)
+        return text[len(self.prefix) :] if named else None
+
+    def renamed(self, text: str, files: Mapping[str, str]) -> str:
+        """The text with its path replaced, where it has one that ``files`` knows."""
+        file = self.file(text)
+        return text if file is None else self.prefix + files.get(file, file)
+
+
+File = Annotated[str, Naming()]
+"""The type of a field that names a file."""
+
+FeatureText = Annotated[str, Naming(ending=".feature")]
+"""The type of a field that is a feature, or names the file of one."""
+
+PlaceText = Annotated[str, Naming(prefix="@")]
+"""The type of a field that is a place, or names a file of places."""
 
 
 def dashed(name: str) -> str:
@@ -70,6 +105,18 @@ def dashed(name: str) -> str:
 def lengths(struct: type[Struct]) -> frozenset[str]:
     """The fields of a struct that hold a length."""
     return frozenset(name for name, kind in plain_types(struct).items() if kind is Length)
+
+
+@cache
+def namings(struct: type[Struct]) -> dict[str, Naming]:
+    """The fields of a struct that name files, and how."""
+    hints = typing.get_type_hints(struct, include_extras=True)
+    found = ((name, _naming(hints[name])) for name in struct.__struct_fields__)
+    return {name: naming for name, naming in found if naming}
+
+
+def _naming(hint: Any) -> Naming | None:
+    return hint if isinstance(hint, Naming) else next(filter(None, map(_naming, typing.get_args(hint))), None)
 
 
 @cache
@@ -113,7 +160,21 @@ class Options(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
     def files(self) -> tuple[str, ...]:
         """Files that the options name, beside the model: what the result depends on, too."""
-        return ()
+        texts = ((naming, text) for name, naming in namings(type(self)).items() for text in self._texts(name))
+        return tuple(file for naming, text in texts if (file := naming.file(text)))
+
+    def relocated(self, files: Mapping[str, str]) -> typing.Self:
+        """The options with the files that they name replaced by others."""
+        changed: dict[str, Any] = {}
+        for name, naming in namings(type(self)).items():
+            texts = tuple(naming.renamed(text, files) for text in self._texts(name))
+            changed[name] = texts if isinstance(getattr(self, name), tuple) else next(iter(texts), None)
+        return structs.replace(self, **changed)
+
+    def _texts(self, name: str) -> tuple[str, ...]:
+        """The text or texts of a field."""
+        value = getattr(self, name)
+        return value if isinstance(value, tuple) else () if value is None else (value,)
 
 
 class Selection(Options, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -282,7 +343,7 @@ class Single(Featured, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """What edits with a feature of the model itself share."""
 
     feature: Annotated[
-        str,
+        FeatureText,
         Meta(
             description="The feature: near:X,Y,Z,radius:R (a disc, mm), #3@u0:u1,v0:v1 (a rectangle of parameters) or "
             "a file made by mracad feature extract."
@@ -293,9 +354,6 @@ class Single(Featured, frozen=True, kw_only=True, forbid_unknown_fields=True):
         super().__post_init__()
         if not self.feature:
             raise UsageError("feature: it is not said which", "give --feature near:X,Y,Z,radius:R")
-
-    def files(self) -> tuple[str, ...]:
-        return (self.feature,) if self.feature.endswith(".feature") else ()
 
 
 class Move(Single, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -323,7 +381,7 @@ class Repeat(Single, frozen=True, kw_only=True, forbid_unknown_fields=True):
     function: ClassVar[str] = "mracad.edit.features:repeat"
 
     at: Annotated[
-        tuple[str, ...],
+        tuple[PlaceText, ...],
         Meta(
             description="A place: X,Y,Z (mm, brought to the nearest selected face), #face@u,v, or @places.csv with "
             "lines x,y,z[,rotate[,size[,height]]]; repeatable."
@@ -368,9 +426,8 @@ class Repeat(Single, frozen=True, kw_only=True, forbid_unknown_fields=True):
             raise UsageError("at: it is not said where the copies are to go", "give --at, --grid, --polar or --along")
         if sum(x is not None for x in (self.grid, self.polar, self.along)) > 1:
             raise UsageError("grid, polar and along exclude each other", "give one of them")
-
-    def files(self) -> tuple[str, ...]:
-        return (*super().files(), *(place[1:] for place in self.at if place.startswith("@")))
+        if not math.isfinite(self.spin):
+            raise UsageError(f"spin: {self.spin} is not an angle", "give --spin 180 for any turn")
 
     @property
     def done(self) -> str:
@@ -382,9 +439,9 @@ class Transfer(Featured, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
     function: ClassVar[str] = "mracad.edit.features:transfer"
 
-    source: Annotated[str, Meta(description="The file that the detail is taken from.")] = ""
+    source: Annotated[File, Meta(description="The file that the detail is taken from.")] = ""
     from_: Annotated[
-        str,
+        FeatureText,
         Meta(
             description="What to take: a face (#3 or its name) with all its detail in --band, or a feature as for "
             "mracad repeat."
@@ -416,9 +473,6 @@ class Transfer(Featured, frozen=True, kw_only=True, forbid_unknown_fields=True):
         if not match or not 0 <= float(match[1]) <= 1:
             raise UsageError(f"mode: {self.mode!r} is not known", "use add, replace or blend=0.3")
         return 1.0 - float(match[1]), float(match[1])
-
-    def files(self) -> tuple[str, ...]:
-        return (self.source, self.from_) if self.from_.endswith(".feature") else (self.source,)
 
     def models(self) -> tuple[str, ...]:
         return (self.source,)
@@ -474,7 +528,7 @@ class Compare(Options, frozen=True, kw_only=True, forbid_unknown_fields=True):
     function: ClassVar[str] = "mracad.job:compare"
 
     reference: Annotated[
-        str | None, Meta(description="File to compare with; by default the model as it came into the recipe.")
+        File | None, Meta(description="File to compare with; by default the model as it came into the recipe.")
     ] = None
     reference_unit: Annotated[
         str | None,
@@ -501,9 +555,6 @@ class Compare(Options, frozen=True, kw_only=True, forbid_unknown_fields=True):
         ],
         Meta(description="What may differ in any way; repeatable."),
     ] = ()  # fmt: skip
-
-    def files(self) -> tuple[str, ...]:
-        return (self.reference,) if self.reference else ()
 
 
 STEPS: dict[str, type[Options]] = {

@@ -15,6 +15,7 @@ recipe is found before a model is read, and named with its place::
 from __future__ import annotations
 
 import json
+import math
 import os
 import re
 import shlex
@@ -49,12 +50,13 @@ class Step:
     def text(self) -> str:
         """The step as a line of ``mracad pipeline``; files by name, without their folders."""
         words = [self.use]
-        options = relocated(self.options, {file: Path(file).name for file in self.options.files()})
-        for name, value in options.given().items():
+        options = self.options.relocated({file: Path(file).name for file in self.options.files()})
+        for name, given in options.given().items():
+            value = _braced(given)
             flag = f"--{dashed(name)}"
             if value is True:
                 words.append(flag)
-            elif isinstance(value, tuple):
+            elif isinstance(value, list):
                 words += [word for member in value for word in (flag, str(member))]
             else:
                 words += [flag, f"{value:g}" if isinstance(value, float) else str(value)]
@@ -154,7 +156,7 @@ class Recipe:
                 if key not in OWN
             }
             given = options(STEPS[table.values["use"]], values, table.place)
-            given = relocated(given, {file: os.path.normpath(folder / file) for file in given.files()})
+            given = given.relocated({file: os.path.normpath(folder / file) for file in given.files()})
             found.append(Step(name, table.values["use"], given))
         return tuple(found)
 
@@ -325,31 +327,52 @@ def _refused(at: str, struct: type[Options], name: str, value: Any, kind: Any, r
     )
 
 
-def relocated(options: Options, files: Mapping[str, str]) -> Options:
-    """The options with the files that they name replaced by others."""
+def record_of(steps: Iterable[Step], place: str | os.PathLike) -> str:
+    """The steps as a recipe with every option resolved and the versions of what did them.
 
-    def moved(value: Any) -> Any:
-        if isinstance(value, tuple):
-            return tuple(moved(member) for member in value)
-        for old in sorted(files, key=len, reverse=True):
-            if isinstance(value, str) and old in value:
-                return value.replace(old, files[old])
-        return value
+    Parameters
+    ----------
+    steps : iterable of Step
+    place : path
+        Of the file that it is for; the files that options name are named from there.
 
-    return structs.replace(options, **{k: moved(v) for k, v in structs.asdict(options).items()}) if files else options
-
-
-def record_of(steps: Iterable[Step]) -> str:
-    """The steps as a recipe with every option resolved and the versions of what did them."""
-    lines = ["[versions]", *(f"{json.dumps(name)} = {json.dumps(version)}" for name, version in versions().items())]
+    Raises
+    ------
+    UsageError
+        For a text that is not Unicode, which TOML cannot hold.
+    """
+    lines = ["[versions]", *(f"{_toml(name)} = {_toml(version)}" for name, version in versions().items())]
     for step in steps:
-        lines += ["", "[[step]]", f"use = {json.dumps(step.use)}", f"id = {json.dumps(step.id)}"]
+        lines += ["", "[[step]]", f"use = {_toml(step.use)}", f"id = {_toml(step.id)}"]
+        near = {file: os.path.relpath(file, Path(place).parent) for file in step.options.files()}
         lines += [
-            f"{dashed(name)} = {json.dumps(value, ensure_ascii=False)}"
-            for name, value in structs.asdict(step.options).items()
+            f"{dashed(name)} = {_toml(_braced(value))}"
+            for name, value in structs.asdict(step.options.relocated(near)).items()
             if value is not None
         ]
     return "\n".join(lines) + "\n"
+
+
+def _toml(value: Any) -> str:
+    """A value as TOML."""
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(_toml, value))}]"
+    if isinstance(value, float) and not math.isfinite(value):
+        return str(value)
+    text = json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    if not text.isascii():
+        try:
+            text.encode()
+        except UnicodeEncodeError as error:
+            raise UsageError(f"record: {value!r} is not Unicode", "rename it, or leave out --record") from error
+    return text
+
+
+def _braced(value: Any) -> Any:
+    """A value that :func:`_filled` leaves as it is."""
+    if isinstance(value, list | tuple):
+        return [_braced(member) for member in value]
+    return value.replace("{", "{{").replace("}", "}}") if isinstance(value, str) else value
 
 
 @cache
@@ -444,18 +467,20 @@ def _toml_value(text: str) -> Any:
 
 
 def _filled(value: Any, variables: Mapping[str, str], place: str) -> Any:
-    """A value with its variables replaced."""
+    """A value with its variables replaced, and double braces by single ones."""
     if isinstance(value, list):
         return [_filled(member, variables, place) for member in value]
     if not isinstance(value, str):
         return value
 
     def replacement(match: re.Match[str]) -> str:
+        if match[1] is None:
+            return match[0][0]
         if match[1] not in variables:
             raise UsageError(f"{place}: no variable {match[0]}", nearest(match[1], variables))
         return variables[match[1]]
 
-    return re.sub(r"\{(\w+)\}", replacement, value)
+    return re.sub(r"\{\{|\}\}|\{(\w+)\}", replacement, value)
 
 
 def _places(text: str, name: str) -> list[dict[str, str]]:

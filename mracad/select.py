@@ -128,7 +128,7 @@ def select(
 
 
 def _faces(model: Model, text: str, cadquery: CadQuery | None) -> set[int]:
-    if text.startswith("#") and text[1:].isdigit():
+    if text.startswith("#") and text[1:].isdecimal():
         return {_number(text, text[1:], len(model.faces), "faces")}
     if text.startswith("#"):
         raise UsageError(f"{text!r} is not a face number", HINT)
@@ -152,11 +152,12 @@ def _where(model: Model, test: Callable[[Face], bool]) -> set[int]:
 
 
 def _number(word: str, digits: str, count: int, what: str) -> int:
-    if not digits.isdigit() or not 1 <= int(digits) <= count:
+    number = int(digits) if digits.isdecimal() and len(digits) < 10 else 0
+    if not 1 <= number <= count:
         raise UsageError(
             f"{word!r}: the model has {what} #1 to #{count}" if count else f"{word!r}: the model has no {what}", HINT
         )
-    return int(digits) - 1
+    return number - 1
 
 
 def _nearest(model: Model, text: str) -> int:

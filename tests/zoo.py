@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterator
 
 import cadquery as cq
+import numpy as np
 from OCP.BRep import BRep_Builder, BRep_Tool
 from OCP.BRepBuilderAPI import (
     BRepBuilderAPI_MakeFace,
@@ -24,7 +25,13 @@ from OCP.TopExp import TopExp_Explorer
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Shape, TopoDS_Shell
 
+from mracad.constraint.frozen import halvings, separate
+from mracad.model import Displacement, Offset
+from mracad.occ import Document, apply, view
+from tests.occ import shapes
+
 Maker = Callable[[], TopoDS_Shape]
+_FREE = 30  # control points that should get noise
 
 
 def sphere() -> cq.Workplane:
@@ -212,3 +219,81 @@ def closed() -> Iterator[tuple[str, Maker]]:
         for hole in ("hole", "holes", "seam"):
             yield from both(f"{body}-{hole}-mirrored", lambda body=body, hole=hole: mirrored(cut(body, hole)))
             yield from both(f"{body}-{hole}-placed", lambda body=body, hole=hole: placed(cut(body, hole)))
+
+
+def rounded_box() -> cq.Workplane:
+    return cq.Workplane().box(40, 30, 20).edges().fillet(4)
+
+
+def chamfered_box() -> cq.Workplane:
+    return cq.Workplane().box(40, 30, 20).edges("|Z").fillet(6).faces(">Z").chamfer(2)
+
+
+def shelled() -> cq.Workplane:
+    return cq.Workplane().box(40, 30, 20).edges("|Z").fillet(6).faces(">Z").shell(2)
+
+
+def square_to_round() -> cq.Workplane:
+    return cq.Workplane().rect(30, 20).workplane(offset=25).circle(8).loft()
+
+
+def pipe() -> cq.Workplane:
+    path = cq.Workplane("XY").spline([(0, 0), (20, 5), (40, 30), (60, 20)])
+    return cq.Workplane("YZ").circle(4).sweep(path)
+
+
+def twisted() -> cq.Workplane:
+    return cq.Workplane().rect(20, 12).twistExtrude(30, 60)
+
+
+def sector() -> cq.Workplane:
+    """Revolved by less than a turn."""
+    profile = cq.Workplane("XZ").moveTo(10, 0).spline([(18, 6), (14, 16), (20, 25)], includeCurrent=True)
+    return profile.lineTo(10, 25).close().revolve(200, (0, 0, 0), (0, 1, 0))
+
+
+def crossing_pipes() -> cq.Workplane:
+    across = cq.Workplane("YZ").circle(6).extrude(50).translate((-25, 0, 0))
+    return cq.Workplane().circle(10).extrude(40, both=True).union(across)
+
+
+def blended() -> cq.Workplane:
+    """A boss on a plate, the joint between them filleted."""
+    return cq.Workplane().box(40, 40, 6).faces(">Z").workplane().circle(10).extrude(12).edges("%CIRCLE").fillet(2)
+
+
+def drilled() -> cq.Workplane:
+    """A freeform top with holes through it."""
+    profile = cq.Workplane("XZ").lineTo(40, 0).lineTo(40, 10).spline([(28, 14), (12, 8), (0, 12)], includeCurrent=True)
+    return profile.close().extrude(-30).faces("<Z").workplane(origin=(20, 15, 0)).rarray(16, 12, 2, 2).hole(5)
+
+
+def lettered() -> cq.Workplane:
+    return cq.Workplane().box(40, 20, 4).faces(">Z").workplane().text("Sg", 12, 2)
+
+
+SOLIDS: dict[str, Callable[[], cq.Workplane]] = {
+    each.__name__: each
+    for each in (
+        rounded_box, chamfered_box, shelled, square_to_round, pipe, twisted, sector, crossing_pipes, blended, drilled,
+        lettered,
+    )
+}  # fmt: skip
+"""Bodies as they are drawn every day."""
+
+
+def noisy(shape: TopoDS_Shape, size: float = 0.03, seed: int = 1) -> Document:
+    """A document with a body as NURBS, and noise on those control points (of finer nets) that no edge looks at."""
+    document = shapes.document(nurbs(shape), names={0: "body"})
+    model = view(document)
+    rng, offsets = np.random.default_rng(seed), {}
+    for surface in model.surfaces:
+        on = [model.faces[face] for face in surface.faces]
+        for net, *knots in halvings(surface.net):
+            free = separate(net, on, surface.faces).free
+            if free.sum() >= _FREE:
+                noise = size * rng.standard_normal(net.poles.shape)
+                offsets[surface.index] = Offset(np.where(free[..., None], noise, 0.0), *knots)
+                break
+    apply(document, model, Displacement(offsets))
+    return document

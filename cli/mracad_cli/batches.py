@@ -73,9 +73,10 @@ def run_batch(
     words = [word for given in sources for word in (_listed() if given == "-" else [given])]
     items = find(words, Path(folder), format or "")
     if dry_run:
-        listed = (f"{item.source} -> {Path(folder, item.output)}" for item in items)
-        for line in [*plan(recipe.steps(items[0].source)), *listed]:
-            print(line)
+        listed = {item.source: str(Path(folder, item.output)) for item in items}
+        planned = plan(recipe.steps(items[0].source))
+        lines = [*planned, *(f"{source} -> {output}" for source, output in listed.items())]
+        deliver({}, [json_text({"plan": planned, "files": listed})] if as_json else lines)
         return 0
     workers = min(jobs or os.cpu_count() or 1, len(items))
     start = time.perf_counter()

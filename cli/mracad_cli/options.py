@@ -9,9 +9,8 @@ from typing import Any, Literal
 import click
 from msgspec import Meta, Struct, structs
 
-from mracad.errors import UsageError
 from mracad.formats import FORMATS
-from mracad.options import Length, dashed, plain_types
+from mracad.options import Length, dashed, duration, plain_types
 
 Command = Callable[..., Any]
 
@@ -133,9 +132,9 @@ debug = click.option("--debug", is_flag=True, expose_value=False, help="Show the
 limiting = apply(
     click.option(
         "--time-limit",
-        metavar="SECONDS",
+        metavar="TIME",
         expose_value=False,
-        help="End the command after this time: exit code 5.",
+        help="End the command after this time (90s, 10min): exit code 5.",
     ),
     click.option(
         "--memory-limit", metavar="SIZE", expose_value=False, help="Memory that the command may hold: 500MB, 2GB."
@@ -171,14 +170,7 @@ def limits(arguments: list[str]) -> tuple[float | None, int | None]:
     from mracad.guard import size
 
     time, memory = (_given(arguments, flag) for flag in ("--time-limit", "--memory-limit"))
-    if time is None:
-        return None, None if memory is None else size(memory)
-    try:
-        seconds = float(time)
-    except ValueError:
-        seconds = 0.0
-    if not 0 < seconds < float("inf"):
-        raise UsageError(f"time-limit: {time!r} is not a time", "give seconds, greater than zero")
+    seconds = None if time is None else duration(time, "time-limit")
     return seconds, None if memory is None else size(memory)
 
 

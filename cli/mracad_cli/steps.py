@@ -65,8 +65,9 @@ def run_steps(
     from mracad_cli import render
 
     start = time.perf_counter()
-    records = [f"{path}.toml" for path in outputs if record and path != "-"]
-    targets = Outputs(outputs, needed=not dry_run, beside=(report, depfile, *records), **formats)
+    places = [f"{path}.toml" for path in outputs if record and path != "-"]
+    targets = Outputs(outputs, needed=not dry_run, beside=(report, depfile, *places), **formats)
+    records = {place: record_of(steps, place) for place in places}
     with Progress() as progress:
         progress("reading", 0, 1)
         text = load(source)
@@ -88,7 +89,7 @@ def run_steps(
     body |= {"warnings": document.warnings, **targets.body()}
     files: dict[str, str | None] = {report: render.json_text(body, 1) + "\n"} if report else {}
     if done.made:
-        files |= dict.fromkeys(records, record_of(steps))
+        files |= records
         needs = [source] * (source != "-") + needed(steps, recipe)
         files |= {depfile: depfile_text(targets.files(), needs)} if depfile else {}
     end = f"wrote {targets.sizes()}" if done.made else f"{'dry run, ' if dry_run else ''}nothing written"

@@ -16,7 +16,7 @@ import numpy as np
 
 from mracad.bspline.knots import Side as Limit
 from mracad.bspline.net import Net, cross, curvature
-from mracad.constraint.coincide import GAP, coinciding
+from mracad.constraint.coincide import GAP, TORN, coinciding
 from mracad.constraint.seam import from_inside
 from mracad.model import Edge, Face, Model, Side
 
@@ -25,9 +25,6 @@ _Pair = tuple[Edge, bool, tuple[Side, Side]]
 
 SMOOTH = 1.0
 """Degrees: a seam whose largest angle is below this counts as smooth in summaries."""
-
-TORN = 0.05
-"""Distance, mm, within which two free edges are told to be one that was torn open."""
 
 FLAT = 1e-9
 """Curvature, 1/mm, below which a face counts as flat: jumps are not measured against less."""

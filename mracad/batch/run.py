@@ -13,6 +13,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, Protocol
 
+from msgspec import structs
+
 from mracad.audit.accept import ReadBack
 from mracad.batch.cluster import lost
 from mracad.batch.manifest import Manifest, digest
@@ -263,12 +265,13 @@ class _Batch:
             self._epoch,
         )
         key = self._key(work)
-        if self.manifest.done(item.output, key):
-            try:
-                self.manifest.restore(self._record(item, work))
-            except MracadError as error:
-                return _failed(item, error)
-            return Outcome(item.source, item.output, "unchanged")
+        try:
+            beside = self._record(item, work)
+            if self.manifest.done(item.output, key):
+                self.manifest.restore(beside)
+                return Outcome(item.source, item.output, "unchanged")
+        except MracadError as error:
+            return _failed(item, error)
         self._submit(_Task(item, work, key, 0, 0.0))
         return None
 
@@ -295,7 +298,8 @@ class _Batch:
 
     def _record(self, item: Item, work: Work) -> dict[str, bytes]:
         """The resolved recipe that goes beside the output, where asked."""
-        return {f"{item.output}.toml": record_of(work.steps).encode()} if self.settings.record else {}
+        name = f"{item.output}.toml"
+        return {name: record_of(work.steps, self.manifest.folder / name).encode()} if self.settings.record else {}
 
     def _check_target(self, item: Item) -> None:
         target = self.manifest.folder / item.output
@@ -305,7 +309,8 @@ class _Batch:
     def _key(self, work: Work) -> str:
         """A hash of everything that the output depends on."""
         files = {Path(name).name: digest(data) for name, data in work.files.items()}
-        parts = [work.name, digest(work.data), record_of(work.steps), files]
+        steps = [[step.use, step.id, structs.asdict(step.options)] for step in work.steps]
+        parts = [work.name, digest(work.data), steps, dict(work.versions), files]
         return digest(
             json.dumps(
                 [*parts, work.input_unit, work.encoding, work.format, work.schema, work.verify, work.epoch],

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from mracad.audit.accept import ReadBack
 from mracad.errors import Code, MracadError
 from mracad.options import STEPS
-from mracad.recipe import Step, relocated, title, versions
+from mracad.recipe import Step, title, versions
 
 if TYPE_CHECKING:
     from mracad.job import Judged, Report
@@ -127,7 +127,7 @@ def _here(work: Work, folder: Path) -> list[Step]:
         place.parent.mkdir()
         place.write_bytes(data)
         places[name] = str(place)
-    return [replace(step, options=relocated(step.options, places)) for step in work.steps]
+    return [replace(step, options=step.options.relocated(places)) for step in work.steps]
 
 
 def _short(result: Report | Judged) -> dict[str, Any]:

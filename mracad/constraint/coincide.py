@@ -2,11 +2,16 @@
 
 Each edge is known at samples with unit tangents; between two samples it is taken as the cubic Hermite arc, which is
 off by the fourth power of the step.  An edge belongs to another when all of its samples lie on the other's arcs.
+
+How near that is depends on the model alone, so that a model means the same at every size: within the tolerances that
+the edges themselves have, or a share of the edge and of the model, whichever is less (:func:`reach`).  Parts that
+stand once and in the same place (the roots of an IGES file, the products of many a STEP file) are one space.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -14,48 +19,98 @@ from mracad.model import Edge, Model, Side
 
 Array = np.ndarray
 
-GAP = 1e-2
-"""Distance, mm, within which free edges of different faces are taken for a seam (or 1e-6 of the diagonal)."""
+GAP = 1.0
+"""How far apart, in units of :func:`reach`, free edges of different faces are taken for a seam."""
+
+TORN = 5.0
+"""How far apart, in the same units, two free edges are told to be one that was torn open."""
+
+OF_MODEL, OF_EDGE, PRECISION = 1e-4, 2e-3, 1e-6
+"""Shares of the diagonal and of the length of an edge, and the share of the diagonal that numbers are good for."""
 
 BEYOND = 0.125
 """Share of the first and last steps by which an edge goes on beyond its samples."""
 
 
+def reach(model: Model, edge: Edge, other: Edge) -> float:
+    """Distance, mm, within which an edge that lies along another one coincides with it."""
+    share = min(OF_MODEL * model.diagonal, OF_EDGE * length(edge))
+    return max(share, edge.tolerance + other.tolerance, PRECISION * model.diagonal)
+
+
 def coinciding(model: Model, gap: float = GAP) -> list[tuple[Edge, Side, Side]]:
-    """Seams of free edges within ``gap`` of each other: an edge, its side, and the other face's at the same places.
+    """Seams of free edges within ``gap`` times their :func:`reach` of each other: an edge, its side, and the other
+    face's at the same places.
 
     Where one edge is a part of the other (a T-junction) the shorter one is the seam.
     """
     free = [e for e in model.edges if e.free and len(e.points) > 1]
-    if len({e.sides[0].face for e in free}) < 2:
-        return []
-    tolerance = max(gap, 1e-6 * model.diagonal)
-    lines = [_hermite(e.points, _slopes(e), *_between(len(e.points))) for e in free]
     found: dict[tuple[int, int], tuple[Edge, Side, Side]] = {}
-    for i, j in _candidates(free, lines, tolerance):
+    space = np.array([model.spaces[e.part] if model.spaces else 0 for e in free])
+    for i, j in _candidates(model, free, gap, lambda i: space == space[i]):
         edge, other = free[i], free[j]
         if (j, i) in found:
             continue
         off, uv = _carried(edge.points, other)
-        if np.linalg.norm(off, axis=1).max() <= tolerance:
+        if np.linalg.norm(off, axis=1).max() <= gap * reach(model, edge, other):
             side = Side(other.sides[0].face, uv=uv) if uv is not None else _baked(edge.points - off, other)
             found[i, j] = (edge, edge.sides[0], side)
     return list(found.values())
 
 
-def _candidates(free: list[Edge], lines: list[Array], tolerance: float) -> Iterator[tuple[int, int]]:
-    """Pairs (i, j) of edges of one part and different faces where ends and middle of i are near points of j."""
-    reach = np.array([np.linalg.norm(np.diff(line, axis=0), axis=1).max() for line in lines]) + tolerance
-    low = np.array([line.min(axis=0) for line in lines]) - reach[:, None]
-    high = np.array([line.max(axis=0) for line in lines]) + reach[:, None]
-    part, face = (np.array(x) for x in zip(*((e.part, e.sides[0].face) for e in free), strict=True))
+def touching(model: Model) -> frozenset[int]:
+    """Free edges that coincide, where they stand, with one of another instance, whose numbers are in another space."""
+    if len(set(model.spaces)) < 2 and all(len(frames) == 1 for frames in model.places):
+        return frozenset()
+    free = [
+        (edge, number, _placed(edge, frame))
+        for edge in model.edges
+        if edge.free and len(edge.points) > 1
+        for number, frame in enumerate(model.places[edge.part])
+    ]
+    stands = np.array([(model.spaces[edge.part], number) for edge, number, _ in free]).reshape(-1, 2)
+    placed = [edge for _, _, edge in free]
+    found: set[int] = set()
+    for i, j in _candidates(model, placed, GAP, lambda i: (stands != stands[i]).any(axis=1), alike=True):
+        if placed[i].index not in found or placed[j].index not in found:
+            off, _ = _carried(placed[i].points, placed[j])
+            if np.linalg.norm(off, axis=1).max() <= reach(model, placed[i], placed[j]):
+                found |= {placed[i].index, placed[j].index}
+    return frozenset(found)
+
+
+def _placed(edge: Edge, frame: Array) -> Edge:
+    """An edge where an instance of its part stands."""
+    turn = frame[:3, :3].T
+    return replace(edge, points=edge.points @ turn + frame[:3, 3], tangents=edge.tangents @ turn)
+
+
+def _candidates(
+    model: Model, free: list[Edge], gap: float, eligible: Callable[[int], Array], alike: bool = False
+) -> Iterator[tuple[int, int]]:
+    """Pairs (i, j) of edges where j is among those ``eligible`` for i, of different faces (or ``alike``), and ends and
+    middle of i are near points of j."""
+    if len(free) < 2:
+        return
+    lines = [_hermite(e.points, _slopes(e), *_between(len(e.points))) for e in free]
+    share = [max(OF_MODEL * model.diagonal, 2 * e.tolerance, PRECISION * model.diagonal) * gap for e in free]
+    steps = np.array([np.linalg.norm(np.diff(line, axis=0), axis=1).max() for line in lines]) + np.max(share)
+    low = np.array([line.min(axis=0) for line in lines]) - steps[:, None]
+    high = np.array([line.max(axis=0) for line in lines]) + steps[:, None]
+    face = np.array([e.sides[0].face for e in free])
     for i, line in enumerate(lines):
         probes = line[[0, len(line) // 2, -1]]
         inside = ((probes >= low[:, None]) & (probes <= high[:, None])).all(axis=(1, 2))
-        for j in np.flatnonzero(inside & (part == part[i]) & (face != face[i])):
+        inside &= eligible(i)
+        for j in np.flatnonzero(inside if alike else inside & (face != face[i])):
             apart = np.linalg.norm(probes[:, None] - lines[j], axis=2).min(axis=1)
-            if (apart <= reach[j]).all():
+            if (apart <= steps[j]).all():
                 yield i, int(j)
+
+
+def length(edge: Edge) -> float:
+    """Length of an edge, mm, as the polygon of its samples."""
+    return float(np.linalg.norm(np.diff(edge.points, axis=0), axis=1).sum())
 
 
 def apart(edge: Edge, other: Edge) -> float:

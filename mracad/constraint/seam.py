@@ -18,7 +18,7 @@ import numpy as np
 
 from mracad.bspline.knots import Side as Limit
 from mracad.bspline.net import Net, cross
-from mracad.constraint.coincide import GAP, apart, coinciding
+from mracad.constraint.coincide import apart, coinciding, length, reach, touching
 from mracad.constraint.frozen import CONTINUITY, ISO, local_span
 from mracad.model import Edge, Face, Model, Side
 
@@ -30,6 +30,8 @@ TRIMMED, UNEVEN = "trimmed", "parameters differ along the seam"
 
 HELD = "held by --hold"
 
+FREE, ELSEWHERE = "free edge", "touches another instance, which moves by itself"
+
 WHOLE = 1e-2
 """Edges that coincide and differ by less than this in length coincide as a whole."""
 
@@ -39,8 +41,8 @@ CREASE = np.radians(1.0)
 AFFINE = 1e-7
 """Largest deviation, as a fraction of the seam, from an affine map between the parameters along it."""
 
-SLIP = 1e-2
-"""Largest distance, mm, between points of equal parameter measured along the seam (or 1e-5 of its length)."""
+SLIP = 1e-4
+"""Largest distance between points of equal parameter measured along the seam, as a share of its length."""
 
 EXACT, CLOSE = 1e-8, 2e-3
 """A joint's polynomials fit when they miss the input by EXACT of |T_n|; they serve up to CLOSE: the angle of the seam
@@ -230,7 +232,7 @@ def seams(model: Model, movable: Collection[int], wishes: Wishes) -> Seams:
         elif edge.degenerate:
             frozen[edge.index] = "pole"
         elif len(edge.sides) == 1:
-            frozen[edge.index] = "free edge"
+            frozen[edge.index] = FREE
         elif len(edge.sides) > 2:
             frozen[edge.index] = "more than two faces"
         else:
@@ -258,19 +260,22 @@ def seams(model: Model, movable: Collection[int], wishes: Wishes) -> Seams:
             del frozen[seam.edge], frozen[seam.twin]
         elif isinstance(seam, str):
             frozen[edge.index] = seam
+    for index in touching(model) & frozen.keys():
+        if frozen[index] == FREE:
+            frozen[index] = ELSEWHERE
     return result
 
 
 def _twin(model: Model, edge: Edge, face: int) -> Edge | None:
     """The free edge of a face that coincides with another free edge, known to lie on one of that face, as a whole."""
-    length = _length(edge)
+    own = length(edge)
     others = [
         other
         for other in model.edges
-        if other.free and other.sides[0].face == face and abs(_length(other) - length) <= WHOLE * length
+        if other.free and other.sides[0].face == face and abs(length(other) - own) <= WHOLE * own
     ]
     nearest = min(others, key=lambda other: apart(edge, other), default=None)
-    return nearest if nearest and apart(edge, nearest) <= max(GAP, 1e-6 * model.diagonal) else None
+    return nearest if nearest and apart(edge, nearest) <= reach(model, edge, nearest) else None
 
 
 def runs_back(one: Array, other: Array) -> bool:
@@ -278,10 +283,6 @@ def runs_back(one: Array, other: Array) -> bool:
     at = np.linspace(0, len(other) - 1, len(one)).round().astype(int)
     ahead, behind = (np.linalg.norm(one - other[k], axis=1).mean() for k in (at, at[::-1]))
     return bool(behind < ahead)
-
-
-def _length(edge: Edge) -> float:
-    return float(np.linalg.norm(np.diff(edge.points, axis=0), axis=1).sum())
 
 
 def _seam(
@@ -414,7 +415,7 @@ def _joint(model: Model, borders: tuple[Border, Border], found: tuple[_Jet, _Jet
     (a, b), ((s, sn, st, snn), (t, tn, tt, tnn)) = borders, found
     length = np.linalg.norm(st, axis=1).mean()
     slip = np.abs(((s - t) * st).sum(axis=1) / np.maximum(np.linalg.norm(st, axis=1), 1e-12 * length)).max()
-    if slip > max(SLIP, 1e-5 * length):
+    if slip > SLIP * length:
         return UNEVEN
     normals = _outward(model, a, sn, st), _outward(model, b, tn, tt)
     sizes = [np.linalg.norm(n, axis=1) for n in normals]

@@ -16,7 +16,7 @@ from mracad.constraint.seam import Treatment, Wishes
 from mracad.edit.result import Edit, FaceOutcome
 from mracad.errors import EditError, UsageError
 from mracad.feature.character import at_scale, laid_on
-from mracad.feature.copies import Copies, Laid
+from mracad.feature.copies import NARROWEST, Copies, Laid
 from mracad.feature.detail import Feature, above_surroundings, between_levels, load
 from mracad.feature.ground import Ground, axes
 from mracad.feature.pattern import along, grid, listed, polar, scattered
@@ -188,9 +188,21 @@ def _laid(
     removed: Mapping[int, Array],
     hold: frozenset[int],
 ) -> Laid:
+    _refuse_small(places, feature)
     feet = standing(ground, places, feature.reach)
     copies = Copies(ground, feature, places, feet, overlap, options.mirror)
     return copies.laid(Wishes(options.keep, hold=hold), options.edges == "coupled", options.clip, removed)
+
+
+def _refuse_small(places: Sequence[Place], feature: Feature) -> None:
+    """Raise EditError for a copy that would need knots which nearly meet."""
+    least = min(places, key=lambda p: p.size, default=None)
+    if least is not None and feature.spacing * least.size < NARROWEST:
+        raise EditError(
+            f"{least.label}: a copy of {2 * feature.radius * least.size:.3g} mm would need knots closer than "
+            f"{NARROWEST:g} mm",
+            "make it larger with --size",
+        )
 
 
 def _edit(model: Model, laid: Laid, scope: Scope) -> Edit:

@@ -16,7 +16,18 @@ from mracad.bspline.knots import KnotVector
 from mracad.bspline.net import Net
 from mracad.constraint.frozen import separate
 from mracad.errors import EditError
-from mracad.feature.copies import MISSED, PIECES, ROUNDS, SPARE, Copy, Laid, divided, refined_offset, weights_over
+from mracad.feature.copies import (
+    MISSED,
+    NARROWEST,
+    PIECES,
+    ROUNDS,
+    SPARE,
+    Copy,
+    Laid,
+    divided,
+    refined_offset,
+    weights_over,
+)
 from mracad.feature.detail import taper
 from mracad.feature.ground import Sheet
 from mracad.model import Model, Offset
@@ -134,6 +145,8 @@ def laid_on(
     if height * comes <= 1e-7 and stays == 1.0:
         raise EditError(f"from: {options.from_} has no detail in the band", "give another --band")
     least = [float(np.median(arc_lengths(source.net, axis)[arc_lengths(source.net, axis) > 0])) for axis in (0, 1)]
+    if min(least) * options.size < NARROWEST:
+        raise EditError(f"size: {options.size:g} would need knots closer than {NARROWEST:g} mm", "give a larger --size")
     extra, poles = _held(target, own, ideal, MISSED * height, min(least) * options.size)
     net = model.surfaces[target.index].net
     fine = net.refined(*extra)

@@ -58,6 +58,9 @@ EXACT, CONGRUENT = 1e-6, 1e-3
 WIDER, STEEPER = 1e-7, np.radians(0.01)
 """A seam may end up with so much more of a gap (mm) and of an angle; otherwise it is frozen."""
 
+NARROWEST = 1e-3
+"""Least width of a knot span that is made for a copy, mm."""
+
 MOST = 4_000_000
 """Control points that a net may grow to."""
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from mracad.errors import EditError, UsageError
 from mracad.feature.ground import Feet, Ground, axes
-from mracad.feature.place import Place, numbers, place, table
+from mracad.feature.place import MOST_PLACES, Place, numbers, place, table, whole
 from mracad.model import Model
 
 Array = np.ndarray
@@ -42,22 +42,34 @@ def listed(ground: Ground, words: Sequence[str]) -> list[Place]:
 def grid(ground: Ground, text: str, origin: Array, frame: Array, own: bool) -> list[Place]:
     """A grid that follows the ground along the axes of a frame (rows); the first place is left out where the feature
     is there already."""
-    match = re.fullmatch(r"\s*(\d+)\s*[xX]\s*(\d+)\s*,(.*)", text)
-    if not match or 0 in (int(match[1]), int(match[2])):
+    match = re.fullmatch(r"\s*([0-9]+)\s*[xX]\s*([0-9]+)\s*,(.*)", text)
+    if not match:
         raise UsageError(f"grid: {text!r} is not right", GRID)
+    wide, high = (_counted(match[i], f"grid: {text!r}", GRID) for i in (1, 2))
+    _counted(str(wide * high), f"grid: {text!r}", GRID)
     dx, dy = numbers(match[3], "grid", GRID, (2,))
     rows = [(origin[None], frame[None])]
-    for _ in range(int(match[1]) - 1):
+    for _ in range(wide - 1):
         rows.append(_walked(ground, *rows[-1], 0, dx))
     columns = [(np.concatenate([p for p, _ in rows]), np.concatenate([f for _, f in rows]))]
-    for _ in range(int(match[2]) - 1):
+    for _ in range(high - 1):
         columns.append(_walked(ground, *columns[-1], 1, dy))
     return [
         Place(f"place {i + 1},{j + 1} of the grid", points[i], direction=frames[i, 0])
-        for i in range(int(match[1]))
+        for i in range(wide)
         for j, (points, frames) in enumerate(columns)
         if i or j or not own
     ]
+
+
+def _counted(text: str, what: str, hint: str) -> int:
+    """How many places a text asks for; raises UsageError."""
+    count = whole(text)
+    if not count:
+        raise UsageError(f"{what} is not right", hint)
+    if count > MOST_PLACES:
+        raise UsageError(f"{what}: more than {MOST_PLACES} places", "do them in several edits")
+    return count
 
 
 def _walked(ground: Ground, points: Array, frames: Array, axis: int, distance: float) -> tuple[Array, Array]:
@@ -76,9 +88,8 @@ def _walked(ground: Ground, points: Array, frames: Array, axis: int, distance: f
 
 def polar(text: str, origin: Array, frame: Array, own: bool) -> list[Place]:
     """Places around an axis; the first one is left out where the feature is there already."""
-    count, _, rest = text.partition(",")
-    if not count.strip().isdigit() or int(count) < 1:
-        raise UsageError(f"polar: {text!r} is not right", POLAR)
+    first, _, rest = text.partition(",")
+    count = _counted(first.strip(), f"polar: {text!r}", POLAR)
     if rest.strip().lower() in AXES:
         centre, axis = np.zeros(3), np.array(AXES[rest.strip().lower()])
     else:
@@ -88,9 +99,9 @@ def polar(text: str, origin: Array, frame: Array, own: bool) -> list[Place]:
     if size == 0:
         raise UsageError(f"polar: {text!r} has no direction", POLAR)
     found = []
-    for k in range(1 if own else 0, int(count)):
-        turn = _rotation(axis / size, 2 * np.pi * k / int(count))
-        label = f"place {k + 1} of {int(count)} around the axis"
+    for k in range(1 if own else 0, count):
+        turn = _rotation(axis / size, 2 * np.pi * k / count)
+        label = f"place {k + 1} of {count} around the axis"
         found.append(Place(label, centre + turn @ (origin - centre), direction=turn @ frame[0]))
     return found
 
@@ -98,15 +109,14 @@ def polar(text: str, origin: Array, frame: Array, own: bool) -> list[Place]:
 def along(ground: Ground, text: str) -> list[Place]:
     """Places along an edge, in the middles of equal parts of it."""
     name, _, rest = text.partition(",")
-    number = name.strip().removeprefix("edge#").removeprefix("#")
+    number = whole(name.strip().removeprefix("edge#").removeprefix("#")) or 0
     model = ground.model
-    if not number.isdigit() or not 1 <= int(number) <= len(model.edges):
+    if not 1 <= number <= len(model.edges):
         raise UsageError(f"along: {name!r}: the model has edges edge#1 to edge#{len(model.edges)}", ALONG)
-    values = numbers(rest, "along", ALONG, (1, 2))
-    count, offset = int(values[0]), values[1] if len(values) > 1 else 0.0
-    if count < 1 or count != values[0]:
-        raise UsageError(f"along: {rest!r} is not right", ALONG)
-    edge = model.edges[int(number) - 1]
+    first, comma, last = rest.partition(",")
+    count = _counted(first.strip(), f"along: {text!r}", ALONG)
+    offset = numbers(last, "along", ALONG, (1,))[0] if comma else 0.0
+    edge = model.edges[number - 1]
     side = next((s for s in edge.sides if s.face in ground.chosen and s.uv is not None), None)
     if side is None or edge.degenerate:
         raise EditError(f"along: edge#{number} bounds no face to edit", "select one of its faces with --faces")

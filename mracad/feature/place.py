@@ -18,23 +18,35 @@ Array = np.ndarray
 PLACE = "write a place as X,Y,Z in millimetres or #FACE@u,v"
 WINDOW = "write a feature as near:X,Y,Z,radius:R (mm), #FACE@u0:u1,v0:v1 or the name of a .feature file"
 
+FAR = 1e12
+"""Numbers of this size are no places and no distances, mm."""
+
+MOST_PLACES = 10_000
+"""Places that one edit takes."""
+
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 
 
 def numbers(text: str, what: str, hint: str, counts: Sequence[int]) -> list[float]:
     """Finite numbers between commas; raises UsageError."""
     parts = [part.strip() for part in text.split(",")]
-    if len(parts) not in counts or not all(re.fullmatch(_NUMBER, part) for part in parts):
+    if len(parts) not in counts or not all(re.fullmatch(_NUMBER, part) and abs(float(part)) < FAR for part in parts):
         raise UsageError(f"{what}: {text!r} is not right", hint)
     return [float(part) for part in parts]
+
+
+def whole(text: str) -> int | None:
+    """A whole number written in digits; None for anything else, and for what nothing has so many of."""
+    return int(text) if re.fullmatch(r"[0-9]{1,9}", text) else None
 
 
 def face_number(model: Model, text: str, what: str, hint: str) -> int:
     """A face by its number ``#3`` or its name; raises UsageError."""
     if text.startswith("#"):
-        if not text[1:].isdigit() or not 1 <= int(text[1:]) <= len(model.faces):
+        number = whole(text[1:]) or 0
+        if not 1 <= number <= len(model.faces):
             raise UsageError(f"{what}: {text!r}: the model has faces #1 to #{len(model.faces)}", hint)
-        return int(text[1:]) - 1
+        return number - 1
     found = [face.index for face in model.faces if text and text in (face.name, face.product)]
     if len(found) != 1:
         raise UsageError(f"{what}: {len(found) or 'no'} faces are called {text!r}", hint)
@@ -112,7 +124,11 @@ def table(path: str) -> list[tuple[str, list[float]]]:
             raise FileError(f"{where}: {line.strip()!r} is not a place", hint) from error
         if any(factor <= 0 for factor in row[4:5]):
             raise FileError(f"{where}: size {row[4]:g} is not greater than zero", "give a factor such as 1")
+        if any(factor == 0 for factor in row[5:6]):
+            raise FileError(f"{where}: a copy of height 0 is none", "leave the line out, or give a factor such as 1")
         rows.append((where, row))
+        if len(rows) > MOST_PLACES:
+            raise FileError(f"'{path}' names more than {MOST_PLACES} places", "give several files, one edit each")
     if not rows:
         raise FileError(f"'{path}' names no places", "write lines x,y,z")
     return rows

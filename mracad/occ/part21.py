@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Iterator, Mapping
 
@@ -61,13 +62,16 @@ def tidy(text: bytes, titles: Mapping[bytes, Title] | None = None) -> bytes:
 
 def _entitle(pieces: list[bytes], titles: Mapping[bytes, Title]) -> None:
     """Put titles in the place of marks: the name of a product is its identifier, too, that of an instance not."""
+    known = {title.identifier for title in titles.values()}
+    unused = (number for number in map(str, itertools.count(1)) if number not in known)
     for i in range(1, len(pieces), 2):
         title = titles.get(pieces[i])
         if title is None:
             continue
         head = i if pieces[i - 1].endswith(b"PRODUCT(") else i - 2
         if head == i or pieces[head - 1].endswith(b"NEXT_ASSEMBLY_USAGE_OCCURRENCE("):
-            pieces[head : head + 5 : 2] = map(encoded, (title.identifier, title.name, title.description))
+            identifier = next(unused) if title.identifier is None else title.identifier
+            pieces[head : head + 5 : 2] = map(encoded, (identifier, title.name, title.description))
         else:
             pieces[i] = encoded(title.name)
 

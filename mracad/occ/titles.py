@@ -28,16 +28,16 @@ _MARK = "mracad title "
 
 @dataclass(frozen=True)
 class Title:
-    """What a file says of a product or an instance."""
+    """What a file says of a product or an instance; an identifier of None is a number that is free."""
 
-    identifier: str
+    identifier: str | None
     name: str
     description: str = ""
 
     @property
     def shown(self) -> str:
         """The name, or else the identifier."""
-        return self.name if self.name.strip() else self.identifier
+        return self.name if self.name.strip() else self.identifier or ""
 
 
 def marked(text: bytes) -> tuple[bytes, list[Title]]:
@@ -69,15 +69,13 @@ def marking(document: Document) -> Iterator[Mapping[bytes, Title]]:
     What no file has named is called after its label, or by a number.
     """
     tool = document.shape_tool
-    known = {document.titles[key].identifier for key in map(label_key, _labels(document)) if key in document.titles}
-    unused = (number for number in map(str, itertools.count(1)) if number not in known)
     unnamed = (f"part {count}" for count in itertools.count(1))
     titles: dict[bytes, Title] = {}
     names: list[tuple[TDF_Label, str | None]] = []
     for number, label in enumerate(_labels(document)):
         title, name = document.titles.get(label_key(label)), label_name(label)
         if title is None and tool.IsComponent_s(label):
-            title = Title(next(unused), name)
+            title = Title(None, name)
         elif title is None:
             own = name or next(unnamed)
             title = Title(own, own)

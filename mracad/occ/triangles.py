@@ -12,11 +12,15 @@ from OCP.IMeshTools import IMeshTools_MeshAlgoType, IMeshTools_Parameters
 from OCP.TopAbs import TopAbs_REVERSED
 from OCP.TopLoc import TopLoc_Location
 
+from mracad.errors import UsageError
 from mracad.occ.document import Document
 from mracad.occ.settings import quiet
 from mracad.occ.topology import box, compound, matrix
 
 Array = np.ndarray
+SMALLEST = 1e-6, 0.5
+"""Least chord, as a share of the diagonal, and least angle, degrees."""
+
 _CHORD = 2e-4  # of the diagonal
 _ANGLE = 12.0  # degrees
 _ALGORITHMS = (
@@ -59,12 +63,23 @@ def triangles(document: Document, chord: float | None = None, angle: float | Non
         How far the mesh may be from the surface, mm; by default 1/5000 of the model's diagonal.
     angle : float, optional
         How far neighbouring triangles may turn along a curve, degrees; by default 12.
+
+    Raises
+    ------
+    UsageError
+        For a chord or an angle of which no mesh would come to an end.
     """
+    if angle is not None and not SMALLEST[1] <= angle <= 180:
+        raise UsageError(f"angle: {angle:g} is not between {SMALLEST[1]:g} and 180 degrees", "give --angle 12")
     with quiet():
         whole = compound(part.shape for part in document.parts)
         bounds = box(document.shape)
         settings = IMeshTools_Parameters()
-        settings.Deflection = chord or _CHORD * float(np.linalg.norm(bounds[1] - bounds[0]))
+        size = float(np.linalg.norm(bounds[1] - bounds[0]))
+        if chord is not None and not chord >= SMALLEST[0] * size:
+            least = f"give at least {SMALLEST[0] * size:.3g} mm, a millionth of the model's diagonal"
+            raise UsageError(f"chord: {chord:g} mm is too small", least)
+        settings.Deflection = chord or _CHORD * size
         settings.Angle = float(np.radians(angle or _ANGLE))
         best: Triangles | None = None
         for algorithm in _ALGORITHMS:

@@ -120,7 +120,8 @@ def view(document: Document, convert: Iterable[int] = (), edges: Container[int] 
         diagonal = _diagonal(document, boxes)
         _refuse_absurd(document.name, _seen(lines, found, diagonal))
     products = tuple(part.product for part in document.parts)
-    return Model(document.name, surfaces, faces, lines, diagonal, document.unit, document.schema, products)
+    places = tuple(tuple(matrix(place) for place in part.placements) for part in document.parts)
+    return Model(document.name, surfaces, faces, lines, diagonal, document.unit, document.schema, products, places)
 
 
 def _refuse_absurd(name: str, numbers: Iterable[tuple[int, Array | float]]) -> None:

@@ -8,6 +8,8 @@ from pathlib import Path
 from typing import Annotated, ClassVar
 
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 from mracad_cli.__main__ import main
 from msgspec import Meta
 
@@ -85,10 +87,11 @@ def test_recipe_pipeline_record_and_schema_agree(tmp_path):
     assert [step.id for step in steps] == ["fair", "check"]
     assert recipe.title(steps) == LINE
     assert [step.options for step in recipe.pipeline(LINE).steps("-")] == [step.options for step in steps]
-    again = recipe.load(written(tmp_path, recipe.record_of(steps)))
+    record = recipe.record_of(steps, tmp_path / "out.toml")
+    again = recipe.load(written(tmp_path, record))
     assert again.steps("other.step") == steps
     schema = recipe.schema()["$defs"]
-    for step in tomllib.loads(recipe.record_of(steps))["step"]:
+    for step in tomllib.loads(record)["step"]:
         assert set(step) <= set(schema[step["use"]]["properties"])
 
 
@@ -109,10 +112,7 @@ class Engrave(options.Selection, frozen=True, kw_only=True, forbid_unknown_field
     function: ClassVar[str] = "mracad.edit.smooth:smooth"
     quiet: ClassVar[str] = "blank"
 
-    stencil: Annotated[str, Meta(description="Its outline.")]
-
-    def files(self) -> tuple[str, ...]:
-        return (self.stencil.removeprefix("@"),)
+    stencil: Annotated[options.PlaceText, Meta(description="Its outline.")]
 
 
 def test_a_new_edit_is_known_everywhere_by_its_declaration(tmp_path, monkeypatch, capsys):
@@ -139,7 +139,7 @@ def test_one_read_and_one_write_for_the_whole_recipe(tmp_path, capsys, monkeypat
     two = "smooth --scale 20% ! smooth --level 1 --amount 0.5 ! check --max-angle 90"
     words = ["pipeline", two, str(source), "-o", str(tmp_path / "out.step"), "--record"]
     assert main([*words, "--depfile", str(tmp_path / "out.d")]) == 0
-    assert calls == ["read", "write"]
+    assert calls == ["read", "write", "read"]  # the last one is to judge what was written
     said = capsys.readouterr().out
     assert (
         said.startswith("smooth: part000.step: 1 NURBS face") and "\nsmooth-2: " in said and "\ncheck: passed" in said
@@ -192,3 +192,69 @@ def test_the_page_of_steps_is_up_to_date():
 def header(path: Path) -> str:
     """The header of a STEP file, its lines joined."""
     return path.read_text().partition("ENDSEC;")[0].replace("\n", "")
+
+
+TEXTS = st.text(st.characters(exclude_categories=("Cs",)), max_size=8)
+FLOATS = st.floats(min_value=0, allow_nan=False)
+calm = settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+
+
+@calm
+@given(
+    st.builds(options.Smooth, scale=st.just("2%"), faces=st.lists(TEXTS).map(tuple), instance=st.none() | TEXTS),
+    st.builds(options.Check, max_angle=st.none() | FLOATS, kink=FLOATS),
+    TEXTS.filter(bool),
+)
+def test_a_record_is_a_recipe_whatever_the_options(tmp_path_factory, smooth, check, name):
+    """Control characters, quotes, braces of variables, numbers without end."""
+    folder = tmp_path_factory.mktemp("record", numbered=True)
+    steps = (recipe.Step(name, "smooth", smooth), recipe.Step(f"{name}2", "check", check))
+    again = recipe.load(written(folder, recipe.record_of(steps, folder / "recipe.toml")))
+    assert again.steps("other.step") == steps
+
+
+@calm
+@given(st.recursive(TEXTS | FLOATS | st.booleans() | st.integers(), lambda x: st.lists(x, max_size=3), max_leaves=5))
+def test_values_are_toml(value):
+    assert tomllib.loads(f"value = {recipe._toml(value)}")["value"] == value
+
+
+def test_a_record_in_another_folder_finds_its_files(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "out").mkdir()
+    steps = recipe.pipeline("compare --reference models/ref.step").steps("-")
+    path = tmp_path / "out" / "made.toml"
+    path.write_text(recipe.record_of(steps, "out/made.toml"))
+    assert recipe.load(path).steps("-")[0].options.files() == (str(tmp_path / "models" / "ref.step"),)
+
+
+def test_a_record_refuses_what_toml_cannot_hold():
+    steps = recipe.pipeline("smooth --scale 2% --faces 'caf\udce9'").steps("-")
+    with pytest.raises(UsageError, match="not Unicode"):
+        recipe.record_of(steps, "out.toml")
+
+
+@pytest.mark.parametrize(
+    ("line", "files", "there"),
+    [
+        ("transfer --source wood --from wood --to woodpanel", ("wood",), ("x/wood", "wood", "woodpanel")),
+        (
+            "transfer --source a.step --from b.feature --to #1",
+            ("a.step", "b.feature"),
+            ("x/a.step", "x/b.feature", "#1"),
+        ),
+        ("transfer --source 1 --from #1 --to 1,1,1", ("1",), ("x/1", "#1", "1,1,1")),
+    ],
+)
+def test_the_files_of_a_transfer_are_told_by_their_options(line, files, there):
+    """Not by how their names look in others."""
+    (step,) = recipe.pipeline(line.replace("#", "'#'")).steps("-")
+    assert step.options.files() == files
+    moved = step.options.relocated({file: f"x/{file}" for file in files})
+    assert (moved.source, moved.from_, moved.to) == there
+
+
+def test_the_files_of_copies_are_told_by_their_options():
+    step = recipe.Step("r", "repeat", options.Repeat(feature="@b.feature", at=("@a.csv", "1,2,3", "a.csv@0,0")))
+    assert step.options.files() == ("@b.feature", "a.csv")
+    assert step.options.relocated({"a.csv": "x/c.csv"}).at == ("@x/c.csv", "1,2,3", "a.csv@0,0")

@@ -210,11 +210,18 @@ def command(*words):
 def test_limits_on_the_command_line(samples, tmp_path):
     out = tmp_path / "out.step"
     words = ["smooth", samples / "panel.step", "--scale", "16mm", "-o", out]
-    late = command(*words, "--time-limit", "0.2")
-    assert late.returncode == 5 and late.stderr.count("\n") == 1 and "0.2 s" in late.stderr and late.stdout == ""
+    late = command(*words, "--time-limit", "0.005min")
+    assert late.returncode == 5 and late.stderr.count("\n") == 1 and "0.3 s" in late.stderr and late.stdout == ""
     assert not list(tmp_path.iterdir())
     full = command(*words, "--memory-limit", "120MB")
     assert full.returncode == 5 and "120 MB" in full.stderr and not list(tmp_path.iterdir())
-    assert command(*words, "--time-limit", "60", "--memory-limit", "4GB").returncode == 0 and out.exists()
-    for wrong in (["--time-limit", "0"], ["--time-limit", "soon"], ["--memory-limit", "much"]):
+    assert command(*words, "--time-limit", "1min", "--memory-limit", "4GB").returncode == 0 and out.exists()
+    for wrong in (
+        ["--time-limit", "0"],
+        ["--time-limit", "soon"],
+        ["--time-limit", "5mm"],
+        ["--time-limit", "1e300"],
+        ["--memory-limit", "9" * 400],
+        ["--memory-limit", "much"],
+    ):
         assert command("info", samples / "panel.step", *wrong).returncode == 2
