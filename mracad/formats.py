@@ -81,3 +81,24 @@ def by_content(data: bytes, name: str) -> Format:
     if start[72:73] == b"S" and start[73:80].strip().isdigit():
         return FORMATS["iges"]
     raise FileError(f"'{name}' is none of STEP, IGES, BREP and BinBREP", "export it as one of them")
+
+
+_GEOMETRY_ONLY = frozenset({"assembly", "names", "colours", "layers", "materials", "annotations"})
+_LACKS = {
+    "AP203": frozenset({"annotations"}),
+    "AP214": frozenset({"annotations"}),
+    "IGES": frozenset({"assembly", "names", "transparency", "layers", "materials", "annotations", "shells"}),
+    "BREP": _GEOMETRY_ONLY,
+    "BinBREP": _GEOMETRY_ONLY,
+}
+
+
+def unheld(*schemas: str) -> dict[str, str]:
+    """What two documents cannot be compared by, and the format or schema that does not hold it.
+
+    Two STEP or two IGES files are compared by everything.  A format that keeps a thing in a part of the cases only
+    (levels of IGES are numbers) counts as not holding it.
+    """
+    if len(set(schemas)) == 1 and _LACKS.get(schemas[0]) != _GEOMETRY_ONLY:
+        return {}
+    return {what: schema for schema in schemas for what in sorted(_LACKS.get(schema, frozenset()))}

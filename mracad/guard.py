@@ -34,6 +34,10 @@ def size(text: str) -> int:
     return int(found)
 
 
+class TimeLimitError(LimitError):
+    """Work that took more time than it may."""
+
+
 class _Note:
     """A few words from a child to its parent, which remain when the child is lost."""
 
@@ -56,6 +60,7 @@ class _Note:
 
 
 _note: _Note | None = None  # of this process, when it is a child
+_memory: int | None = None  # that this process may hold, when it is a child with a limit
 
 
 def doing(stage: str = "", subject: str = "") -> None:
@@ -96,7 +101,7 @@ def run(
     seconds : float, optional
         Time that it may take.
     memory : int, optional
-        Bytes that it may hold.
+        Bytes that it may hold; within such a child by default what that may.
 
     Raises
     ------
@@ -104,18 +109,19 @@ def run(
         With the code of a limit when one was hit; with that of an internal error when the child crashed, or raised
         anything else.
     """
+    global _note, _memory
     if not hasattr(os, "fork"):
         if seconds is None and memory is None:
             return work()
         raise UsageError("this system cannot limit time and memory", "leave the limits out")
+    memory = memory or _memory
     sys.stdout.flush()
     sys.stderr.flush()
     reader, writer = os.pipe()
     note = _Note()
     child = os.fork()
     if not child:
-        global _note
-        _note = note
+        _note, _memory = note, memory
         os.close(reader)
         _child(work, writer, memory)
     os.close(writer)
@@ -129,7 +135,7 @@ def run(
         os.close(reader)
     if not finished:
         _end(child)
-        raise LimitError(f"time limit of {seconds:g} s exceeded{note}", "give more with --time-limit")
+        raise TimeLimitError(f"time limit of {seconds:g} s exceeded{note}", "give more with --time-limit")
     _, status, usage = os.wait4(child, 0)
     if asked and not data.startswith(wire.DONE):
         _terminated()

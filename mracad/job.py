@@ -11,15 +11,14 @@ from functools import partial
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-from mracad import guard, review
-from mracad.audit.compare import Limits
+from mracad import guard
 from mracad.audit.continuity import SeamMeasure, key, remeasured, seams
 from mracad.audit.deviation import Deviation, deviations
-from mracad.audit.verdict import Layer, Verdict
 from mracad.edit.result import Edit
 from mracad.errors import EditError, UsageError
+from mracad.judge import Judged, Original
 from mracad.model import Model
-from mracad.options import Check, Compare, Selection, length
+from mracad.options import Selection
 from mracad.select import Scope, every_nurbs
 from mracad.select import scope as select_scope
 
@@ -27,9 +26,6 @@ if TYPE_CHECKING:
     from mracad.occ.check import Validity
     from mracad.occ.document import Document
     from mracad.recipe import Step
-
-Original = Callable[[], "Document"]
-"""Reads a document again as it was."""
 
 WIDER, STEEPER = 1e-5, 0.01
 """No seam may gape by so much more (mm), and no smooth one turn by so much more (degrees), after an edit."""
@@ -65,23 +61,6 @@ class Report:
     def smooth_seams(self) -> frozenset[tuple[int, tuple[int, int]]]:
         """Keys of the seams that were smooth before."""
         return frozenset(key(m) for m in self.before if m.smooth)
-
-
-@dataclass(frozen=True)
-class Judged:
-    """What a check or comparison found, and the layers for which it fails."""
-
-    verdict: Verdict
-    failed: tuple[Layer, ...]
-
-    @property
-    def passed(self) -> bool:
-        return not self.failed
-
-    @property
-    def failures(self) -> list[str]:
-        """What does not hold, one line each; empty when it is passed."""
-        return [text for layer in self.failed for text in ([f.text for f in layer.findings] or [layer.text])]
 
 
 def play(
@@ -134,61 +113,6 @@ def play(
         if isinstance(result, Judged) and not result.passed:
             break
     return results
-
-
-def check(document: Document, options: Check, original: Original | None = None, *, text: bytes | None = None) -> Judged:
-    """Check a document.
-
-    Parameters
-    ----------
-    document : Document
-    options : Check
-    original : callable, optional
-        Not needed.
-    text : bytes, optional
-        The file that the document was read from: then every layer is looked at.  Without it there is no file to be
-        judged, and of the layers that take long only those that ``options.fail_on`` names are.
-    """
-    size = review.diagonal(document)
-    gap, tolerance, wall = (
-        None if given is None else length(given, size, name)
-        for given, name in (
-            (options.max_gap, "max-gap"),
-            (options.max_tolerance, "max-tolerance"),
-            (options.min_wall, "min-wall"),
-        )
-    )
-    limits = review.CheckLimits(gap, options.max_angle, options.kink, tolerance, wall, options.layer_limit)
-    slow = review.SLOW if text is not None else review.SLOW.intersection(options.fail_on)
-    verdict = review.check(text, document.name, document, limits, slow)
-    return Judged(verdict, tuple(review.failing(verdict, options.fail_on)))
-
-
-def compare(document: Document, options: Compare, original: Original | None = None) -> Judged:
-    """Compare a document with the reference that ``options`` names, or else with the original.
-
-    Raises
-    ------
-    UsageError
-        When there is neither.
-    """
-    from mracad.occ.files import read
-
-    if options.reference:
-        reference = read(options.reference, options.reference_unit)
-    elif original:
-        reference = original()
-    else:
-        raise UsageError("compare has nothing to compare with", "name a reference")
-    size = review.diagonal(reference)
-    limits = Limits(
-        deviation=length(options.max_deviation, size, "max-deviation"),
-        gap_growth=None if options.max_gap_growth is None else length(options.max_gap_growth, size, "max-gap-growth"),
-        angle_growth=options.max_angle_growth,
-        volume_change=None if options.max_volume_change is None else options.max_volume_change / 100,
-    )
-    verdict = review.compare(reference, document, limits, options.ignore)
-    return Judged(verdict, verdict.failed())
 
 
 def run(

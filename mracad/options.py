@@ -498,7 +498,7 @@ def band_of(text: str, diagonal: float) -> tuple[float, float]:
 class Check(Options, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Check validity and continuity; what fails it stops a recipe, and a command ends with exit code 1."""
 
-    function: ClassVar[str] = "mracad.job:check"
+    function: ClassVar[str] = "mracad.judge:check"
 
     max_gap: Annotated[Length | None, Meta(description="Largest gap along any seam.")] = None
     max_angle: Annotated[
@@ -508,6 +508,12 @@ class Check(Options, frozen=True, kw_only=True, forbid_unknown_fields=True):
     kink: Annotated[float, Meta(description="A seam with a smaller angle (degrees) is meant to be smooth.", ge=0.0)] = (
         1.0
     )
+    expect: Annotated[
+        str | None,
+        Meta(
+            description="How many seams are to be smooth: a number, or the report (JSON) of an earlier check or edit."
+        ),
+    ] = None
     max_tolerance: Annotated[Length | None, Meta(description="Largest tolerance of edges and vertices.")] = None
     min_wall: Annotated[Length | None, Meta(description="Least thickness of the walls of solids.")] = None
     layer_limit: Annotated[
@@ -521,11 +527,14 @@ class Check(Options, frozen=True, kw_only=True, forbid_unknown_fields=True):
         Meta(description="What fails the check beside the limits; repeatable."),
     ] = ("invalid",)
 
+    def files(self) -> tuple[str, ...]:
+        return (self.expect,) if self.expect and not self.expect.isdecimal() else ()
+
 
 class Compare(Options, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Compare with a reference; what differs beyond its limit stops a recipe, and a command ends with exit code 1."""
 
-    function: ClassVar[str] = "mracad.job:compare"
+    function: ClassVar[str] = "mracad.judge:compare"
 
     reference: Annotated[
         File | None, Meta(description="File to compare with; by default the model as it came into the recipe.")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,30 +11,35 @@ import numpy as np
 from mracad import guard
 from mracad.audit import check as layers
 from mracad.audit import compare as audit
-from mracad.audit.continuity import key, seams, summary
+from mracad.audit.continuity import seams
 from mracad.audit.crossing import crossings
 from mracad.audit.verdict import Finding, Layer, Verdict
-from mracad.errors import Code, MracadError
-from mracad.formats import by_content
+from mracad.errors import CrashError
+from mracad.formats import by_content, unheld
 
 if TYPE_CHECKING:
-    from mracad.audit.continuity import SeamMeasure, SeamSummary
+    from mracad.audit.continuity import SeamMeasure
     from mracad.occ.document import Document
     from mracad.occ.stated import Stated
 
 
-def compare(ref: Document, new: Document, limits: audit.Limits | None = None, ignore: Iterable[str] = ()) -> Verdict:
+def compare(
+    ref: Document, new: Document, limits: Callable[[float], audit.Limits] | None = None, ignore: Iterable[str] = ()
+) -> Verdict:
     """Judge a new version of a document by a reference.
 
     Parameters
     ----------
     ref, new : Document
-    limits : Limits, optional
-        What may differ; by default faces may deviate by a millionth of a millimetre.
+    limits : callable, optional
+        What may differ, from the diagonal of the reference in mm; by default faces may deviate by a millionth of a
+        millimetre.
     ignore : iterable of str
         Names of layers (see :data:`mracad.audit.compare.LAYERS`) that are left out.
     """
-    return audit.compare(_measured(ref), _measured(new), limits or audit.Limits(1e-6), ignore)
+    place = "assembly" in unheld(ref.schema, new.schema)
+    old, fresh = (_measured(document, place) for document in (ref, new))
+    return audit.compare(old, fresh, limits(old.model.diagonal) if limits else audit.Limits(1e-6), ignore)
 
 
 def diagonal(document: Document) -> float:
@@ -44,24 +49,35 @@ def diagonal(document: Document) -> float:
     return view(document).diagonal
 
 
-def _measured(document: Document) -> audit.Subject:
+def _measured(document: Document, place: bool) -> audit.Subject:
+    """A document, measured; with ``place`` all of its instances where they stand."""
     from mracad.occ.check import check
     from mracad.occ.contents import contents
     from mracad.occ.measure import Gauge, face_masses, mass
+    from mracad.occ.placed import placed
     from mracad.occ.view import view
 
+    whole = placed(document) if place else None
+    seen = whole.document if whole else document
+    model = view(seen)
+    if whole:
+        faces = (replace(face, colour=colour) for face, colour in zip(model.faces, whole.colours, strict=True))
+        model = replace(model, faces=tuple(faces))
     return audit.Subject(
-        model=view(document),
+        model=model,
+        schema=document.schema,
         contents=contents(document),
         mass=mass(document),
-        faces=face_masses(document),
-        validity=check(document),
-        gauge=Gauge(document),
+        faces=face_masses(seen),
+        validity=check(seen),
+        gauge=Gauge(seen),
+        face_numbers=whole.faces if whole else range(len(model.faces)),
+        edge_numbers=whole.edges if whole else range(len(model.edges)),
     )
 
 
 _DECISIVE = ("load", "brep", "shells")  # what makes a model invalid
-_BEYOND = {"gap", "angle", "edge-tolerance", "vertex-tolerance", "thin-wall"}  # findings against limits that were given
+_BEYOND = {"gap", "angle", "smooth-seams", "edge-tolerance", "vertex-tolerance", "thin-wall"}  # against given limits
 
 
 @dataclass(frozen=True)
@@ -70,8 +86,7 @@ class CheckLimits:
 
     Attributes
     ----------
-    gap, angle : float or None
-        Along seams; angles only of those below ``kink``, which are meant to be smooth.
+    seams : SeamLimits
     tolerance : float or None
         Of edges and vertices.
     wall : float or None
@@ -80,9 +95,7 @@ class CheckLimits:
         Time for each layer.
     """
 
-    gap: float | None = None
-    angle: float | None = None
-    kink: float = 1.0
+    seams: layers.SeamLimits = field(default_factory=layers.SeamLimits)
     tolerance: float | None = None
     wall: float | None = None
     layer_seconds: float | None = None
@@ -93,7 +106,7 @@ SLOW = frozenset({"self-intersection", "mesh"})
 
 
 def check(
-    text: bytes | None, name: str, document: Document, limits: CheckLimits, slow: Collection[str] = SLOW
+    text: bytes | None, document: Document, limits: Callable[[float], CheckLimits], slow: Collection[str] = SLOW
 ) -> Verdict:
     """Check a document, layer by layer.
 
@@ -101,10 +114,9 @@ def check(
     ----------
     text : bytes or None
         The file that it was read from; None for a document that has changed since.
-    name : str
-        Its name.
     document : Document
-    limits : CheckLimits
+    limits : callable
+        What it allows, from the diagonal of the document in mm.
     slow : collection of str
         Those of :data:`SLOW` to be looked at.
     """
@@ -114,21 +126,21 @@ def check(
     from mracad.occ.triangles import triangles
     from mracad.occ.view import view
 
-    model = view(document)
+    model, name = view(document), document.name
+    allowed = limits(model.diagonal)
     is_step = text is not None and by_content(text, name).name == "step"
     file = stated(text, name) if text is not None and is_step else None
     why = "not written yet" if text is None else "only STEP files are looked at as parsed"
     measures = seams(model, every=True)
     flipped = layers.turned(file.uses) if file else set()
-    told = _told(file, document) if file else {}
+    told = _told(file, document, model.diagonal) if file else {}
     known = {told[face] for face in flipped if face in told}
     senses = file.senses if file else ()
     inward = {face for place, face in told.items() if senses[place] == model.faces[face].reversed} - known
     unseen = "" if known or not flipped else f"; {len(flipped)} faces of the file were turned round"
-    brep = _limited("brep", lambda: layers.brep(kernel_check(document), inward), limits)
+    brep = _limited("brep", lambda: layers.brep(kernel_check(document), inward), allowed)
     validity = kernel_check(document, faces=None if brep.status in ("pass", "fail") else ())
     open_faces = {edge.sides[0].face for edge in model.edges if edge.free}
-    totals = summary(measures, frozenset(key(m) for m in measures if m.angle < limits.kink))
     found = [
         _file(file, document) if file else Layer("file", "skipped", why),
         _load(len(model.faces), file.faces, unseen, lambda: unloaded(text or b"", name))
@@ -136,23 +148,23 @@ def check(
         else Layer("load", "skipped", why),
         brep,
         layers.shells(model, validity, known | layers.turned(looks(document))),
-        layers.seams(measures, limits.kink, limits.gap, limits.angle, _seam_text(totals)),
-        _limited("self-intersection", lambda: _crossed(document, measures), limits, slow),
-        layers.tolerances(model, validity, limits.tolerance),
-        _limited("walls", lambda: _walls(document, limits.wall), limits),
-        _limited("mesh", lambda: layers.mesh(triangles(document), open_faces), limits, slow),
+        layers.seams(model, measures, allowed.seams),
+        _limited("self-intersection", lambda: _crossed(document, measures, model.diagonal), allowed, slow),
+        layers.tolerances(model, validity, allowed.tolerance),
+        _limited("walls", lambda: _walls(document, allowed.wall), allowed),
+        _limited("mesh", lambda: layers.mesh(triangles(document), open_faces), allowed, slow),
     ]
     return Verdict(name, tuple(found), _valid(found, validity.solids))
 
 
-def _told(file: Stated, document: Document) -> dict[int, int]:
+def _told(file: Stated, document: Document, diagonal: float) -> dict[int, int]:
     """Which face of the document each one in the file is, as far as its vertices tell."""
     from scipy.spatial import cKDTree
 
     from mracad.occ.check import centres
 
     old, new = np.array(file.centres) * document.units.mm, np.array(centres(document))
-    near = 1e-6 * diagonal(document)
+    near = 1e-6 * diagonal
     if not len(old):
         return {}
     old, new = (np.where(np.isfinite(points), points, 1e30) for points in (old, new))
@@ -191,7 +203,7 @@ def _file(file: Stated, document: Document) -> Layer:
         "file",
         "fail" if file.broken else "pass",
         f"{document.schema or 'unknown schema'}, unit {document.unit}, {file.entities} entities",
-        tuple(Finding(line, "entity") for line in file.broken),
+        tuple(Finding("entity", figures={"says": line}) for line in file.broken),
         {"entities": file.entities, "schema": document.schema, "unit": document.unit},
     )
 
@@ -204,9 +216,9 @@ def _limited(name: str, make: Callable[[], Layer], limits: CheckLimits, slow: Co
         return make()
     try:
         return guard.run(make, Layer, limits.layer_seconds)
-    except MracadError as error:
-        if error.code == Code.LIMIT:
-            return Layer(name, "time limit", f"more than {limits.layer_seconds:g} s")
+    except guard.TimeLimitError:
+        return Layer(name, "time limit", f"more than {limits.layer_seconds:g} s")
+    except CrashError as error:
         return Layer(name, "skipped", error.message)
 
 
@@ -214,17 +226,12 @@ def _load(faces: int, stated: int, unseen: str, unloaded: Callable[[], list[str]
     text = f"{faces} faces of {stated}{unseen}"
     lost: tuple[Finding, ...] = ()
     if faces < stated:
-        lost = tuple(Finding(f"face not loaded: {line}", "lost-faces") for line in unloaded())
-        lost = lost or (Finding(f"{stated - faces} faces could not be loaded", "lost-faces"),)
+        lost = tuple(Finding("lost-faces", figures={"says": line}) for line in unloaded())
+        lost = lost or (Finding("lost-faces", figures={"count": stated - faces}),)
     return Layer("load", "fail" if lost else "pass", text, lost, {"faces": faces, "stated": stated})
 
 
-def _seam_text(totals: SeamSummary) -> str:
-    text = f"{totals.smooth} smooth of {totals.seams}, angle ≤ {totals.angle:.2g}°, gap ≤ {totals.gap:.3g} mm"
-    return text + (f", {totals.unsewn} not sewn" if totals.unsewn else "")
-
-
-def _crossed(document: Document, measures: list[SeamMeasure]) -> Layer:
+def _crossed(document: Document, measures: list[SeamMeasure], diagonal: float) -> Layer:
     """Faces that cross, on a mesh and again on a finer one: what the coarser alone shows is its own error."""
     from mracad.occ.triangles import triangles
 
@@ -241,12 +248,9 @@ def _crossed(document: Document, measures: list[SeamMeasure]) -> Layer:
 
     first = crossing(None)
     if first:
-        again = crossing(1e-4 * diagonal(document))
+        again = crossing(1e-4 * diagonal)
         first = {faces: where for faces, where in first.items() if faces in again}
-    findings = [
-        Finding(f"#{a + 1} crosses itself" if a == b else f"#{a + 1} and #{b + 1} cross", "crossing", (a, b), where=w)
-        for (a, b), w in sorted(first.items())
-    ]
+    findings = [Finding("crossing", faces, where=where) for faces, where in sorted(first.items())]
     text = f"{len(findings)} crossings" if findings else "none found"
     return Layer("self-intersection", "fail" if findings else "pass", text, tuple(findings))
 
@@ -268,7 +272,7 @@ def _walls(document: Document, least: float | None) -> Layer:
     if not found:
         return Layer("walls", "skipped", "no solids")
     findings = tuple(
-        Finding(f"wall of {thickness:.4g} mm at #{index + 1}", "thin-wall", (index,), where=where)
+        Finding("thin-wall", (index,), where=where, figures={"thickness": thickness})
         for index, thickness, where in found
         if thickness < least
     )

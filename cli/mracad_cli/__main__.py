@@ -81,12 +81,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         failure = error
     except KeyboardInterrupt:
         failure = MracadError("interrupted", "nothing was written", Code.INTERRUPTED)
-    if "--json" in arguments:
-        from mracad_cli.render import json_text
+    from mracad_cli.render import json_text, say
 
+    if "--json" in arguments:
         body = {"code": int(failure.code), "message": failure.message, "hint": failure.hint}
-        click.echo(json_text({"error": body}))
-    click.echo(f"mracad: {' '.join(str(failure).split())}", err=True)
+        say(json_text({"error": body}))
+    say(f"mracad: {' '.join(str(failure).split())}", file=sys.stderr)
     return int(failure.code)
 
 

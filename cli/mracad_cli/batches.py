@@ -25,7 +25,7 @@ from mracad.options import duration
 from mracad.recipe import Recipe
 from mracad_cli.files import check_reports, deliver, depfile_text
 from mracad_cli.progress import Progress
-from mracad_cli.render import json_text
+from mracad_cli.render import json_text, say
 from mracad_cli.steps import needed, plan
 from mracad_cli.verdicts import clean
 
@@ -93,9 +93,10 @@ def run_batch(
             for outcome in results:
                 outcomes.append(outcome)
                 for warning in outcome.warnings:
-                    print(f"warning: {outcome.file}: {warning}", file=sys.stderr)
+                    say(f"warning: {outcome.file}: {warning}", file=sys.stderr)
                 if as_json and outcome.status != "not tried":
-                    print(json_text(msgspec.to_builtins(outcome)), flush=True)
+                    say(json_text(msgspec.to_builtins(outcome)))
+                    sys.stdout.flush()
                 failed += outcome.status == "failed"
                 progress(f"{recipe.name}, {failed} failed" if failed else recipe.name, len(outcomes), len(items))
         except KeyboardInterrupt:

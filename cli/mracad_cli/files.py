@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from mracad import guard
 from mracad.errors import FileError, UsageError
 from mracad.formats import FORMATS, by_ending
-from mracad_cli.render import read_back
+from mracad_cli.render import read_back, say
 
 if TYPE_CHECKING:
     from mracad.occ.document import Document
@@ -35,7 +35,7 @@ def read(source: str | Text, input_unit: str | None, encoding: str | None) -> Do
     guard.doing("reading", text.name)
     document = read_file(text, input_unit, encoding)
     for warning in document.warnings:
-        print(f"warning: {warning}", file=sys.stderr)
+        say(f"warning: {warning}", file=sys.stderr)
     return document
 
 
@@ -81,15 +81,14 @@ def deliver(files: Mapping[str, str | bytes | None], lines: Iterable[str], *, st
 
     said = list(lines)
 
-    def say() -> None:
+    def tell() -> None:
         if stream is not None:
             sys.stdout.buffer.write(stream)
-        for line in said:
-            print(line, file=sys.stdout if stream is None else sys.stderr)
+        say(*said, file=sys.stdout if stream is None else sys.stderr)
         sys.stdout.flush()
 
     contents = {path: content for path, content in files.items() if content is not None}
-    put_all({p: c.encode(errors="surrogateescape") if isinstance(c, str) else c for p, c in contents.items()}, say)
+    put_all({p: c.encode(errors="surrogateescape") if isinstance(c, str) else c for p, c in contents.items()}, tell)
 
 
 def depfile_text(outputs: Iterable[str], inputs: Iterable[str]) -> str:
@@ -151,7 +150,7 @@ class Outputs:
 
         for path, made in self.made.items():
             if made.written.lost:
-                print(f"warning: {self._name(path)} lacks {', '.join(map(str, made.written.lost))}", file=sys.stderr)
+                say(f"warning: {self._name(path)} lacks {', '.join(map(str, made.written.lost))}", file=sys.stderr)
         data = {path: made.data for path, made in self.made.items()}
         stream = data.pop("-", b"" if "-" in self.paths else None)
         changed = {p: d for p, d in data.items() if not (self.if_changed and holds(Path(p), d))}

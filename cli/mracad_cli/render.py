@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import sys
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TextIO
 
 import msgspec
 
@@ -172,6 +173,20 @@ def seam_line(new: SeamSummary, old: SeamSummary | None = None) -> str:
         angle, gap = f"{angle} (was {degrees(old.angle)})", f"{gap} (was {mm(old.gap)})"
     line = f"seams: {new.smooth} smooth of {new.seams}, angle ≤ {angle}; gap ≤ {gap}"
     return line + (f"; {new.unsewn} not sewn" if new.unsewn else "")
+
+
+_CONTROL = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029]")
+
+
+def printable(line: str) -> str:
+    """A line for a terminal: control characters, which names may hold, are spelled as in JSON (``\\u001b``)."""
+    return _CONTROL.sub(lambda match: f"\\u{ord(match[0]):04x}", line)
+
+
+def say(*lines: str, file: TextIO | None = None) -> None:
+    """Print lines, on standard output unless ``file`` is given."""
+    for line in lines:
+        print(printable(line), file=file)
 
 
 def json_text(value: Any, indent: int | None = None) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Sequence
 from typing import Any
@@ -11,7 +10,8 @@ from xml.etree import ElementTree as Xml
 import msgspec
 
 import mracad
-from mracad.audit.verdict import Finding, Layer, Verdict
+from mracad.audit.verdict import Figure, Finding, Layer, Verdict
+from mracad.audit.words import words
 from mracad_cli.files import deliver
 from mracad_cli.render import json_text
 
@@ -56,7 +56,8 @@ def as_data(verdict: Verdict, failed: Sequence[Layer]) -> dict[str, Any]:
                 "status": layer.status,
                 "text": layer.text,
                 "findings": [_finding(finding) for finding in layer.findings],
-                "figures": _finite(msgspec.to_builtins(dict(layer.figures))),
+                "notes": [_finding(note) for note in layer.notes],
+                "figures": _shown(msgspec.to_builtins(dict(layer.figures))),
             }
             for layer in verdict.layers
         ],
@@ -65,28 +66,27 @@ def as_data(verdict: Verdict, failed: Sequence[Layer]) -> dict[str, Any]:
 
 def _finding(finding: Finding) -> dict[str, Any]:
     return {
-        "text": finding.text,
+        "text": words(finding),
         "rule": finding.rule,
         "faces": [face + 1 for face in finding.faces],
         "edge": None if finding.edge is None else finding.edge + 1,
         "where": None if finding.where is None else list(finding.where),
+        "figures": {name: _counted(name, value) for name, value in finding.figures.items()},
     }
 
 
-def _finite(value: Any) -> Any:
-    """Values in which whatever is not finite is None, and faces and edges have numbers as on the command line."""
+def _counted(name: str, value: Figure) -> Figure:
+    """A figure of a finding; faces count from 1."""
+    return value + 1 if name in ("face", "was_face") and isinstance(value, int) else value
+
+
+def _shown(value: Any) -> Any:
+    """Figures in which faces and edges have numbers as on the command line."""
     if isinstance(value, dict):
-        counted = (
-            {"ref", "new"}
-            if "there" in value
-            else {"edge", "faces"}
-            if isinstance(value.get("faces"), list | tuple)
-            else set()
-        )
-        return {key: _numbered(item) if key in counted else _finite(item) for key, item in value.items()}
-    if isinstance(value, list):
-        return [_finite(item) for item in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+        seam = isinstance(value.get("faces"), list | tuple)
+        counted = {"ref", "new"} if "there" in value else {"edge", "faces"} if seam else set()
+        return {key: _numbered(item) if key in counted else _shown(item) for key, item in value.items()}
+    return [_shown(item) for item in value] if isinstance(value, list) else value
 
 
 def _numbered(index: int | Sequence[int]) -> int | list[int]:
@@ -101,13 +101,16 @@ def _lines(verdict: Verdict, failed: Sequence[Layer]) -> list[str]:
         lines += [f"  {_placed(finding)}" for finding in layer.findings[:SHOWN]]
         if len(layer.findings) > SHOWN:
             lines.append(f"  and {len(layer.findings) - SHOWN} more")
+        lines += [f"  note: {_placed(note)}" for note in layer.notes[:SHOWN]]
+        if len(layer.notes) > SHOWN:
+            lines.append(f"  and {len(layer.notes) - SHOWN} more notes")
     lines.append("failed: " + ", ".join(layer.name for layer in failed) if failed else "passed")
     return lines
 
 
 def _placed(finding: Finding) -> str:
     at = "" if finding.where is None else " at " + " ".join(f"{x:.6g}" for x in finding.where)
-    return finding.text + at
+    return words(finding) + at
 
 
 def _junit(verdict: Verdict, failed: Sequence[Layer], command: str) -> str:
@@ -142,27 +145,34 @@ def clean(text: str) -> str:
 def _sarif(verdict: Verdict, failed: Sequence[Layer], command: str) -> dict[str, Any]:
     """One result a finding; errors where the command fails for its layer, notes elsewhere."""
     results = [
-        {
-            "ruleId": f"{layer.name}/{finding.rule}",
-            "level": "error" if layer in failed else "note",
-            "message": {"text": _placed(finding)},
-            "locations": [
-                {
-                    "physicalLocation": {"artifactLocation": {"uri": _uri(verdict.subject)}},
-                    "logicalLocations": [{"name": f"#{face + 1}", "kind": "face"} for face in finding.faces]
-                    + ([{"name": f"edge#{finding.edge + 1}", "kind": "edge"}] if finding.edge is not None else []),
-                }
-            ],
-        }
+        result
         for layer in verdict.layers
-        for finding in layer.findings or ((Finding(layer.text, layer.status),) if layer in failed else ())
+        for level, evidence in (("error" if layer in failed else "note", layer.findings), ("note", layer.notes))
+        for result in (_result(verdict.subject, layer, finding, level) for finding in evidence)
     ]
+    results += [_result(verdict.subject, layer, None, "error") for layer in failed if not layer.findings]
     rules = sorted({str(result["ruleId"]) for result in results})
     driver = {"name": f"mracad {command}", "version": mracad.__version__, "rules": [{"id": rule} for rule in rules]}
     return {
         "$schema": "https://json.schemastore.org/sarif-2.1.0.json",
         "version": "2.1.0",
         "runs": [{"tool": {"driver": driver}, "results": results}],
+    }
+
+
+def _result(subject: str, layer: Layer, finding: Finding | None, level: str) -> dict[str, Any]:
+    """A finding, or what a layer says that fails without one."""
+    faces = finding.faces if finding else ()
+    places = [{"name": f"#{face + 1}", "kind": "face"} for face in faces]
+    if finding and finding.edge is not None:
+        places.append({"name": f"edge#{finding.edge + 1}", "kind": "edge"})
+    return {
+        "ruleId": f"{layer.name}/{finding.rule if finding else layer.status}",
+        "level": level,
+        "message": {"text": _placed(finding) if finding else layer.text},
+        "locations": [
+            {"physicalLocation": {"artifactLocation": {"uri": _uri(subject)}}, "logicalLocations": places},
+        ],
     }
 
 

@@ -7,31 +7,32 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 Status = Literal["pass", "fail", "time limit", "skipped"]
+Figure = float | int | str | bool | None
 
 
 @dataclass(frozen=True)
 class Finding:
-    """One piece of evidence.
+    """One piece of evidence; :func:`mracad.audit.words.words` puts it into words.
 
     Attributes
     ----------
-    text : str
-        What was found, in one line.
     rule : str
-        Its kind, as ``"SelfIntersectingWire"`` or ``"deviation"``.
+        Its kind, as ``"SelfIntersectingWire"`` or ``"deviates"``.
     faces : tuple of int
         Indices of the faces that it concerns.
     edge : int or None
         Index of the edge that it concerns.
     where : tuple of float or None
         A point, mm, in the part's frame.
+    figures : mapping
+        What was measured, by name; lengths are millimetres, angles degrees, faces of another document indices.
     """
 
-    text: str
     rule: str
     faces: tuple[int, ...] = ()
     edge: int | None = None
     where: tuple[float, float, float] | None = None
+    figures: Mapping[str, Figure] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -47,6 +48,8 @@ class Layer:
     findings : tuple of Finding
     figures : mapping
         What was measured, by name; lengths are millimetres, angles degrees.
+    notes : tuple of Finding
+        What is worth saying and fails nothing.
     """
 
     name: str
@@ -54,6 +57,7 @@ class Layer:
     text: str = ""
     findings: tuple[Finding, ...] = ()
     figures: Mapping[str, object] = field(default_factory=dict)
+    notes: tuple[Finding, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,7 @@ from collections.abc import Callable
 from concurrent.futures import Executor, Future
 from dataclasses import dataclass
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import psutil
@@ -162,7 +163,7 @@ class Pool(Executor):
                 if time.monotonic() > worker.deadline:
                     hint = "raise --time-limit, or look into the file"
                     worker.kill(LimitError(f"not done within the time limit of {worker.seconds:g} s", hint))
-                elif (used := worker.memory()) > self._memory:
+                elif (used := worker.used()) > self._memory:
                     text = f"over the memory limit of {self._memory / 1e6:.0f} MB (at {used / 1e6:.0f} MB)"
                     worker.kill(LimitError(text, "raise --memory-limit, or use fewer workers"))
 
@@ -217,10 +218,14 @@ class _Worker:
 
     def memory(self) -> int:
         """Bytes that the process occupies; 0 once it is gone."""
-        try:
-            return int(self._process.memory_info().rss)
-        except psutil.Error:
-            return 0
+        return _occupied(self._process)
+
+    def used(self) -> int:
+        """Bytes that the process occupies, or a child of it where that is more.
+
+        A child begins with all that the process has, and the process waits for it: together they hold what it does.
+        """
+        return max(_occupied(process) for process in (self._process, *_children(self._process)))
 
     def kill(self, reason: MracadError) -> None:
         self.reason = self.reason or reason
@@ -243,6 +248,24 @@ class _Worker:
             return CrashError("the worker was killed (out of memory, maybe)", "try again with fewer workers")
         name = signal.Signals(-code).name if code < 0 else f"exit code {code}"
         return CrashError(f"the worker crashed ({name})", "the file breaks the CAD kernel: export it again")
+
+
+def _occupied(process: psutil.Process) -> int:
+    try:
+        return int(process.memory_info().rss)
+    except psutil.Error:
+        return 0
+
+
+def _children(process: psutil.Process) -> list[psutil.Process]:
+    """The children of a process; Linux knows them without a look at all processes of the machine."""
+    listed = Path(f"/proc/{process.pid}/task/{process.pid}/children")
+    try:
+        if listed.exists():
+            return [psutil.Process(int(pid)) for pid in listed.read_text().split()]
+        return list(process.children())
+    except (OSError, psutil.Error):
+        return []
 
 
 def serve() -> None:

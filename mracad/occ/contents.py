@@ -46,6 +46,26 @@ class Placed:
     frame: tuple[float, ...]
 
 
+@dataclass(frozen=True, order=True)
+class Place:
+    """What carries an attribute: a product, one of its components, or something inside it.
+
+    Attributes
+    ----------
+    product, component : str
+        ``component`` is ``""`` unless it is one.
+    face : int
+        Index of the face; -1 for everything else.
+    inside : bool
+        Whether it is another shape inside the product: a body or an edge.
+    """
+
+    product: str
+    component: str = ""
+    face: int = -1
+    inside: bool = False
+
+
 @dataclass(frozen=True)
 class Contents:
     """What a document says beyond geometry.
@@ -58,12 +78,12 @@ class Contents:
     usages : int
         How often some product is used in an assembly definition.
     tree : tuple of Placed
-    colours : tuple of (str, str, str)
-        Where (a product, instance, or face as ``"product#4"``), of what, ``"#rrggbb"`` or ``"#rrggbbaa"``; sorted.
-    layers : tuple of (str, str)
-        Layer and where; sorted.
-    materials : tuple of (str, float)
-        Part and density, as the kernel gives it.
+    colours : tuple of (Place, str, str)
+        Where, of what, ``"#rrggbb"`` or ``"#rrggbbaa"``; sorted.
+    layers : tuple of (Place, str)
+        Where, and the layer; sorted.
+    materials : tuple of (Place, float)
+        Where, and the density as the kernel gives it; sorted.
     annotations : dict of str to int
         How many ``"dimensions"``, ``"tolerances"`` and ``"datums"`` there are.
     """
@@ -72,9 +92,9 @@ class Contents:
     products: tuple[str, ...]
     usages: int
     tree: tuple[Placed, ...]
-    colours: tuple[tuple[str, str, str], ...]
-    layers: tuple[tuple[str, str], ...]
-    materials: tuple[tuple[str, float], ...]
+    colours: tuple[tuple[Place, str, str], ...]
+    layers: tuple[tuple[Place, str], ...]
+    materials: tuple[tuple[Place, float], ...]
     annotations: dict[str, int]
 
 
@@ -89,7 +109,7 @@ def contents(document: Document) -> Contents:
     for label in labels(document.shape_tool.GetFreeShapes):
         _grow(label, (), TopLoc_Location(), tree)
     on_layers = [
-        (label_name(layer), where[label_key(shape)][1])
+        (where[label_key(shape)][1], label_name(layer))
         for layer in labels(layer_tool.GetLayerLabels)
         for shape in labels(lambda found, layer=layer: XCAFDoc_LayerTool.GetShapesOfLayer_s(layer, found))
         if label_key(shape) in where
@@ -111,24 +131,24 @@ def contents(document: Document) -> Contents:
     )
 
 
-def _places(document: Document, products: list[TDF_Label]) -> Iterator[tuple[TDF_Label, str]]:
-    """Everything that can be coloured or put on a layer, and words for it."""
+def _places(document: Document, products: list[TDF_Label]) -> Iterator[tuple[TDF_Label, Place]]:
+    """Everything that can be coloured or put on a layer."""
     parts = {label_key(part.label): part for part in document.parts}
     for label in products:
         product = label_name(label)
-        yield label, product
+        yield label, Place(product)
         for component in components(label):
-            yield component, f"{product}/{label_name(component)}"
+            yield component, Place(product, component=label_name(component))
         part = parts.get(label_key(label))
         for sub in labels(lambda found, label=label: XCAFDoc_ShapeTool.GetSubShapes_s(label, found)):
             shape = XCAFDoc_ShapeTool.GetShape_s(sub)
             if part and shape.ShapeType() == TopAbs_FACE:
-                yield sub, f"{product} #{part.first + part.faces.FindIndex(shape)}"
+                yield sub, Place(product, face=part.first + part.faces.FindIndex(shape) - 1)
             else:
-                yield sub, f"{product} inside"
+                yield sub, Place(product, inside=True)
 
 
-def _colours(places: Iterable[tuple[TDF_Label, str]]) -> Iterator[tuple[str, str, str]]:
+def _colours(places: Iterable[tuple[TDF_Label, Place]]) -> Iterator[tuple[Place, str, str]]:
     colour = Quantity_ColorRGBA()
     for label, place in places:
         for name, kind in _COLOURS.items():

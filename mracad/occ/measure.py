@@ -113,6 +113,32 @@ class Gauge:
         with quiet():
             return np.fromiter(_off(surface, (points - frame[:3, 3]) @ frame[:3, :3]), float, len(points))
 
+    def facing(self, index: int) -> Array:
+        """Which way a face looks, ``(4,)``: its mean outward normal, and how far it looks away from its own middle.
+
+        Two faces that coincide and look in opposite directions have opposite ones.
+        """
+        face = self.document.faces[index]
+        surface = BRepAdaptor_Surface(face, False)
+        bounds = BRepTools.UVBounds_s(face)
+        sign = -1.0 if face.Orientation() == TopAbs_REVERSED else 1.0
+        point, du, dv = gp_Pnt(), gp_Vec(), gp_Vec()
+        rows = []
+        shares = (np.arange(_LEAST) + 0.5) / _LEAST
+        for u in (bounds[0] + (bounds[1] - bounds[0]) * shares).tolist():
+            for v in (bounds[2] + (bounds[3] - bounds[2]) * shares).tolist():
+                surface.D1(u, v, point, du, dv)
+                rows.append(point.Coord() + du.Crossed(dv).Coord())
+        points, normals = np.array(rows)[:, :3], sign * np.array(rows)[:, 3:]
+        normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+        out = points - points.mean(axis=0)
+        size = max(float(np.linalg.norm(out, axis=1).max()), 1e-300)
+        return np.append(normals.mean(axis=0), (out * normals).sum(axis=1).mean() / size)
+
+    def face_distances(self, index: int, points: Array) -> Array:
+        """Distances of points ``(q, 3)`` from a face, within its boundary."""
+        return _apart(points, self.document.faces[index])
+
     def thinnest(self, index: int, part: Part) -> tuple[float, Point | None]:
         """Least distance from points of a face through the material of its part, along the normal; and where."""
         face = self.document.faces[index]
@@ -139,10 +165,14 @@ class Gauge:
 
     def edge_distances(self, edges: Iterable[int], points: Array) -> Array:
         """Distances of points ``(q, 3)`` from the nearest of some edges."""
-        target = compound(self.document.edges[index] for index in edges)
-        with quiet():
-            vertices = (BRepBuilderAPI_MakeVertex(gp_Pnt(*point)).Vertex() for point in points.tolist())
-            return np.array([BRepExtrema_DistShapeShape(vertex, target).Value() for vertex in vertices])
+        return _apart(points, compound(self.document.edges[index] for index in edges))
+
+
+def _apart(points: Array, target: TopoDS_Shape) -> Array:
+    """Distances of points ``(q, 3)`` from a shape."""
+    with quiet():
+        vertices = (BRepBuilderAPI_MakeVertex(gp_Pnt(*point)).Vertex() for point in points.tolist())
+        return np.array([BRepExtrema_DistShapeShape(vertex, target).Value() for vertex in vertices])
 
 
 def _off(surface: Geom_Surface, points: Array) -> Iterator[float]:

@@ -6,6 +6,7 @@ import os
 import signal
 import time
 
+from mracad import guard
 from mracad.batch.work import Product
 from mracad.errors import UsageError
 
@@ -17,6 +18,13 @@ class Trap:
 
     def __reduce__(self) -> tuple[object, ...]:
         return os.kill, (os.getppid(), signal.SIGKILL)
+
+
+def hold(count: int) -> None:
+    """Hold so many bytes for a minute."""
+    held = b"x" * count
+    time.sleep(60)
+    assert held
 
 
 def work(what: str) -> object:
@@ -32,6 +40,8 @@ def work(what: str) -> object:
         eaten = []
         while True:
             eaten.append(b"x" * MB * 10)
+    elif what == "eat in a child":
+        guard.run(lambda: hold(600 * MB), type(None))
     elif what == "wrong":
         raise UsageError("no", "do better")
     elif what == "bug":

@@ -39,6 +39,12 @@ def test_bad_tasks_cost_themselves_alone():
                 assert future.result() == what
 
 
+def test_what_a_child_of_a_worker_holds_counts():
+    with Pool(1, Limits(30.0, 400 * MB)) as pool:
+        error = pool.submit(work, "eat in a child").exception()
+    assert isinstance(error, LimitError) and "memory limit of 400 MB" in str(error)
+
+
 def test_a_worker_does_one_task_after_another():
     with Pool(1) as pool:
         assert len({pool.submit(os.getpid).result() for _ in range(10)}) == 1

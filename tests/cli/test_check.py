@@ -14,8 +14,9 @@ from OCP.TopAbs import TopAbs_FACE
 from OCP.TopExp import TopExp_Explorer
 from OCP.TopoDS import TopoDS, TopoDS_Shell
 
-from mracad import occ, review
+from mracad import guard, occ, review
 from mracad.audit.verdict import Layer
+from mracad.errors import LimitError
 from tests.occ import shapes
 
 
@@ -154,6 +155,19 @@ def test_a_tangent_seam_is_smooth(mracad, tmp_path):
 def test_a_layer_that_takes_too_long_says_nothing():
     slow = review._limited("brep", lambda: time.sleep(60), review.CheckLimits(layer_seconds=0.1))
     assert slow == Layer("brep", "time limit", "more than 0.1 s")
+
+
+def test_a_layer_holds_no_more_memory_than_the_check():
+    def hungry():
+        held = b"x" * 600_000_000
+        return Layer("brep", "pass", str(len(held)))
+
+    def check():
+        return review._limited("brep", hungry, review.CheckLimits(layer_seconds=60.0))
+
+    assert guard.run(check, Layer).status == "pass"
+    with pytest.raises(LimitError, match="memory limit of 500 MB"):
+        guard.run(check, Layer, memory=500_000_000)
 
 
 def test_what_is_not_known_is_not_called_valid(mracad, samples):

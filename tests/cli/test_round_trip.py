@@ -65,7 +65,7 @@ def test_samples(samples, tmp_path, name):
 @pytest.mark.parametrize("name", EXPECTED)
 def test_real_models(tmp_path, name):
     found = round_trip(CORPUS / f"{name}.step", tmp_path / "out.step")
-    layers = {layer for layer, _ in found.layers}
+    layers = {layer for _, layer in found.layers}
     annotations = sum(found.annotations.values())
     assert (found.usages, len(found.products), len(found.colours), len(layers), annotations) == EXPECTED[name]
 

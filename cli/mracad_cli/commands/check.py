@@ -32,7 +32,7 @@ def command(
 
     check_reports(junit, sarif, overwrite=overwrite)
     limits = options_of(Check, given)
-    from mracad import job
+    from mracad import judge
     from mracad_cli.verdicts import emit
 
     with Progress() as progress:
@@ -40,5 +40,5 @@ def command(
         text = load(source)
         document = read(text, input_unit, encoding)
         progress("checking", 0, 1)
-        judged = job.check(document, limits, text=text.getvalue())
+        judged = judge.check(document, limits, text=text.getvalue())
     return emit(judged.verdict, judged.failed, command="check", as_json=as_json, junit=junit, sarif=sarif)

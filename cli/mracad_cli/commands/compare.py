@@ -41,7 +41,7 @@ def command(
 
     check_reports(junit, sarif, overwrite=overwrite)
     limits = options_of(Compare, given)
-    from mracad import job
+    from mracad import judge
     from mracad_cli.verdicts import emit
 
     with Progress() as progress:
@@ -49,5 +49,5 @@ def command(
         old = read(reference, limits.reference_unit, encoding)
         new = read(source, input_unit, encoding)
         progress("comparing", 0, 1)
-        judged = job.compare(new, limits, lambda: old)
+        judged = judge.compare(new, limits, lambda: old)
     return emit(judged.verdict, judged.failed, command="compare", as_json=as_json, junit=junit, sarif=sarif)

@@ -24,19 +24,19 @@ def list_(source: str, input_unit: str | None, encoding: str | None, faces: tupl
     """Propose features: places where the detail of a face stands out, with size, height and scales."""
     from mracad import job
     from mracad.feature.find import found
-    from mracad_cli.render import json_text, mm, plain
+    from mracad_cli.render import json_text, mm, plain, say
 
     model, scope = job.looked_at(read(source, input_unit, encoding), Selection(faces=faces))
     features = found(model, scope.chosen)
     if as_json:
         body = [{**plain(f), "face": f.face + 1, "feature": f.text} for f in features]
-        print(json_text({"file": model.name, "features": body}))
+        say(json_text({"file": model.name, "features": body}))
         return
     for f in features:
         scales = f"{mm(f.scales[0])} to {mm(f.scales[1])}"
-        print(f"{f.text} on #{f.face + 1}: {mm(f.height)} high, {mm(f.size)} across, scales {scales}")
+        say(f"{f.text} on #{f.face + 1}: {mm(f.height)} high, {mm(f.size)} across, scales {scales}")
     if not features:
-        print(f"{model.name}: nothing stands out")
+        say(f"{model.name}: nothing stands out")
 
 
 @command.command()

@@ -72,20 +72,22 @@ def command(
             "seams": {**render.plain(summary(measures)), "each": [render.seam(m) for m in measures]},
             "valid": render.validity(valid),
         }
-        print(render.json_text(body))
+        render.say(render.json_text(body))
         return 0
     kinds = Counter(face.kind for face in model.faces)
-    print(f"{model.name}: {model.schema or 'unknown schema'}, unit {model.unit}, diagonal {render.mm(model.diagonal)}")
+    render.say(
+        f"{model.name}: {model.schema or 'unknown schema'}, unit {model.unit}, diagonal {render.mm(model.diagonal)}"
+    )
     if model.products:
-        print(f"products: {len(model.products)}: {', '.join(name or '(no name)' for name in model.products)}")
+        render.say(f"products: {len(model.products)}: {', '.join(name or '(no name)' for name in model.products)}")
     if everything:
-        print(*(f"  {path}" for path in instances(document)), sep="\n")
-    print(f"faces: {len(model.faces)}: " + ", ".join(f"{n} {kind}" for kind, n in kinds.most_common()))
-    print(render.seam_line(summary(measures)))
-    print(f"valid: {render.verdict(valid.valid)}" + "".join(f"\n  {failure}" for failure in valid.failures[:10]))
+        render.say(*(f"  {path}" for path in instances(document)))
+    render.say(f"faces: {len(model.faces)}: " + ", ".join(f"{n} {kind}" for kind, n in kinds.most_common()))
+    render.say(render.seam_line(summary(measures)))
+    render.say(f"valid: {render.verdict(valid.valid)}", *(f"  {failure}" for failure in valid.failures[:10]))
     rows = [_row(model, face, found.get(face.index)) for face in model.faces if everything or face.surface is not None]
     if rows:
-        print(f"detail below {render.mm(width)}, free with all edges held at {keep.upper()}")
+        render.say(f"detail below {render.mm(width)}, free with all edges held at {keep.upper()}")
         _table(["face", "type", "degree", "net", "shape", "free", "spans mm", "at this scale", "from", "name"], rows)
     if everything and measures:
         _table(
@@ -194,4 +196,4 @@ def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
     lines = [list(head), *map(list, rows)]
     widths = [max(len(line[i]) for line in lines) for i in range(len(head))]
     for line in lines:
-        print("  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip())
+        render.say("  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip())

@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 
 from mracad_cli import options
-from mracad_cli.render import json_text
+from mracad_cli.render import json_text, say
 from mracad_cli.steps import plan
 
 
@@ -25,10 +25,10 @@ def check(file: str, assignments: tuple[str, ...], as_json: bool) -> None:
     steps = found.steps("model.step")
     if as_json:
         listed = [{"id": step.id, "use": step.use, "text": step.text()} for step in steps]
-        print(json_text({"recipe": found.name, "steps": listed}))
+        say(json_text({"recipe": found.name, "steps": listed}))
     else:
         for line in plan(steps):
-            print(line)
+            say(line)
 
 
 @command.command()

@@ -1,0 +1,110 @@
+"""What is reported is plain data: any reader of JSON takes it, and no name can play tricks on a terminal."""
+
+import json
+
+import msgspec
+import pytest
+from mracad_cli import render, verdicts
+from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
+
+from mracad import judge, occ
+from mracad.audit.words import words
+from mracad.edit.smooth import smooth
+from mracad.job import run
+from mracad.options import Check, Compare, Smooth
+from tests.occ import shapes
+
+PLAIN = (str, int, float, bool, type(None))
+
+
+def odd(value, path=""):
+    """The places of whatever is not a value of JSON itself: a number of numpy is not."""
+    if isinstance(value, dict):
+        return [x for key, item in value.items() for x in odd(item, f"{path}.{key}")] + [
+            path for key in value if type(key) is not str
+        ]
+    if isinstance(value, list | tuple):
+        return [x for item in value for x in odd(item, f"{path}[]")]
+    return [] if type(value) in PLAIN else [f"{path}: {type(value).__name__}"]
+
+
+def raw(verdict):
+    """Everything that a verdict holds, dataclasses taken apart."""
+    return [
+        [msgspec.to_builtins(layer.figures), *((f.rule, f.faces, f.edge, f.where, dict(f.figures)) for f in found)]
+        for layer in verdict.layers
+        for found in (layer.findings, layer.notes)
+    ]
+
+
+@pytest.fixture
+def panels(samples):
+    return [occ.read(samples / f"{name}.step") for name in ("panel_clean", "panel")]
+
+
+def test_a_comparison_is_plain_data(panels, samples, tmp_path):
+    strict = Compare(max_gap_growth="1e-12mm", max_angle_growth=0.0, max_volume_change=0.0)
+    other = tmp_path / "other.igs"
+    occ.write(occ.read(samples / "assembly.step"), other)
+    pairs = [tuple(panels), (occ.read(samples / "assembly.step"), occ.read(other)), (panels[0], occ.read(other))]
+    for ref, new in pairs:
+        judged = judge.compare(new, strict, lambda ref=ref: ref)
+        assert odd(raw(judged.verdict)) == []
+        body = verdicts.as_data(judged.verdict, judged.failed)
+        assert odd(body) == [] and json.loads(json.dumps(body, allow_nan=True))
+        assert all(words(finding) for layer in judged.verdict.layers for finding in (*layer.findings, *layer.notes))
+
+
+def test_a_check_is_plain_data(panels, samples):
+    text = (samples / "panel.step").read_bytes()
+    strict = Check(max_gap="1e-12mm", max_angle=1e-12, max_tolerance="1e-12mm", expect="99", min_wall="1m")
+    judged = judge.check(panels[1], strict, text=text)
+    assert {"shells", "seams", "tolerances"} <= {layer.name for layer in judged.verdict.layers if layer.findings}
+    assert odd(raw(judged.verdict)) == [] and odd(verdicts.as_data(judged.verdict, judged.failed)) == []
+
+
+def test_an_edit_is_plain_data(panels):
+    assert odd(render.report(run(panels[1], smooth, Smooth(scale="25mm")))) == []
+
+
+def test_files_that_differ_are_told_as_json(mracad, samples, tmp_path):
+    result = mracad("compare", samples / "panel_clean.step", samples / "panel.step", "--json")
+    assert result.code == 1 and "seams" in json.loads(result.out)["layers"][2]["name"]
+    steps = "smooth --scale 25mm ! compare --max-angle-growth 0"
+    result = mracad("pipeline", steps, samples / "panel.step", "-o", tmp_path / "out.step", "--json")
+    assert result.code == 1 and json.loads(result.out)["steps"][1]["failed"]
+    assert not (tmp_path / "out.step").exists()
+
+
+def test_a_name_like_a_face_is_a_name(mracad, tmp_path):
+    path = tmp_path / "pins.step"
+    boxes = [BRepPrimAPI_MakeBox(size, 2, 3).Shape() for size in (1, 5)]
+    colours = {0: "#ff0000", 1: "#00ff00"}
+    occ.write_step(shapes.document(*boxes, names={0: "pin #99", 1: "pin #1"}, colours=colours), path)
+    assert mracad("compare", path, path).code == 0
+    other = tmp_path / "other.step"
+    occ.write_step(shapes.document(*boxes, names={0: "pin #99", 1: "pin #1"}, colours=colours | {0: "#0000ff"}), other)
+    body = json.loads(mracad("compare", path, other, "--json").out)
+    assert body["failed"] == ["colours"]
+    found = next(x for x in body["layers"] if x["name"] == "colours")["findings"]
+    lost = next(f for f in found if f["rule"] == "colours" and f["figures"]["change"] == "lost")
+    assert lost["figures"]["product"] == "pin #99" and lost["figures"]["face"] is None
+    assert lost["text"] == "lost: pin #99 surface #ff0000"
+
+
+def test_control_characters_of_names_never_reach_the_terminal(mracad, tmp_path):
+    name, path = "evil\x1b[2J\x9b31m\nname", tmp_path / "evil.step"
+    document = shapes.document(BRepPrimAPI_MakeBox(1, 2, 3).Shape(), names={0: name})
+    other = shapes.document(BRepPrimAPI_MakeBox(1, 2, 3).Shape(), names={0: "good"})
+    occ.write_step(document, path)
+    occ.write_step(other, tmp_path / "good.step")
+    read = occ.view(occ.read(path)).products[0]
+    assert "\x1b" in read and "\x9b" in read
+    for line in (("info", path), ("compare", path, tmp_path / "good.step")):
+        result = mracad(*line)
+        assert not any(c in result.out + result.err for c in "\x1b\x9b"), line
+        assert "evil\\u001b[2J\\u009b31m" in result.out
+    result = mracad("info", path, "--json")
+    assert json.loads(result.out)["products"] == [read] and "\x1b" not in result.out and "\x9b" not in result.out
+    result = mracad("info", tmp_path / "no\x1b[2J.step")
+    assert result.code == 3 and "no\\u001b[2J.step" in result.err and "\x1b" not in result.err
