@@ -88,6 +88,12 @@ def bean() -> cq.Workplane:
     return cq.Workplane().spline(points, periodic=True).close().extrude(30)
 
 
+def capsule() -> cq.Workplane:
+    """Domes of revolution whose arcs would go on beyond the axis."""
+    profile = cq.Workplane("XZ").moveTo(0, -15).threePointArc((8, -8), (8, 0)).lineTo(8, 10)
+    return profile.threePointArc((6, 16), (0, 18)).close().revolve(360, (0, 0, 0), (0, 1, 0))
+
+
 BODIES: dict[str, Callable[[], cq.Workplane]] = {
     each.__name__: each for each in (sphere, half_sphere, torus, cylinder, cone, frustum, vase, egg, ring, loft, bean)
 }
@@ -211,6 +217,7 @@ def closed() -> Iterator[tuple[str, Maker]]:
         for hole in HOLES:
             yield from both(f"{body}-{hole}", lambda body=body, hole=hole: cut(body, hole))
         yield from both(f"{body}-halved", lambda body=body: halved(body))
+    yield from both("capsule", lambda: capsule().val().wrapped)
     for body in ("sphere", "egg", "vase", "cylinder", "cone"):
         yield from both(f"{body}-turned", lambda body=body: turned(cut(body, "whole")))
     for body in ("sphere", "egg", "ring", "vase"):

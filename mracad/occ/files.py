@@ -51,7 +51,7 @@ class Written:
     lost : tuple of Lost
         What it lacks.
     cut : tuple of Cut
-        The faces that it holds in several parts, because a reader would mistake them in one.
+        The faces that it holds on NURBS or in several parts, because a reader would mistake them as they are.
     """
 
     lost: tuple[Lost, ...] = ()
@@ -132,7 +132,7 @@ def write(
     -------
     Written
         What could not be written (faces of a mesh, annotations of an exact model, names beyond ASCII in IGES, in STEP
-        the transparency of single instances inside assemblies), and what only in parts.
+        the transparency of single instances inside assemblies), and what only in another way.
 
     Raises
     ------

@@ -1,8 +1,9 @@
-"""What a format cannot express as it is: faces that a reader would lay anew otherwise are written in parts.
+"""What a format cannot express as it is: faces that a reader would mistake are written on NURBS or in parts.
 
 A face that goes right round its surface has a closing edge.  STEP and IGES leave out what closes it at poles, and a
 reader guesses; where the face has other boundaries, too, it may guess wrong and keep the hole for the face.  Cut along
-a parameter line the parts close nowhere, and there is nothing to guess.
+a parameter line the parts close nowhere, and there is nothing to guess.  A surface of revolution is written without its
+limits, and whole it may touch its axis where the face does not: as NURBS it ends where the face ends.
 """
 
 from __future__ import annotations
@@ -14,11 +15,18 @@ from dataclasses import dataclass
 import numpy as np
 from OCP.BRep import BRep_Builder, BRep_Tool
 from OCP.BRepAdaptor import BRepAdaptor_Curve2d
+from OCP.BRepBuilderAPI import BRepBuilderAPI_Copy
 from OCP.BRepCheck import BRepCheck_Analyzer
 from OCP.BRepGProp import BRepGProp
 from OCP.BRepLib import BRepLib
 from OCP.BRepTools import BRepTools
-from OCP.Geom import Geom_ElementarySurface, Geom_RectangularTrimmedSurface, Geom_Surface
+from OCP.Geom import (
+    Geom_BezierSurface,
+    Geom_BSplineSurface,
+    Geom_ElementarySurface,
+    Geom_RectangularTrimmedSurface,
+    Geom_Surface,
+)
 from OCP.GProp import GProp_GProps
 from OCP.ShapeAnalysis import ShapeAnalysis_ShapeTolerance
 from OCP.ShapeBuild import ShapeBuild_ReShape
@@ -32,6 +40,7 @@ from OCP.TopTools import TopTools_MapOfShape
 from OCP.XCAFDoc import XCAFDoc_ShapeTool
 
 from mracad.errors import EditError
+from mracad.occ.convert import conversion, lay
 from mracad.occ.document import Document, Part, labels
 from mracad.occ.instance import say
 from mracad.occ.topology import edge_uses, inside
@@ -40,6 +49,7 @@ Array = np.ndarray
 Copier = Callable[[TopoDS_Shape], TopoDS_Shape]
 """Writes a bare shape in some format and reads it back."""
 
+_NURBS = Geom_BSplineSurface, Geom_BezierSurface
 _NATURAL = 4  # edge uses of a face that is bounded by nothing but parameter lines
 _SAME = 1e-5  # relative difference of areas, and of centres to size, of one face
 _EXACT = 1e-7  # relative error of areas; those of the kernel's quick way are off by up to a hundredth on NURBS faces
@@ -51,20 +61,21 @@ _PRECISION = 1e-7
 
 @dataclass(frozen=True)
 class Cut:
-    """A face that a file holds in several parts.
+    """A face that a file holds in another way.
 
     Attributes
     ----------
     face : int
         Its index.
     parts : int
+        In how many parts; 1 where it is on a NURBS surface instead of its own.
     """
 
     face: int
     parts: int
 
     def __str__(self) -> str:
-        return f"#{self.face + 1} in {self.parts} parts"
+        return f"#{self.face + 1} " + (f"in {self.parts} parts" if self.parts > 1 else "as NURBS")
 
 
 @contextmanager
@@ -81,12 +92,12 @@ def writable(document: Document, copier: Copier) -> Iterator[tuple[Cut, ...]]:
     Yields
     ------
     tuple of Cut
-        The faces that are in several parts, which have its name, colour and layers.
+        The faces that are on NURBS or in several parts, which have their name, colour and layers.
 
     Raises
     ------
     EditError
-        For a face that would not come back whole in parts either.
+        For a face that would not come back whole so either.
     """
     wrong: dict[int, list[int]] = {}
     for number, part in enumerate(document.parts):
@@ -111,12 +122,14 @@ def writable(document: Document, copier: Copier) -> Iterator[tuple[Cut, ...]]:
 
 
 def _closes(face: TopoDS_Face) -> bool:
-    """Whether a face goes right round a surface that is no plain one, and has more than that surface's own bounds."""
+    """Whether a face goes right round a surface that is no plain one, and a reader has to guess how."""
     forward = TopoDS.Face_s(face.Oriented(TopAbs_FORWARD))
-    if isinstance(_basis(BRep_Tool.Surface_s(forward, TopLoc_Location())), Geom_ElementarySurface):
+    basis = _basis(BRep_Tool.Surface_s(forward, TopLoc_Location()))
+    if isinstance(basis, Geom_ElementarySurface):
         return False
     edges = list(edge_uses(forward))
-    if len(edges) <= _NATURAL and sum(1 for _ in inside(forward, TopAbs_WIRE)) == 1:
+    natural = len(edges) <= _NATURAL and sum(1 for _ in inside(forward, TopAbs_WIRE)) == 1
+    if natural and isinstance(basis, _NURBS):
         return False
     return any(BRep_Tool.IsClosed_s(edge, forward) for edge in edges)
 
@@ -150,17 +163,20 @@ def _tolerance(shape: TopoDS_Shape) -> float:
 
 
 def _rewrite(document: Document, part: Part, faces: Sequence[int], copier: Copier) -> Iterator[Cut]:
-    """Put a part with some faces in parts in its own place in the document."""
+    """Put a part with some faces on NURBS or in parts in its own place in the document."""
+    twins = BRepBuilderAPI_Copy(part.shape, False, False)
     context = ShapeBuild_ReShape()
     for index in faces:
-        _divide(document, index, copier, context)
-        yield Cut(index, len(_faces(context.Apply(document.faces[index]))))
-    whole = context.Apply(part.shape)
+        twin = twins.ModifiedShape(document.faces[index])
+        if not _laid(document, index, twin, copier):
+            _divide(document, index, context.Apply(twin), copier, context)
+        yield Cut(index, len(_faces(context.Apply(twin))))
+    whole = context.Apply(twins.Shape())
     if BRepCheck_Analyzer(part.shape).IsValid() and not BRepCheck_Analyzer(whole).IsValid():
         raise _mistaken(document, faces[0])
     tool = document.shape_tool
     subs = list(labels(lambda found: XCAFDoc_ShapeTool.GetSubShapes_s(part.label, found)))
-    new = [context.Apply(XCAFDoc_ShapeTool.GetShape_s(label)) for label in subs]
+    new = [context.Apply(twins.ModifiedShape(XCAFDoc_ShapeTool.GetShape_s(label))) for label in subs]
     tool.SetShape(part.label, whole)
     for label, shape in zip(subs, new, strict=True):
         is_face = XCAFDoc_ShapeTool.GetShape_s(label).ShapeType() == TopAbs_FACE
@@ -170,9 +186,27 @@ def _rewrite(document: Document, part: Part, faces: Sequence[int], copier: Copie
             say(document, label, tool.AddSubShape(part.label, other))
 
 
-def _divide(document: Document, index: int, copier: Copier, context: ShapeBuild_ReShape) -> None:
+def _laid(document: Document, index: int, twin: TopoDS_Shape, copier: Copier) -> bool:
+    """Whether a face that is not NURBS comes back as such: then its twin is."""
+    face = twin.Located(TopLoc_Location()).Oriented(TopAbs_FORWARD)
+    if isinstance(_basis(BRep_Tool.Surface_s(TopoDS.Face_s(face), TopLoc_Location())), _NURBS):
+        return False
+    try:
+        made = conversion(document, index)
+    except EditError:
+        return False
+    finally:
+        document.conversions.pop(index, None)
+    trial = BRepBuilderAPI_Copy(face, False, False).Shape()
+    lay(TopoDS.Face_s(trial), made.surface, made.pcurves, made.tolerances)
+    if not (BRepCheck_Analyzer(trial).IsValid() and _kept(trial, copier(trial))):
+        return False
+    lay(TopoDS.Face_s(face), made.surface, made.pcurves, made.tolerances)
+    return True
+
+
+def _divide(document: Document, index: int, face: TopoDS_Shape, copier: Copier, context: ShapeBuild_ReShape) -> None:
     """Cut a face within a context, in one direction where that is enough, else in both; raises EditError."""
-    face = context.Apply(document.faces[index])
     for directions in ((True, False), (False, True), (True, True)):
         parts = _parts(face, directions, ShapeBuild_ReShape())
         if parts is not None and BRepCheck_Analyzer(parts).IsValid() and _kept(parts, copier(parts)):

@@ -88,7 +88,7 @@ FAST = [
         "bean-holes",
         "cylinder-turned-nurbs",
     ),
-    *("torus-seam-nurbs", "ring-whole-nurbs", "ring-blindseam"),
+    *("torus-seam-nurbs", "ring-whole-nurbs", "ring-blindseam", "capsule"),
 ]
 REFUSED = "ring-"
 """Begins the names of those whose surfaces close both ways: the kernel cannot cut some of them."""
@@ -130,6 +130,19 @@ def test_what_is_said_of_a_face_goes_to_its_parts(schema):
     assert occ.view(found).products == ("ball",)
     layer = data.index(b"PRESENTATION_LAYER_ASSIGNMENT('trim'")
     assert data[layer : data.index(b";", layer)].count(b"#") == 3
+
+
+def test_a_face_is_not_cut_where_it_comes_back_as_nurbs():
+    document = shapes.document(zoo.capsule().val().wrapped)
+    said(document, 2, "dome")
+    document.__dict__.pop("parts")
+    data, cut = written(document)
+    assert [str(each) for each in cut] == ["#3 as NURBS"]
+    found = again(data)
+    assert_same(document, found, cut)
+    (dome,) = (face for face in occ.view(found).faces if face.name)
+    assert (dome.name, dome.colour, dome.kind) == ("dome", "#00ff00", "bspline")
+    assert occ.view(document).faces[2].kind == "revolution" and not document.conversions
 
 
 def test_the_document_stays_what_it_was():
