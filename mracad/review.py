@@ -51,7 +51,7 @@ def diagonal(document: Document) -> float:
 
 def _measured(document: Document, place: bool) -> audit.Subject:
     """A document, measured; with ``place`` all of its instances where they stand."""
-    from mracad.occ.check import check
+    from mracad.occ.check import check, lone_faces
     from mracad.occ.contents import contents
     from mracad.occ.measure import Gauge, face_masses, mass
     from mracad.occ.placed import placed
@@ -70,6 +70,7 @@ def _measured(document: Document, place: bool) -> audit.Subject:
         mass=mass(document),
         faces=face_masses(seen),
         validity=check(seen),
+        lone_faces=lone_faces(seen),
         gauge=Gauge(seen),
         face_numbers=whole.faces if whole else range(len(model.faces)),
         edge_numbers=whole.edges if whole else range(len(model.edges)),

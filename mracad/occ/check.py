@@ -112,6 +112,12 @@ def check(document: Document, faces: Iterable[int] | None = None, distances: boo
         )
 
 
+def lone_faces(document: Document) -> int:
+    """Open shells of one face: what STEP makes of a face that is in no shell."""
+    shells = (shell for part in document.parts for shell in inside(part.shape, TopAbs_SHELL))
+    return sum(not BRep_Tool.IsClosed_s(shell) and len(list(inside(shell, TopAbs_FACE))) == 1 for shell in shells)
+
+
 def _failures(
     analyzer: BRepCheck_Analyzer, subject: TopoDS_Shape, chosen: Iterable[int], members: list[TopoDS_Face]
 ) -> Iterator[Failure]:

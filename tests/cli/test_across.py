@@ -153,6 +153,22 @@ def test_faces_without_a_shell_are_noted_in_iges_alone(mracad, tmp_path):
     assert body["failed"] == ["topology"]
 
 
+def test_a_face_alone_in_a_shell_is_noted(mracad, tmp_path):
+    """STEP has no face without a shell."""
+    apart = [flat((0, 0, z), (10, 0, z), (10, 10, z), (0, 10, z)) for z in (0, 5)]
+    ref = saved(shapes.compound(*apart), tmp_path / "ref.brep")
+    new = converted(mracad, ref, tmp_path / "new.step")
+    for pair in ((ref, new), (new, ref)):
+        body, layers = compared(mracad, *pair)
+        assert body["passed"] and ("topology", "open-shells") in notes(layers)
+    joined = [flat((0, 0, 0), (10, 0, 0), (10, 10, z), (0, 10, z)) for z in (0, 5)]
+    bare, shell = (
+        saved(shapes.compound(*joined), tmp_path / "bare.brep"),
+        saved(shapes.sewn(*joined), tmp_path / "s.step"),
+    )
+    assert compared(mracad, bare, shell)[0]["failed"] == ["topology"]
+
+
 def test_an_edge_in_two_pieces_is_noted(mracad, tmp_path):
     corners = (0, 0, 0), (5, 0, 0), (10, 0, 0), (10, 10, 0), (0, 10, 0)
     ref = saved(flat(*corners[:1], *corners[2:]), tmp_path / "ref.step")

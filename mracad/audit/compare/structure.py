@@ -208,6 +208,8 @@ def _length(line: Array) -> float:
 def topology(ref: Subject, new: Subject, unsewn: str) -> Layer:
     """Solids, shells and free edges; how many faces and edges they are made of is noted.
 
+    An open shell of one face is as good as that face alone.
+
     Parameters
     ----------
     ref, new : Subject
@@ -218,6 +220,9 @@ def topology(ref: Subject, new: Subject, unsewn: str) -> Layer:
     counts = {name: (getattr(ref.validity, name), getattr(new.validity, name)) for name in names}
     counts["edges"] = len(ref.model.edges), len(new.model.edges)
     written = {"faces", "edges"}
+    for name in ("shells", "open_shells"):
+        if counts[name][0] - ref.lone_faces == counts[name][1] - new.lone_faces:
+            written.add(name)
     if unsewn:
         written |= counts.keys()
     elif abs(_free(new.model) - _free(ref.model)) <= _SAME_LENGTH * _free(ref.model):

@@ -52,6 +52,8 @@ class Subject:
     faces : list of Mass
         Of each face of ``model``.
     validity : Validity
+    lone_faces : int
+        Open shells of one face.
     gauge : Gauge
         On the faces of ``model``.
     face_numbers, edge_numbers : sequence of int
@@ -64,6 +66,7 @@ class Subject:
     mass: Mass
     faces: list[Mass]
     validity: Validity
+    lone_faces: int
     gauge: Gauge
     face_numbers: Sequence[int]
     edge_numbers: Sequence[int]
