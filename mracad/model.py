@@ -81,7 +81,8 @@ class Face:
     frame : ndarray (4, 4)
         Rigid map from the surface's frame to the part's.
     box : ndarray (2, 3)
-        Lowest and highest corner in the part's frame, mm.
+        Lowest and highest corner of what is around its control points in the part's frame, mm; ``face_boxes`` of
+        ``occ.boxes`` has that of the face itself.
     instances : int
         How often the part stands in the document.
     """

@@ -28,6 +28,7 @@ STEPS = 4
 """Of Newton's method."""
 
 _FINE = 8  # points between two samples of an edge
+_FEW = 16  # knots of an edge that its samples do justice to
 
 
 def rims(edges: Sequence[Edge]) -> list[Array]:
@@ -42,7 +43,7 @@ def rims(edges: Sequence[Edge]) -> list[Array]:
     return result
 
 
-def box(face: Face, net: Net, rim: Array, outer: Array) -> Array:
+def box(face: Face, net: Net, rim: Array, outer: Array, slack: float = 0.0) -> Array:
     """The box of a face in its part's frame.
 
     Parameters
@@ -51,11 +52,15 @@ def box(face: Face, net: Net, rim: Array, outer: Array) -> Array:
     net : Net
         Its surface.
     rim : ndarray (2, 3)
-        That of its boundary.
+        That of its edges, by :func:`rims`, and vertices.
     outer : ndarray (2, 3)
         One around its control points: nothing of the face is beyond.
+    slack : float
+        What it may miss, mm, beside ``CLOSE`` of the face's size.
     """
-    slack = CLOSE * float(np.linalg.norm(outer[1] - outer[0]))
+    slack = max(slack, CLOSE * float(np.linalg.norm(outer[1] - outer[0])))
+    if np.abs(outer - rim).max() > slack:
+        rim = _with_long(face, net, rim)
     wanted = [(k, axis) for k in (0, 1) for axis in range(3) if abs(outer[k, axis] - rim[k, axis]) > slack]
     if not wanted:
         return rim
@@ -81,6 +86,22 @@ def box(face: Face, net: Net, rim: Array, outer: Array) -> Array:
     return np.clip(result, outer[0], outer[1])
 
 
+def _with_long(face: Face, net: Net, rim: Array) -> Array:
+    """The box of the boundary with what edges of many spans do between their samples."""
+    long = [trim.curve for trim in face.trims if len(trim.curve.knots.breaks) > _FEW]
+    if not long:
+        return rim
+    uv = np.concatenate([curve.evaluate(_quarters(curve.knots.breaks))[0] for curve in long])
+    points = net.evaluate(uv) @ face.frame[:3, :3].T + face.frame[:3, 3]
+    return np.array([np.minimum(rim[0], points.min(axis=0)), np.maximum(rim[1], points.max(axis=0))])
+
+
+def _quarters(breaks: Array) -> Array:
+    """Breaks, and the quarters of the spans between them."""
+    count = len(breaks)
+    return np.interp(np.arange(4 * count - 3) / 4, np.arange(count), breaks)
+
+
 def _lines(points: Array, tangents: Array) -> Array:
     """Points along edges, close to each other, ``(e, q, 3)``, from their samples ``(e, k, 3)``."""
     count = points.shape[1]
@@ -97,9 +118,9 @@ def _peaks(lines: Array) -> Array:
     place = lines.argmax(axis=1)[:, None]
     i = np.clip(place, 1, lines.shape[1] - 2)
     before, top, after = (np.take_along_axis(lines, i + k, axis=1)[:, 0] for k in (-1, 0, 1))
-    bend = np.maximum(2 * top - before - after, np.finfo(float).tiny)
-    rise = np.where((place == i)[:, 0], (before - after) ** 2 / (8 * bend), 0.0)
-    return lines.max(axis=1) + np.minimum(rise, np.maximum(top - before, top - after))
+    bend = 2 * top - before - after
+    curved = (place == i)[:, 0] & (bend > 0)
+    return lines.max(axis=1) + np.where(curved, (before - after) ** 2 / (8 * np.where(curved, bend, 1.0)), 0.0)
 
 
 def _grid(face: Face, net: Net) -> tuple[Array, Array]:

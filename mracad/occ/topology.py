@@ -51,10 +51,14 @@ def matrix(location: TopLoc_Location) -> Array:
     return out
 
 
-def box(shape: TopoDS_Shape) -> Array:
-    """Lowest and highest corner of a shape, ``(2, 3)``, memory units: never too small, at most that of its poles."""
+def box(shape: TopoDS_Shape, tight: bool = False) -> Array:
+    """Lowest and highest corner of a shape, ``(2, 3)``, memory units: never too small, at most that of its poles;
+    ``tight`` ones take long on NURBS."""
     bounds = Bnd_Box()
-    BRepBndLib.Add_s(shape, bounds, False)
+    if tight:
+        BRepBndLib.AddOptimal_s(shape, bounds, False, False)
+    else:
+        BRepBndLib.Add_s(shape, bounds, False)
     return np.array([bounds.CornerMin().Coord(), bounds.CornerMax().Coord()])
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Container, Iterable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from OCP.BRep import BRep_Tool
@@ -20,6 +20,7 @@ from OCP.TopoDS import TopoDS, TopoDS_Edge, TopoDS_Face
 from mracad.bspline.net import Net, cross, curvature
 from mracad.errors import FileError, UsageError
 from mracad.model import Edge, Face, Model, Side, Surface, Trim
+from mracad.occ.boxes import diagonal
 from mracad.occ.convert import conversion
 from mracad.occ.document import Document
 from mracad.occ.geometry import basis, curves, is_nurbs, nets
@@ -117,11 +118,13 @@ def view(document: Document, convert: Iterable[int] = (), edges: Container[int] 
             for index, (net, members) in enumerate(zip(control, found.surfaces.values(), strict=True))
         )
         lines = tuple(_edges(document, found, edges))
-        diagonal = _diagonal(document, boxes)
-        _refuse_absurd(document.name, _seen(lines, found, diagonal))
-    products = tuple(part.product for part in document.parts)
-    places = tuple(tuple(matrix(place) for place in part.placements) for part in document.parts)
-    return Model(document.name, surfaces, faces, lines, diagonal, document.unit, document.schema, products, places)
+        _refuse_absurd(document.name, _seen(lines, found))
+        products = tuple(part.product for part in document.parts)
+        places = tuple(tuple(matrix(place) for place in part.placements) for part in document.parts)
+        model = Model(document.name, surfaces, faces, lines, 0.0, document.unit, document.schema, products, places)
+        size = diagonal(document, model)
+        _refuse_absurd(document.name, [(0, size)])
+    return replace(model, diagonal=size)
 
 
 def _refuse_absurd(name: str, numbers: Iterable[tuple[int, Array | float]]) -> None:
@@ -142,9 +145,8 @@ def _stored(boxes: list[Array], surfaces: Iterable[tuple[list[int], Net]]) -> It
             yield members[0], net.weights
 
 
-def _seen(edges: tuple[Edge, ...], found: _Found, diagonal: float) -> Iterator[tuple[int, Array | float]]:
+def _seen(edges: tuple[Edge, ...], found: _Found) -> Iterator[tuple[int, Array | float]]:
     """What was evaluated of each face, and where it stands."""
-    yield 0, diagonal
     yield from enumerate(found.frames)
     for edge in edges:
         for side in edge.sides:
@@ -285,19 +287,3 @@ def _unit(vectors: Array) -> Array:
     """Vectors of length 1; a vanishing one stays zero."""
     lengths = np.linalg.norm(vectors, axis=1, keepdims=True)
     return vectors / np.where(lengths > 0, lengths, 1.0)
-
-
-def _diagonal(document: Document, boxes: list[Array]) -> float:
-    """Diagonal of the box around all placed face boxes, mm."""
-    corners = []
-    for part in document.parts:
-        own = np.array(boxes[part.first : part.first + part.faces.Extent()])
-        if not len(own):
-            continue
-        # the eight corners of every box: each axis low or high
-        grid = np.stack([own[:, [a, b, c], [0, 1, 2]] for a in (0, 1) for b in (0, 1) for c in (0, 1)])
-        for placement in part.placements:
-            frame = matrix(placement)
-            corners.append(grid.reshape(-1, 3) @ frame[:3, :3].T + frame[:3, 3])
-    everything = np.concatenate(corners)
-    return float(np.linalg.norm(everything.max(axis=0) - everything.min(axis=0)))

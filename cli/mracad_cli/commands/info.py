@@ -12,6 +12,8 @@ from mracad_cli import options, render
 from mracad_cli.progress import Progress
 
 if TYPE_CHECKING:
+    import numpy as np
+
     from mracad.audit.scales import FaceScales
     from mracad.model import Face, Model
 
@@ -42,6 +44,7 @@ def command(
 ) -> int:
     from mracad.audit.continuity import seams, summary
     from mracad.audit.scales import scales
+    from mracad.occ.boxes import face_boxes
     from mracad.occ.check import check
     from mracad.occ.instance import instances
     from mracad.occ.view import view
@@ -68,7 +71,10 @@ def command(
             "instances": list(instances(document)),
             "diagonal": model.diagonal,
             "scale": width,
-            "faces": [{**_facts(model, face), **_judged(face, found.get(face.index))} for face in model.faces],
+            "faces": [
+                {**_facts(model, face, own), **_judged(face, found.get(face.index))}
+                for face, own in zip(model.faces, face_boxes(document, model), strict=True)
+            ],
             "seams": {**render.plain(summary(measures)), "each": [render.seam(m) for m in measures]},
             "valid": render.validity(valid),
         }
@@ -108,8 +114,8 @@ def command(
     return 0
 
 
-def _facts(model: Model, face: Face) -> dict[str, Any]:
-    """What a face is; lengths in millimetres."""
+def _facts(model: Model, face: Face, box: np.ndarray) -> dict[str, Any]:
+    """What a face is, and its box; lengths in millimetres."""
     facts: dict[str, Any] = {
         "face": face.index + 1,
         "name": face.name,
@@ -117,7 +123,7 @@ def _facts(model: Model, face: Face) -> dict[str, Any]:
         "colour": face.colour,
         "kind": face.kind,
         "instances": face.instances,
-        "box": face.box.tolist(),
+        "box": box.tolist(),
     }
     if face.surface is not None:
         net = model.surfaces[face.surface].net
