@@ -14,11 +14,12 @@ from typing import TYPE_CHECKING
 from mracad import guard
 from mracad.audit.continuity import SeamMeasure, key, remeasured, seams
 from mracad.audit.deviation import Deviation, deviations
+from mracad.audit.mended import unmended
 from mracad.edit.result import Edit
 from mracad.errors import EditError, UsageError
 from mracad.judge import Judged, Original
 from mracad.model import Model
-from mracad.options import Selection
+from mracad.options import Fitting, Selection
 from mracad.select import Scope, every_nurbs
 from mracad.select import scope as select_scope
 
@@ -202,6 +203,12 @@ def run(
                 "leave faces out with --faces '!#N', or use --amount 0.5",
             )
         spoiled |= dict.fromkeys(worse, "its result would not be valid")
+    if isinstance(options, Fitting):
+        reasons = {treatment.edge: treatment.reason for treatment in result.edges if treatment.reason}
+        movable = scope.chosen - spoiled.keys()
+        result = replace(
+            result, notes=(*result.notes, *unmended(options, model.diagonal, movable, before, after, reasons))
+        )
     stage("measuring the deviation")(0, 1)
     return Report(
         model,
