@@ -7,10 +7,10 @@ Further options go to ``mracad smooth`` as they are.
 
 ``smooth`` smooths each model through the command and compares the file with its output (see :mod:`tests.roughness`).
 
-``noise`` adds noise to the free control points of each NURBS face with at least ``FREE`` of them, normally distributed
-in all three directions with the given deviation (% of the scale), writes that, smooths it through the command and
-measures what is left: the root mean square of (result − original)·n inside the trims over that of the noisy input, at
-the original's parameters and along its normals.
+``noise`` adds noise to the free control points of each NURBS face that has any (at least ``FREE``), normally
+distributed in all three directions with the given deviation (% of the scale), writes that, smooths it through the
+command and measures what is left: the root mean square of (result − original)·n inside the trims over that of the noisy
+input, at the original's parameters and along its normals.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ from mracad.options import length
 from tests.roughness import FEWEST, POINTS, Face, compared, faces, matched, opened, removed, report
 from tests.sheet import Sheet, grid
 
-FREE = 16
+FREE = 1
 """Fewest free control points of a face that noise is put on."""
 
 SEED = 2006
