@@ -51,7 +51,8 @@ Copier = Callable[[TopoDS_Shape], TopoDS_Shape]
 
 _NURBS = Geom_BSplineSurface, Geom_BezierSurface
 _NATURAL = 4  # edge uses of a face that is bounded by nothing but parameter lines
-_SAME = 1e-5  # relative difference of areas, and of centres to size, of one face
+_SAME = 2e-4  # relative difference of areas, and of centres to size, of one face: the kernel measures no better
+_OTHER = 1e-2  # that of faces of which one is surely mistaken for another
 _EXACT = 1e-7  # relative error of areas; those of the kernel's quick way are off by up to a hundredth on NURBS faces
 _LOOSER = 2.0, 1e-5  # a face read back may have so many times the tolerance, or so much (memory units)
 _ALL_THE_WAY = 0.9  # share of the whole range of a parameter
@@ -142,20 +143,25 @@ def _kept(face: TopoDS_Shape, copy: TopoDS_Shape) -> bool:
     """Whether what was read back is what was written."""
     loose, looser = _LOOSER
     return (
-        len(_faces(copy)) == len(_faces(face))
-        and (_as_large(face, copy) or _as_large(face, copy, _EXACT))
+        _alike(face, copy, _SAME)
         and _tolerance(copy) <= max(loose * _tolerance(face), looser)
         and BRepCheck_Analyzer(copy).IsValid()
     )
 
 
-def _as_large(face: TopoDS_Shape, copy: TopoDS_Shape, *exact: float) -> bool:
+def _alike(face: TopoDS_Shape, copy: TopoDS_Shape, slack: float) -> bool:
+    """Whether there are as many faces, with the same area and centre."""
+    same_count = len(_faces(copy)) == len(_faces(face))
+    return same_count and (_as_large(face, copy, slack) or _as_large(face, copy, slack, _EXACT))
+
+
+def _as_large(face: TopoDS_Shape, copy: TopoDS_Shape, slack: float, *exact: float) -> bool:
     """Whether two faces have the same area and centre; quickly, what says no to some that have, or exactly."""
     old, new = GProp_GProps(), GProp_GProps()
     for shape, found in ((face, old), (copy, new)):
         BRepGProp.SurfaceProperties_s(shape, found, *exact)
     off = old.CentreOfMass().Distance(new.CentreOfMass())
-    return abs(new.Mass() - old.Mass()) <= _SAME * abs(old.Mass()) and off <= _SAME * abs(old.Mass()) ** 0.5
+    return abs(new.Mass() - old.Mass()) <= slack * abs(old.Mass()) and off <= slack * abs(old.Mass()) ** 0.5
 
 
 def _tolerance(shape: TopoDS_Shape) -> float:
@@ -168,9 +174,10 @@ def _rewrite(document: Document, part: Part, faces: Sequence[int], copier: Copie
     context = ShapeBuild_ReShape()
     for index in faces:
         twin = twins.ModifiedShape(document.faces[index])
-        if not _laid(document, index, twin, copier):
-            _divide(document, index, context.Apply(twin), copier, context)
-        yield Cut(index, len(_faces(context.Apply(twin))))
+        if _laid(document, index, twin, copier) or _divided(context.Apply(twin), copier, context):
+            yield Cut(index, len(_faces(context.Apply(twin))))
+        elif not _alike(twin, copier(twin), _OTHER):
+            raise _mistaken(document, index)
     whole = context.Apply(twins.Shape())
     if BRepCheck_Analyzer(part.shape).IsValid() and not BRepCheck_Analyzer(whole).IsValid():
         raise _mistaken(document, faces[0])
@@ -205,14 +212,14 @@ def _laid(document: Document, index: int, twin: TopoDS_Shape, copier: Copier) ->
     return True
 
 
-def _divide(document: Document, index: int, face: TopoDS_Shape, copier: Copier, context: ShapeBuild_ReShape) -> None:
-    """Cut a face within a context, in one direction where that is enough, else in both; raises EditError."""
+def _divided(face: TopoDS_Shape, copier: Copier, context: ShapeBuild_ReShape) -> bool:
+    """Whether a face comes back in parts: then it is cut in a context, in one direction where that is enough."""
     for directions in ((True, False), (False, True), (True, True)):
         parts = _parts(face, directions, ShapeBuild_ReShape())
         if parts is not None and BRepCheck_Analyzer(parts).IsValid() and _kept(parts, copier(parts)):
             _parts(face, directions, context)
-            return
-    raise _mistaken(document, index)
+            return True
+    return False
 
 
 def _mistaken(document: Document, index: int) -> EditError:
