@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
+from concurrent.futures import Future
 from pathlib import Path
 from typing import Any
 
@@ -33,9 +34,9 @@ def commands() -> dict[str, click.Command]:
     return found
 
 
-def options(command: click.Command) -> dict[str, click.Option]:
+def options(command: click.Command, without: Container[str] = COVERED_ELSEWHERE) -> dict[str, click.Option]:
     """The options of a command by name."""
-    every = (p for p in command.params if isinstance(p, click.Option) and p.name not in COVERED_ELSEWHERE)
+    every = (p for p in command.params if isinstance(p, click.Option) and p.name not in without)
     return {str(option.name): option for option in every}
 
 
@@ -123,7 +124,7 @@ NEEDED = {"feature"}
 """Options without which a command has nothing to do."""
 
 RECIPE = '[[step]]\nuse = "smooth"\nscale = "20%"\n\n[[step]]\nuse = "check"\n'
-PIPELINE = "smooth --scale 20% ! check"
+PIPELINE = "smooth --scale 20% ! check ! compare --max-deviation 1mm"
 ARGUMENTS = {
     "batch": ("recipe.toml", "IN"),
     "compare": ("REF", "IN"),
@@ -221,3 +222,29 @@ def small_models(folder: Path) -> list[Path]:
         paths.append(folder / f"{name}.step")
         mracad.write(document(*parts, names={0: "part", 1: "other"}), paths[-1])
     return paths
+
+
+class Here:
+    """The pool of a batch, in this process."""
+
+    workers = 1
+
+    def __init__(self, *_):
+        pass
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        pass
+
+    def submit(self, fn, *args):
+        future = Future()
+        try:
+            future.set_result(fn(*args))
+        except Exception as error:
+            future.set_exception(error)
+        return future
+
+    def shutdown(self, wait=True, cancel_futures=False):
+        pass

@@ -2,7 +2,6 @@
 
 import json
 from collections import Counter
-from concurrent.futures import Future
 from pathlib import Path
 
 import pytest
@@ -12,34 +11,8 @@ from tests.cli import declared
 LEAST = 0.3
 """Share of the rows that must come to an end: where nearly all are refused, nothing is tried."""
 
-ROWS = 12
+ROWS = 8
 """Rows of a command without --long, evenly from all of them."""
-
-
-class Here:
-    """The pool of a batch, in this process."""
-
-    workers = 1
-
-    def __init__(self, *_):
-        pass
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        pass
-
-    def submit(self, fn, *args):
-        future = Future()
-        try:
-            future.set_result(fn(*args))
-        except Exception as error:
-            future.set_exception(error)
-        return future
-
-    def shutdown(self, wait=True, cancel_futures=False):
-        pass
 
 
 def contents(folder):
@@ -59,7 +32,7 @@ def rows(command, small, every):
 
 @pytest.mark.parametrize("command", declared.commands())
 def test_pairs_of_options(command, mracad, small, tmp_path, monkeypatch, pytestconfig):
-    monkeypatch.setattr("mracad_cli.batches.Pool", Here)
+    monkeypatch.setattr("mracad_cli.batches.Pool", declared.Here)
     codes = Counter()
     for number, words in enumerate(rows(command, small, pytestconfig.getoption("--long"))):
         folder = tmp_path / str(number)

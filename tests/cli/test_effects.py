@@ -1,0 +1,293 @@
+"""Every option of every command has an effect: what a command does with it differs from what it does without."""
+
+import json
+import os
+import re
+from pathlib import Path
+
+import pytest
+
+import mracad
+from tests.cli import declared
+from tests.cli.shapes import ruled_strip
+from tests.edit import halves
+from tests.occ import shapes
+
+TESTS = Path(__file__).parents[1]
+
+ELSEWHERE = {
+    "batch cluster": "batch/test_cluster.py::test_a_lost_worker_costs_nothing",
+    "batch if_changed": "batch/test_batch.py::test_a_changed_input_or_recipe_is_done_again_and_nothing_else",
+    "batch jobs": "batch/test_batch.py::test_the_outputs_do_not_depend_on_the_number_of_workers",
+    "batch keep_going": "batch/test_batch.py::test_fail_fast_stops_and_retry_tries_again",
+    "batch memory_limit": "batch/test_batch.py::test_five_bad_files_of_a_hundred_cost_five",
+    "batch retry": "batch/test_batch.py::test_fail_fast_stops_and_retry_tries_again",
+    "batch time_limit": "batch/test_batch.py::test_five_bad_files_of_a_hundred_cost_five",
+}
+"""Options whose effect needs more than two calls, and the tests of it."""
+
+MEMORY = "robust/test_robust.py::test_limits_on_the_command_line"
+
+FEATURE = ("--feature", "near:5,5,0,radius:1.5")
+BASE = {
+    "batch": ("batch", "recipe.toml", "sheet.step", "--folder", "out", "--json"),
+    "check": ("check", "sheet.step", "--json"),
+    "compare": ("compare", "sheet.step", "smooth.step", "--json"),
+    "convert": ("convert", "sheet.step", "-o", "a.step", "--json"),
+    "feature extract": ("feature", "extract", "sheet.step", *FEATURE, "-o", "a.feature", "--json"),
+    "feature list": ("feature", "list", "sheet.step", "--json"),
+    "info": ("info", "sheet.step", "--json"),
+    "move": ("move", "sheet.step", *FEATURE, "--to", "15,5,0", "-o", "a.step", "--json"),
+    "pipeline": ("pipeline", declared.PIPELINE, "sheet.step", "-o", "a.step", "--json"),
+    "recipe check": ("recipe", "check", "recipe.toml", "--json"),
+    "repeat": ("repeat", "sheet.step", *FEATURE, "--at", "14,5,0", "-o", "a.step", "--json"),
+    "run": ("run", "recipe.toml", "sheet.step", "-o", "a.step", "--json"),
+    "smooth": ("smooth", "sheet.step", "--scale", "4mm", "-o", "a.step", "--json"),
+    "transfer": (
+        "transfer",
+        "sheet.step",
+        "flat.step",
+        "--from",
+        FEATURE[1],
+        "--to",
+        "5,7,0",
+        "-o",
+        "a.step",
+        "--json",
+    ),
+}
+"""What each command is called with."""
+
+WAYS = {
+    "amount": ("--amount 0.5",),
+    "angle": ("--angle 2", "-o a.stl --chord 5mm"),
+    "as_json": (None, ""),
+    "ascii_stl": ("--ascii", "-o a.stl"),
+    "assignments": ("--set smooth.scale=3mm",),
+    "at": ("--at 5,8,0",),
+    "band": ("--band 0mm:3mm", "--base level --band 0mm:8mm"),
+    "base": ("--base level", "--band 0mm:8mm"),
+    "chord": ("--chord 1mm", "-o a.stl"),
+    "clip": ("--clip", "--at 0.3,5,0"),
+    "depfile": ("--depfile a.d",),
+    "dry_run": ("--dry-run",),
+    "edges": ("--edges frozen",),
+    "encoding": ("--encoding iso8859-5", "IN latin.step"),
+    "everything": ("--all", "LESS --json"),
+    "faces": ("--faces #1",),
+    "fail_on": ("--fail-on free-edges",),
+    "feature": ("--feature near:5,5,0,radius:1",),
+    "fit_g1": ("--fit-g1 20",),
+    "folder": ("--folder other",),
+    "format": ("--format brep", "-o -"),
+    "from_": ("--from near:5,5,0,radius:1",),
+    "grid": ("--grid 1x2,1,2",),
+    "height": ("--height 0.5",),
+    "hold": ("--hold edge#1 --hold edge#2 --hold edge#3 --hold edge#4",),
+    "if_changed": ("--if-changed", "OLD a.step"),
+    "ignore": ("--ignore deviation",),
+    "input_unit": ("--input-unit in",),
+    "instance": ("--instance part", "IN two.step"),
+    "jitter": ("--jitter 0.3mm",),
+    "junit": ("--junit a.xml",),
+    "keep": ("--keep g2",),
+    "kink": ("--kink 45", "--max-angle 0"),
+    "layer_limit": ("--layer-limit 1e-4",),
+    "level": ("--level 2", "LESS --scale"),
+    "max_angle": ("--max-angle 0", "--kink 45"),
+    "max_angle_growth": ("--max-angle-growth 0",),
+    "max_deviation": ("--max-deviation 0.01mm",),
+    "max_gap": ("--max-gap 1e-5mm", "IN gaping.step"),
+    "max_gap_growth": ("--max-gap-growth 1e-6mm", "IN gaping.step"),
+    "max_tolerance": ("--max-tolerance 1e-9mm",),
+    "max_volume_change": ("--max-volume-change 1e-9", "REF slab.step IN smoothslab.step"),
+    "min_wall": ("--min-wall 9mm", "IN slab.step"),
+    "mirror": ("--mirror", "--rotate 20"),
+    "mode": ("--mode replace", "--from #1 --to #1 --band 0mm:8mm"),
+    "output": ("-o b.feature",),
+    "outputs": ("-o b.brep",),
+    "overlap": ("--overlap max", "--at 14.5,5.3,0"),
+    "overwrite": ("--overwrite", "OLD a.step"),
+    "polar": ("--polar 2,6,6,0,0,0,1",),
+    "along": ("--along edge#1,1,3",),
+    "record": ("--record",),
+    "reference_unit": ("--reference-unit in",),
+    "refine": ("--refine", "IN strip.step --scale 8mm"),
+    "report": ("--report a.json",),
+    "rotate": ("--rotate 40",),
+    "sarif": ("--sarif a.sarif",),
+    "scale": ("--scale 9mm",),
+    "schema": ("--schema AP203",),
+    "seed": ("--seed 5", "--jitter 0.3mm"),
+    "size": ("--size 0.7",),
+    "spin": ("--spin 60",),
+    "taper": ("--taper 1.2mm",),
+    "time_limit": ("--time-limit 1e-3s",),
+    "to": ("--to 5,8,0",),
+    "verify": ("--verify off",),
+    "close_gaps": ("--close-gaps", "IN gaping.step"),
+    "gap_tolerance": ("--gap-tolerance 1mm", "IN halves.step --scale 40mm"),
+}
+"""For each option, words that give it, and others that it needs; IN, REF and OLD stand for files, LESS for less."""
+
+OWN = {
+    "batch format": ("--format brep",),
+    "batch overwrite": ("--overwrite", "OLD out/sheet.step"),
+    "check overwrite": ("--overwrite", "OLD a.xml --junit a.xml"),
+    "compare overwrite": ("--overwrite", "OLD a.xml --junit a.xml"),
+    "feature extract overwrite": ("--overwrite", "OLD a.feature"),
+    "compare max_deviation": ("--max-deviation 1mm",),
+    "info keep": ("--keep g2",),
+    "feature extract keep": ("--keep g2",),
+    "transfer faces": ("--faces #2",),
+    "transfer edges": ("--edges frozen", "--to 10,5,0 --clip"),
+    "transfer hold": ("--hold #1",),
+    "repeat edges": ("--edges frozen", "--at 10,5,0 --clip"),
+    "move edges": ("--edges frozen", "--to 10,5,0 --clip"),
+    "move clip": ("--clip", "--to 19.8,5,0"),
+    "transfer clip": ("--clip", "--to 0.3,5,0"),
+    "move to": ("--to 15,4,0",),
+    "move keep": ("--keep g2", "--to 19.4,5,0 --clip"),
+    "repeat keep": ("--keep g2", "--at 19.4,5,0 --clip"),
+    "transfer keep": ("--keep g2", "--to 0.6,5,0 --clip"),
+    "repeat polar": ("--polar 2,8,5,0,0,0,1",),
+}
+
+
+@pytest.fixture(scope="session")
+def folder(small, tmp_path_factory):
+    """Models by name, and a recipe."""
+    import numpy as np
+    from mracad_cli.__main__ import main
+
+    place = tmp_path_factory.mktemp("effects")
+    for path in small:
+        (place / path.name).write_bytes(path.read_bytes())
+    (place / "recipe.toml").write_text(declared.RECIPE)
+    ruled_strip(place / "strip.step")
+    mracad.write(halves.document(*halves.quiet(0.3, (10, 20))), place / "halves.step")
+    x, y = np.meshgrid(np.linspace(0, 10, 16), np.linspace(0, 10, 16), indexing="ij")
+    near = [np.stack([x + dx, y, declared.heights(x + dx, y) + dz], axis=-1) for dx, dz in ((0, 0), (10, 4e-4))]
+    bare = shapes.document(shapes.compound(*(shapes.face_on(shapes.bspline(poles)) for poles in near)))
+    mracad.write(bare, place / "gaping.step")
+    flat = shapes.document(shapes.compound(*(shapes.face_on(shapes.bspline(0.0 * p + [1, 1, 0] * p)) for p in near)))
+    mracad.write(flat, place / "flat.step")
+    text = (place / "sheet.step").read_bytes()
+    (place / "latin.step").write_bytes(text.replace(b"'part'", b"'t\xe9t\xe9'"))
+    for name in ("sheet", "slab"):
+        words = ["--scale", "20%", "--keep", "g0", "-o", str(place / f"smooth{name}.step")]
+        assert main(["smooth", str(place / f"{name}.step"), *words]) == 0
+    (place / "smoothsheet.step").rename(place / "smooth.step")
+    return place
+
+
+def cases():
+    """Every option of every command, and whether it is the first that has it just so."""
+    seen = set()
+    for name, command in sorted(declared.commands().items(), key=lambda each: each[0] not in ("check", "convert")):
+        for option, declaration in declared.options(command, ()).items():
+            case, kind = f"{name} {option}", (option, declaration.help)
+            if option == "memory_limit":
+                ELSEWHERE.setdefault(case, MEMORY)
+            if case not in ELSEWHERE and option != "debug":
+                yield pytest.param(case, kind not in seen, id=case)
+            seen.add(kind)
+
+
+_known = {}
+
+
+def once(mracad, folder, place, given, old):
+    """What a command does without the option, from the first time that it was asked."""
+    key = (*given, None, *old)
+    if key not in _known:
+        _known[key] = observed(mracad, folder, place, given, old)
+    return _known[key]
+
+
+def words(case):
+    """The words of a command with and without an option, and files that are there before."""
+    command, _, option = case.rpartition(" ")
+    given, *needs = OWN.get(case) or WAYS[option]
+    base, old, more = list(BASE[command]), [], " ".join(needs).split()
+    while more:
+        word = more.pop(0)
+        if word == "OLD":
+            old.append(more.pop(0))
+        elif word in ("IN", "REF"):
+            place = next(i for i, w in enumerate(base) if w.endswith(".step"))
+            base[place + (word == "IN" and command in ("compare", "transfer"))] = more.pop(0)
+        elif word == "LESS":
+            at = base.index(more.pop(0))
+            del base[at : at + 2]
+        else:
+            _give(base, [word, *([more.pop(0)] if more and not more[0].startswith("--") else [])])
+    if given is None:
+        base.remove("--json")
+        return base, [*base, "--json"], old
+    changed, own = list(base), given.split()
+    if option in ("scale", "to", "from_", "feature", "folder", "output") and own[0] in changed:
+        _give(changed, own)
+    else:
+        changed += own
+    if option == "level":
+        base += ["--scale", "4mm"]
+    return base, changed, old
+
+
+def _give(base, option):
+    """Give an option, in place of the value that it has."""
+    if option[0] in base:
+        at = base.index(option[0])
+        del base[at : at + len(option)]
+    base += option
+
+
+def observed(mracad, folder, place, given, old):
+    """What a command says, writes and returns, without what the options are called and how long it took."""
+    place.mkdir()
+    for path in folder.iterdir():
+        os.link(path, place / path.name)
+    for name in old:
+        (place / name).parent.mkdir(exist_ok=True)
+        (place / name).write_text("precious")
+    before = {path.relative_to(place) for path in place.rglob("*")}
+    os.chdir(place)
+    result = mracad(*given)
+    text = result.out
+    if text.startswith("{"):
+        body = json.loads(text.splitlines()[0])
+        for part in (body, *body.get("steps", ())):
+            part.pop("options", None)
+        text = json.dumps(body)
+    text = re.sub(r'"seconds": [\d.e-]+|\d+\.\d s\b', "", text)
+    files = {
+        str(path.relative_to(place)): path.read_bytes().partition(b"FILE_NAME")[2].partition(b"DATA;")[2]
+        if path.suffix == ".step" and b"FILE_NAME" in path.read_bytes()
+        else path.read_bytes()
+        for path in place.rglob("*")
+        if path.is_file() and (path.relative_to(place) not in before or path.read_bytes()[:8] != b"ISO-1030")
+    }
+    schemas = [p.read_bytes().partition(b"FILE_SCHEMA")[2][:40] for p in sorted(place.rglob("a.step"))]
+    return result.code, text, re.sub(r"[\d.]+ s\b", "", result.err), files, schemas
+
+
+@pytest.mark.parametrize(("case", "first"), cases())
+def test_an_option_has_an_effect(case, first, mracad, folder, tmp_path, monkeypatch, pytestconfig):
+    if not (first or pytestconfig.getoption("--long")):
+        pytest.skip("declared once for several commands: pytest --long tries it on each")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("mracad_cli.batches.Pool", declared.Here)
+    base, changed, old = words(case)
+    without = once(mracad, folder, tmp_path / "without", base, old)
+    given = observed(mracad, folder, tmp_path / "with", changed, old)
+    assert without != given, changed
+    assert 70 not in (without[0], given[0]), (without[:3], given[:3])
+    assert re.search("clip|refine|overwrite|if_changed", case) or without[0] in (0, 1), (base, without[:3])
+    assert given[0] != 2, (changed, given[:3])
+
+
+def test_the_effects_that_need_more_are_tested_where_it_is_said():
+    for case, place in ELSEWHERE.items():
+        file, _, name = place.partition("::")
+        assert f"def {name}(" in (TESTS / file).read_text(), case
