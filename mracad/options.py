@@ -70,15 +70,17 @@ Length = Annotated[
 
 @dataclass(frozen=True)
 class Naming:
-    """How the text of an option names a file: what stands before the path, and how it ends where it is one at all."""
+    """How the text of an option names a file: what stands before the path, how it ends where it is one at all, and
+    whether digits alone name none."""
 
     prefix: str = ""
     ending: str = ""
+    or_number: bool = False
 
     def file(self, text: str) -> str | None:
         """The path in a text; None where it names no file."""
         named = text.startswith(self.prefix) and text.endswith(self.ending)
-        return text[len(self.prefix) :] if named else None
+        return text[len(self.prefix) :] if named and not (self.or_number and text.isdecimal()) else None
 
     def renamed(self, text: str, files: Mapping[str, str]) -> str:
         """The text with its path replaced, where it has one that ``files`` knows."""
@@ -91,6 +93,9 @@ File = Annotated[str, Naming()]
 
 FeatureText = Annotated[str, Naming(ending=".feature")]
 """The type of a field that is a feature, or names the file of one."""
+
+CountText = Annotated[str, Naming(or_number=True)]
+"""The type of a field that is a number, or names a file that holds it."""
 
 PlaceText = Annotated[str, Naming(prefix="@")]
 """The type of a field that is a place, or names a file of places."""
@@ -509,7 +514,7 @@ class Check(Options, frozen=True, kw_only=True, forbid_unknown_fields=True):
         1.0
     )
     expect: Annotated[
-        str | None,
+        CountText | None,
         Meta(
             description="How many seams are to be smooth: a number, or the report (JSON) of an earlier check or edit."
         ),
@@ -526,9 +531,6 @@ class Check(Options, frozen=True, kw_only=True, forbid_unknown_fields=True):
         ],
         Meta(description="What fails the check beside the limits; repeatable."),
     ] = ("invalid",)
-
-    def files(self) -> tuple[str, ...]:
-        return (self.expect,) if self.expect and not self.expect.isdecimal() else ()
 
 
 class Compare(Options, frozen=True, kw_only=True, forbid_unknown_fields=True):

@@ -179,6 +179,7 @@ def _copy(shape: TopoDS_Shape) -> TopoDS_Shape:
 def _head(model: StepData_StepModel, name: str, options_text: str) -> None:
     """Fill the header: nothing in it depends on where, when or how often it is written."""
     header = APIHeaderSection_MakeHeader(model)
+    name, options_text = (text.encode(errors="backslashreplace").decode() for text in (name, options_text))
     header.SetName(TCollection_HAsciiString(name))
     header.SetTimeStamp(TCollection_HAsciiString(moment().strftime("%Y-%m-%dT%H:%M:%S")))
     header.SetOriginatingSystem(TCollection_HAsciiString(f"mracad {__version__}"))

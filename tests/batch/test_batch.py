@@ -17,7 +17,7 @@ from mracad.batch.manifest import NAME, Manifest
 from mracad.batch.run import find
 from mracad.errors import FileError, UsageError
 from mracad.recipe import load
-from tests.batch.runs import batch, environment, kills, models, outputs, recipe, shams, start
+from tests.batch.runs import RECIPE, batch, environment, kills, models, outputs, recipe, shams, start
 
 
 def test_five_bad_files_of_a_hundred_cost_five(tmp_path):
@@ -204,6 +204,20 @@ def test_names_that_are_not_unicode(tmp_path):
         assert code == 0, err
         assert [json.loads(line).get("status") for line in out.splitlines()] == [status, None]
     assert list(outputs(tmp_path / "out")) == [name]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="names are Unicode elsewhere")
+def test_files_that_options_name_need_not_be_unicode_either(tmp_path):
+    """The line in the header of the output holds their names."""
+    folder = models(tmp_path / "in", 1)
+    name = os.fsdecode(b"b\xe4r.step")
+    (folder / "part000.step").rename(folder / name)
+    compare = '\n[[step]]\nuse = "compare"\nreference = "{folder}/{name}.step"\nmax-deviation = "1mm"\n'
+    path = recipe(tmp_path, RECIPE + compare)
+    code, _, err = batch(path, folder, "-O", tmp_path / "out")
+    assert code == 0 and list(outputs(tmp_path / "out")) == [name], err
+    code, out, _ = batch(path, folder, "-O", tmp_path / "other", "--record")
+    assert code == 1 and "not Unicode" in out and "internal" not in out and not outputs(tmp_path / "other")
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="asks the system to end children")

@@ -254,6 +254,14 @@ def test_the_files_of_a_transfer_are_told_by_their_options(line, files, there):
     assert (moved.source, moved.from_, moved.to) == there
 
 
+def test_a_count_is_no_file():
+    for text, files in (("7", ()), ("7.json", ("7.json",)), (None, ())):
+        step = options.Check(expect=text)
+        assert step.files() == files and step.relocated({"7": "x/7", "7.json": "x/7.json"}).files() == tuple(
+            f"x/{file}" for file in files
+        )
+
+
 def test_the_files_of_copies_are_told_by_their_options():
     step = recipe.Step("r", "repeat", options.Repeat(feature="@b.feature", at=("@a.csv", "1,2,3", "a.csv@0,0")))
     assert step.options.files() == ("@b.feature", "a.csv")

@@ -81,6 +81,7 @@ VALUES: Mapping[str, Sequence[Any]] = {
     "chord": ["1mm"],
     "depfile": ["out.d"],
     "encoding": ["utf-8"],
+    "expect": ["1", "report.json"],
     "faces": ["#1", "type:bspline", "!#2"],
     "feature": ["near:5,5,0,radius:1.5"],
     "fit_g1": ["10"],

@@ -74,6 +74,7 @@ WAYS = {
     "edges": ("--edges frozen",),
     "encoding": ("--encoding iso8859-5", "IN latin.step"),
     "everything": ("--all", "LESS --json"),
+    "expect": ("--expect 3",),
     "faces": ("--faces #1",),
     "fail_on": ("--fail-on free-edges",),
     "feature": ("--feature near:5,5,0,radius:1",),
@@ -106,7 +107,7 @@ WAYS = {
     "mode": ("--mode replace", "--from #1 --to #1 --band 0mm:8mm"),
     "output": ("-o b.feature",),
     "outputs": ("-o b.brep",),
-    "overlap": ("--overlap max", "--at 14.5,5.3,0"),
+    "overlap": ("--overlap max", "--grid 2x1,0.8,0.8"),
     "overwrite": ("--overwrite", "OLD a.step"),
     "polar": ("--polar 2,6,6,0,0,0,1",),
     "along": ("--along edge#1,1,3",),
@@ -137,6 +138,7 @@ OWN = {
     "compare overwrite": ("--overwrite", "OLD a.xml --junit a.xml"),
     "feature extract overwrite": ("--overwrite", "OLD a.feature"),
     "compare max_deviation": ("--max-deviation 1mm",),
+    "compare max_angle_growth": ("--max-angle-growth 0", "REF smooth.step IN sheet.step"),
     "info keep": ("--keep g2",),
     "feature extract keep": ("--keep g2",),
     "transfer faces": ("--faces #2",),
@@ -272,7 +274,7 @@ def observed(mracad, folder, place, given, old):
     return result.code, text, re.sub(r"[\d.]+ s\b", "", result.err), files, schemas
 
 
-@pytest.mark.parametrize(("case", "first"), cases())
+@pytest.mark.parametrize(("case", "first"), list(cases()))
 def test_an_option_has_an_effect(case, first, mracad, folder, tmp_path, monkeypatch, pytestconfig):
     if not (first or pytestconfig.getoption("--long")):
         pytest.skip("declared once for several commands: pytest --long tries it on each")
