@@ -1,6 +1,7 @@
 """One model in two formats: what a format cannot hold, and how it writes things down, is noted; the rest fails."""
 
 import json
+import math
 
 import pytest
 from OCP.BRepAlgoAPI import BRepAlgoAPI_Cut
@@ -167,6 +168,17 @@ def test_a_face_alone_in_a_shell_is_noted(mracad, tmp_path):
         saved(shapes.sewn(*joined), tmp_path / "s.step"),
     )
     assert compared(mracad, bare, shell)[0]["failed"] == ["topology"]
+
+
+def test_a_closing_edge_elsewhere_is_noted(mracad, tmp_path):
+    files = [tmp_path / "ref.brep", tmp_path / "new.step"]
+    for path, start in zip(files, (0.0, 2.0), strict=True):
+        turned = gp_Ax2(gp_Pnt(0, 0, 0), gp_Dir(0, 0, 1), gp_Dir(math.cos(start), math.sin(start), 0))
+        hole = BRepPrimAPI_MakeCylinder(gp_Ax2(gp_Pnt(2, 0, 10), gp_Dir(1, 0, 0)), 1, 10).Shape()
+        saved(BRepAlgoAPI_Cut(BRepPrimAPI_MakeCylinder(turned, 5, 20).Shape(), hole).Shape(), path)
+    for pair in (files, files[::-1]):
+        body, layers = compared(mracad, *pair)
+        assert body["passed"] and {("seams", "seam-lost"), ("seams", "seam-added")} <= notes(layers)
 
 
 def test_an_edge_in_two_pieces_is_noted(mracad, tmp_path):

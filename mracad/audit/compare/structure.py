@@ -94,13 +94,10 @@ def seams(ref: Subject, new: Subject, groups: Sequence[Group], limits: Limits, u
     smooth = [0.0, 0.0]
     broken = 0
     for strand in _strands(ref.model, new.model, before, after, groups, limits.deviation):
-        if not strand.new:
-            findings.append(_finding(ref, strand.old[0], "seam-lost"))
+        if not (strand.old and strand.new):
+            (notes if _closes(strand) else findings).append(_alone(ref, new, strand))
             continue
         worst = max(strand.new, key=lambda m: _known(m.angle))
-        if not strand.old:
-            findings.append(_finding(new, worst, "seam-added"))
-            continue
         if len(strand.old) != len(strand.new):
             notes.append(_finding(new, worst, "seam-pieces", was=len(strand.old), now=len(strand.new)))
         was, now = strand.worst("angle")
@@ -123,6 +120,18 @@ def seams(ref: Subject, new: Subject, groups: Sequence[Group], limits: Limits, u
     text += f", those that were smooth within {smooth[1]:.2g}° (was {smooth[0]:.2g}°)"
     figures = {"before": old, "after": fresh, "growth": growth, "no_longer_smooth": broken}
     return layer("seams", text, findings, figures, notes)
+
+
+def _closes(strand: _Strand) -> bool:
+    """Whether smooth seams close faces on themselves: where such a face is cut open is a matter of writing it down."""
+    return all(m.smooth and m.faces[0] == m.faces[1] for m in (*strand.old, *strand.new))
+
+
+def _alone(ref: Subject, new: Subject, strand: _Strand) -> Finding:
+    """A seam that only one document has."""
+    if strand.new:
+        return _finding(new, max(strand.new, key=lambda m: _known(m.angle)), "seam-added")
+    return _finding(ref, strand.old[0], "seam-lost")
 
 
 def _either_way(measures: list[SeamMeasure]) -> list[SeamMeasure]:
