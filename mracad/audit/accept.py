@@ -235,7 +235,7 @@ class Facts:
     owners : ndarray of int (p,)
         The face that each of them is.
     closing : frozenset of int
-        Faces on surfaces that close: their edges do not tell which side of them is meant.
+        Faces on surfaces that close, without a closing edge: the others do not tell which side of them is meant.
     vertices : ndarray (f,)
         The largest tolerance among the vertices of each face, mm.
     edges : tuple of Line
@@ -335,9 +335,8 @@ def judge(
 
 def _faults(memory: _File, file: _File, slack: Slack) -> Iterator[Fault]:
     """Where a file is worse than the document."""
-    changed = _changed(memory, file)
-    yield from _bodies(memory, file, slack, {face for pair in changed for face in pair})
-    yield from _beside(memory, file, slack, changed)
+    yield from _bodies(memory, file)
+    yield from _beside(memory, file, slack, _changed(memory, file, lambda edge: _LAID))
 
 
 def _beside(base: _File, file: _File, slack: Slack, pairs: Collection[tuple[int, ...]]) -> Iterator[Fault]:
@@ -354,12 +353,12 @@ def _beside(base: _File, file: _File, slack: Slack, pairs: Collection[tuple[int,
     yield from _seams(base, file, slack, pairs)
 
 
-def _changed(memory: _File, file: _File) -> set[tuple[int, ...]]:
-    """The faces of edges that are not the same in the file."""
+def _changed(memory: _File, file: _File, room: Callable[[Line], float]) -> set[tuple[int, ...]]:
+    """The faces of edges that are not the same in the file, within a distance."""
     same: set[int] = set()
     left: dict[tuple[int, ...], list[int]] = defaultdict(list)
     for number, pair in enumerate(memory.pairs):
-        if number < len(file.pairs) and _same(memory, number, file, number):
+        if number < len(file.pairs) and _same(memory, number, file, number, room):
             same.add(number)
         else:
             left[pair].append(number)
@@ -367,7 +366,7 @@ def _changed(memory: _File, file: _File) -> set[tuple[int, ...]]:
     for number, pair in enumerate(file.pairs):
         if number in same:
             continue
-        twin = next((other for other in left[pair] if _same(memory, other, file, number)), None)
+        twin = next((other for other in left[pair] if _same(memory, other, file, number, room)), None)
         if twin is None:
             changed.add(pair)
         else:
@@ -375,7 +374,7 @@ def _changed(memory: _File, file: _File) -> set[tuple[int, ...]]:
     return changed | {pair for pair, numbers in left.items() if numbers}
 
 
-def _same(memory: _File, one: int, file: _File, other: int) -> bool:
+def _same(memory: _File, one: int, file: _File, other: int, room: Callable[[Line], float]) -> bool:
     a, b = memory.facts.edges[one], file.facts.edges[other]
     if a.points.shape != b.points.shape:
         return False
@@ -384,18 +383,23 @@ def _same(memory: _File, one: int, file: _File, other: int) -> bool:
         return False
     sides = b.points if len(order) < len(b.faces) else b.points[[0, *(1 + i for i in order)]]
     mine = a.points if len(order) < len(b.faces) else a.points[[0, *(1 + i for i in np.argsort(a.faces))]]
-    return float(np.abs(mine - sides).max(initial=0.0)) <= _LAID
+    return float(np.abs(mine - sides).max(initial=0.0)) <= room(a)
 
 
-def _bodies(memory: _File, file: _File, slack: Slack, changed: Collection[int]) -> Iterator[Fault]:
-    """Faces that are lost or others, and the volume and box of everything."""
+def _bodies(memory: _File, file: _File) -> Iterator[Fault]:
+    """Faces that are lost or others, and the volume and box of everything.
+
+    A face of which no edge lies farther off than its tolerance is the same, unless its edges do not tell which side
+    of them is meant.
+    """
     old, new = memory.facts, file.facts
+    changed = {face for pair in _changed(memory, file, lambda edge: max(edge.tolerance, SLACK)) for face in pair}
     before, after = memory.areas(), file.areas()
     lost = [face for face in range(old.count) if face not in after]
     yield from (Fault(Reason.LOST, (face,), 0.0, old.probe.area(face, False)) for face in lost)
     borders = _borders(old)
     others = []
-    for face in sorted((old.closing | set(changed)) & after.keys()):
+    for face in sorted((old.closing | changed) & after.keys()):
         allowed = borders[face] * len(before[face])
         for exact in (False, True):
             value = sum(new.probe.area(twin, exact) for twin in after[face])
@@ -410,9 +414,10 @@ def _bodies(memory: _File, file: _File, slack: Slack, changed: Collection[int]) 
         value, was = new.probe.volume(), old.probe.volume()
         if abs(value - was) > SAME * abs(was):
             yield Fault(Reason.VOLUME, (*lost, *(fault.faces[0] for fault in others)), value, was)
-    if not np.allclose(_hull(old.spots), _hull(new.spots), rtol=0, atol=1e-9 * old.diagonal):
+    room = SAME * old.diagonal + 2 * old.tolerance
+    if np.abs(_hull(old.spots) - _hull(new.spots)).max() > room:
         far = float(np.abs(old.probe.box() - new.probe.box()).max())
-        if far > SAME * old.diagonal + 2 * old.tolerance:
+        if far > room:
             yield Fault(Reason.BOX, (), far, 0.0)
 
 
@@ -479,8 +484,6 @@ def match(document: Facts, file: Facts, parts: Collection[int] = ()) -> dict[int
     Faces of the same number in the same place are; of the others those that are nearest; and what is left over and
     lies within one of the ``parts`` is a part of that.
     """
-    from scipy.optimize import linear_sum_assignment
-
     scale = max(document.diagonal, 1e-300)
     old, new = document.spots, file.spots
     same = min(len(old), len(new))
@@ -488,6 +491,8 @@ def match(document: Facts, file: Facts, parts: Collection[int] = ()) -> dict[int
     found = [*zip(file.owners[:same][alike].tolist(), document.owners[:same][alike].tolist(), strict=True)]
     rest_old, rest_new = (np.concatenate([np.flatnonzero(~alike), np.arange(same, len(each))]) for each in (old, new))
     if len(rest_old) and len(rest_new):
+        from scipy.optimize import linear_sum_assignment  # a few tenths of a second that most files do without
+
         apart = np.abs(new[rest_new][:, None] - old[rest_old][None]).max(axis=2)
         rows, columns = linear_sum_assignment(np.minimum(apart, scale))
         near = apart[rows, columns] < _NEAR * scale

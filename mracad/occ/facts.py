@@ -105,7 +105,7 @@ def _counts(document: Document, lines: list[Line]) -> Counts:
 
 
 def _lines(document: Document) -> tuple[list[Line], list[int]]:
-    """Every edge at a few places, and the faces whose surfaces close."""
+    """Every edge at a few places, and the faces on closed surfaces that have no closing edge."""
     owners: list[list[int]] = [[] for _ in document.edges]
     sides: list[list[Array]] = [[] for _ in document.edges]
     whole = [BRep_Tool.Degenerated_s(edge) for edge in document.edges]
@@ -129,7 +129,8 @@ def _lines(document: Document) -> tuple[list[Line], list[int]]:
         Line(tuple(faces), np.stack([points, *beside]), BRep_Tool.Tolerance_s(edge))
         for faces, points, beside, edge in zip(owners, own, sides, document.edges, strict=True)
     ]
-    return lines, closing
+    closed = {face for line in lines for face in line.faces if line.faces.count(face) > 1}
+    return lines, [face for face in closing if face not in closed]
 
 
 def _along(edge: TopoDS_Edge, *face: TopoDS_Face) -> Array:
