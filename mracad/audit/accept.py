@@ -62,6 +62,7 @@ CONTENT = frozenset({Reason.LOST, Reason.AREA, Reason.VOLUME, Reason.BOX, Reason
 """What is not forgiven though the kernel's own copy has it, too."""
 
 _LAID = 1e-8  # mm: an edge of which no point lies farther off is the same
+_TURNED = 2e-5  # radians: nor has a face turned there that turned by less
 _NEAR = 0.1  # share of the diagonal: faces that are farther apart are not the same
 
 _COUNTS = {
@@ -210,8 +211,9 @@ class Line:
     ----------
     faces : tuple of int
         Those that use it, once for each use.
-    points : ndarray (1 + n, k, 3)
-        Points of its own curve and of each face along it, in the part's frame, mm.
+    points : ndarray (1 + n, k, 6)
+        Points of its own curve and of each face along it, in the part's frame, mm; and the unit normals of the
+        surfaces there (for the curve zero).
     tolerance : float
         mm.
     """
@@ -383,7 +385,9 @@ def _same(memory: _File, one: int, file: _File, other: int, room: Callable[[Line
         return False
     sides = b.points if len(order) < len(b.faces) else b.points[[0, *(1 + i for i in order)]]
     mine = a.points if len(order) < len(b.faces) else a.points[[0, *(1 + i for i in np.argsort(a.faces))]]
-    return float(np.abs(mine - sides).max(initial=0.0)) <= room(a)
+    off = np.abs(mine - sides)
+    turned = np.abs(np.abs(mine[..., 3:]) - np.abs(sides[..., 3:])).max(initial=0.0)
+    return float(off[..., :3].max(initial=0.0)) <= room(a) and (room(a) > _LAID or float(turned) <= _TURNED)
 
 
 def _bodies(memory: _File, file: _File) -> Iterator[Fault]:
@@ -425,7 +429,7 @@ def _borders(facts: Facts) -> Array:
     """Area that the tolerances of each face's edges leave open, ``(f,)``, mm²."""
     found = np.zeros(facts.count)
     for edge in facts.edges:
-        length = float(np.linalg.norm(np.diff(edge.points[0], axis=0), axis=1).sum())
+        length = float(np.linalg.norm(np.diff(edge.points[0, :, :3], axis=0), axis=1).sum())
         for face in edge.faces:
             found[face] += 2 * max(edge.tolerance, SLACK) * length
     return found

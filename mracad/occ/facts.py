@@ -10,10 +10,11 @@ from functools import cached_property
 import numpy as np
 from OCP.Bnd import Bnd_Box
 from OCP.BRep import BRep_Tool
-from OCP.BRepAdaptor import BRepAdaptor_Curve
+from OCP.BRepAdaptor import BRepAdaptor_Curve, BRepAdaptor_Surface
 from OCP.BRepBndLib import BRepBndLib
 from OCP.BRepGProp import BRepGProp
 from OCP.Geom import Geom_ConicalSurface, Geom_CylindricalSurface, Geom_Plane
+from OCP.gp import gp_Pnt, gp_Vec
 from OCP.GProp import GProp_GProps
 from OCP.TopAbs import TopAbs_FACE, TopAbs_FORWARD, TopAbs_SHELL, TopAbs_SOLID, TopAbs_VERTEX
 from OCP.TopLoc import TopLoc_Location
@@ -21,12 +22,13 @@ from OCP.TopoDS import TopoDS, TopoDS_Edge, TopoDS_Face
 
 from mracad.audit.accept import Counts, Facts, Line
 from mracad.audit.continuity import SeamMeasure, seams
+from mracad.bspline.net import cross
 from mracad.occ.check import Validity, check
 from mracad.occ.document import Document
 from mracad.occ.measure import mass
 from mracad.occ.settings import quiet
 from mracad.occ.topology import box, edge_uses, inside, matrix
-from mracad.occ.view import view
+from mracad.occ.view import pcurve, view
 
 Array = np.ndarray
 _EXACT = 1e-6  # relative error of an area
@@ -109,13 +111,14 @@ def _lines(document: Document) -> tuple[list[Line], list[int]]:
     owners: list[list[int]] = [[] for _ in document.edges]
     sides: list[list[Array]] = [[] for _ in document.edges]
     whole = [BRep_Tool.Degenerated_s(edge) for edge in document.edges]
-    own = [np.empty((0, 3)) if lost else _along(edge) for edge, lost in zip(document.edges, whole, strict=True)]
+    own = [np.empty((0, 6)) if lost else _along(edge) for edge, lost in zip(document.edges, whole, strict=True)]
     closing = []
     for part in document.parts:
         for index in range(part.first, part.first + part.faces.Extent()):
             face = TopoDS.Face_s(document.faces[index].Oriented(TopAbs_FORWARD))
             surface = BRep_Tool.Surface_s(face, TopLoc_Location())
             plane = _plane(face) if isinstance(surface, Geom_Plane) else None
+            ground = BRepAdaptor_Surface(face, False)
             if not isinstance(surface, Geom_Plane | Geom_CylindricalSurface | Geom_ConicalSurface) and (
                 surface.IsUClosed() or surface.IsVClosed()
             ):
@@ -124,7 +127,7 @@ def _lines(document: Document) -> tuple[list[Line], list[int]]:
                 number = part.first_edge + part.edges.FindIndex(edge) - 1
                 if not whole[number]:
                     owners[number].append(index)
-                    sides[number].append(_along(edge, face) if plane is None else _onto(own[number], *plane))
+                    sides[number].append(_onto(own[number], *plane) if plane else _beside(edge, face, ground))
     lines = [
         Line(tuple(faces), np.stack([points, *beside]), BRep_Tool.Tolerance_s(edge))
         for faces, points, beside, edge in zip(owners, own, sides, document.edges, strict=True)
@@ -133,11 +136,27 @@ def _lines(document: Document) -> tuple[list[Line], list[int]]:
     return lines, [face for face in closing if face not in closed]
 
 
-def _along(edge: TopoDS_Edge, *face: TopoDS_Face) -> Array:
-    """Points of an edge, or of a face along it."""
-    curve = BRepAdaptor_Curve(edge, *face)
+def _along(edge: TopoDS_Edge) -> Array:
+    """Points of an edge, each with nothing for a normal."""
+    curve = BRepAdaptor_Curve(edge)
     first, last = curve.FirstParameter(), curve.LastParameter()
-    return np.array([curve.Value(first + share * (last - first)).Coord() for share in _PLACES])
+    points = [curve.Value(first + share * (last - first)).Coord() for share in _PLACES]
+    return np.hstack([points, np.zeros((len(points), 3))])
+
+
+def _beside(edge: TopoDS_Edge, face: TopoDS_Face, surface: BRepAdaptor_Surface) -> Array:
+    """Points of a face along an edge, and the normals there."""
+    curve = pcurve(edge, face)
+    first, last = BRep_Tool.Range_s(edge, face)
+    point, du, dv = gp_Pnt(), gp_Vec(), gp_Vec()
+    rows = []
+    for share in _PLACES:
+        surface.D1(*curve.Value(first + share * (last - first)).Coord(), point, du, dv)
+        rows.append(point.Coord() + du.Coord() + dv.Coord())
+    points, us, vs = np.array(rows).reshape(-1, 3, 3).swapaxes(0, 1)
+    normals = cross(us, vs)
+    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+    return np.hstack([points, normals / np.where(lengths > 0, lengths, 1.0)])
 
 
 def _plane(face: TopoDS_Face) -> tuple[Array, Array]:
@@ -149,7 +168,8 @@ def _plane(face: TopoDS_Face) -> tuple[Array, Array]:
 
 
 def _onto(points: Array, origin: Array, normal: Array) -> Array:
-    return points - ((points - origin) @ normal)[:, None] * normal
+    heights = (points[:, :3] - origin) @ normal
+    return np.hstack([points[:, :3] - heights[:, None] * normal, np.tile(normal, (len(points), 1))])
 
 
 def _places(document: Document) -> Iterator[tuple[Array, int, float]]:

@@ -173,12 +173,12 @@ def _walk(document: Document, chosen: frozenset[int]) -> _Found:
             found.surface_of.append(list(found.surfaces).index(handle) if handle in found.surfaces else None)
             for position, edge in enumerate(edge_uses(face)):
                 place = part.first_edge + part.edges.FindIndex(edge) - 1
-                pcurve = replaced.pcurves[position] if replaced else _pcurve(edge, face)
-                found.uses.append(_Use(index, place, pcurve, *BRep_Tool.Range_s(edge, face)))
+                curve = replaced.pcurves[position] if replaced else pcurve(edge, face)
+                found.uses.append(_Use(index, place, curve, *BRep_Tool.Range_s(edge, face)))
     return found
 
 
-def _pcurve(edge: TopoDS_Edge, face: TopoDS_Face) -> Geom2d_Curve:
+def pcurve(edge: TopoDS_Edge, face: TopoDS_Face) -> Geom2d_Curve:
     """The edge's curve in the parameter plane of a face; made by projection where the file lacks it."""
     curve = BRep_Tool.CurveOnSurface_s(edge, face, 0.0, 0.0)
     if curve is None:
