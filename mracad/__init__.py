@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from mracad.occ.files import read, write
     from mracad.occ.view import view as snapshot
     from mracad.options import Move, Repeat, Smooth, Transfer
+    from mracad.produce import read_back
 
 __version__ = "0.1.0"
 
@@ -44,6 +45,7 @@ _HOMES = {
     "deviations": "audit.deviation",
     "move": "edit.features",
     "read": "occ.files",
+    "read_back": "produce",
     "repeat": "edit.features",
     "run": "job",
     "seams": "audit.continuity",
@@ -55,7 +57,7 @@ _HOMES = {
 
 __all__ = [
     "Displacement", "Model", "Move", "MracadError", "Repeat", "Smooth", "Transfer", "apply", "check", "deviations",
-    "move", "read", "repeat", "run", "seams", "smooth", "snapshot", "transfer", "write",
+    "move", "read", "read_back", "repeat", "run", "seams", "smooth", "snapshot", "transfer", "write",
 ]  # fmt: skip
 
 

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import io
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, BinaryIO
 
 from mracad import review
 from mracad.audit import accept
 from mracad.audit.accept import Facts, Fault, ReadBack, Slack
 from mracad.errors import EditError
-from mracad.formats import FORMATS
+from mracad.formats import FORMATS, by_content
 from mracad.job import Judged, Original, Progress, Report, play
 from mracad.options import length
 
@@ -138,6 +139,40 @@ def produce(
     raise _refused(document.name, faults)
 
 
+def read_back(
+    document: Document,
+    file: str | os.PathLike | BinaryIO,
+    written: Written | None = None,
+    original: Original | None = None,
+) -> ReadBack:
+    """Judge an exact file by the document that was written to it.
+
+    Parameters
+    ----------
+    document : Document
+    file : path or binary stream
+    written : Written, optional
+        What writing it said: which faces are in parts.
+    original : callable, optional
+        Reads the document as it was before it was edited: then what is worse than in the document is forgiven only
+        where the kernel's own copy of that has it, too; otherwise all is forgiven that is no loss of content.
+
+    Raises
+    ------
+    FileError
+        For a file that cannot be read.
+    """
+    from mracad.occ.facts import facts
+    from mracad.occ.load import load
+
+    text = load(file)
+    target = Target(text.name, by_content(text.getvalue(), text.name).name)
+    found = _read_back(text.getvalue(), target)
+    copy = partial(_Copies(original).of, target) if original else None
+    slack = Slack(parts={cut.face: cut.parts for cut in written.cut} if written else {})
+    return accept.read_back(found, *accept.judge(facts(document), found, slack, copy))
+
+
 class _Memory:
     """The document that was written."""
 
@@ -174,6 +209,10 @@ class _Copies:
         from mracad.occ.facts import facts
 
         return facts(self.original())
+
+    def mesh(self, target: Target) -> Written:
+        """How a mesh of the input comes out."""
+        return _made(self.original(), target, "").written
 
     def of(self, target: Target) -> tuple[Facts, Facts]:
         """Facts of the input and of its copy."""
@@ -214,7 +253,9 @@ def _read_back(data: bytes, target: Target) -> Facts:
 def _judged(made: Made, memory: _Memory, copies: _Copies) -> Made:
     """A file with what it is, read back."""
     if FORMATS[made.target.format].kind == "mesh":
-        return made
+        torn = made.written.open
+        before = copies.mesh(made.target).open if torn and memory.edited else torn
+        return replace(made, read_back=accept.meshed(torn, before))
     file = _read_back(made.data, made.target)
     slack = replace(memory.slack, parts={cut.face: cut.parts for cut in made.written.cut})
     copy = partial(copies.of, made.target) if memory.edited else None
@@ -226,6 +267,8 @@ def _refused(name: str, faults: Sequence[tuple[Target, Fault]]) -> EditError:
     target, fault = min(faults, key=lambda each: list(accept.Reason).index(each[1].reason))
     more = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
     return EditError(
-        f"{name}: {target.format.upper()} would not keep it, as read back: {fault}{more}",
-        "write BREP, which the kernel does not alter" if target.format in ("step", "iges") else "leave these faces out",
+        f"{name}: the {target.format.upper()} file would be worse: {fault}{more}",
+        "write BREP, which holds faces as they are"
+        if target.format in ("step", "iges")
+        else "leave these faces out of the selection",
     )

@@ -55,10 +55,10 @@ class Reason(StrEnum):
     SEAM = "seam"
     GAP = "gap"
     ANGLE = "angle"
-    OPEN = "open mesh"
+    OPEN = "open mesh"  # of a closed body
 
 
-CONTENT = frozenset({Reason.LOST, Reason.AREA, Reason.VOLUME, Reason.BOX, Reason.OPEN})
+CONTENT = frozenset({Reason.LOST, Reason.AREA, Reason.VOLUME, Reason.BOX})
 """What is not forgiven though the kernel's own copy has it, too."""
 
 _LAID = 1e-8  # mm: an edge of which no point lies farther off is the same
@@ -125,7 +125,7 @@ _WORDS = {
     Reason.SEAM: "no seam between {where}",
     Reason.GAP: "a gap of {f.value:.3g} mm between {where} (was {f.was:.3g} mm)",
     Reason.ANGLE: "an angle of {f.value:.2g}° between {where} (was {f.was:.2g}°)",
-    Reason.OPEN: "the mesh has {f.value:.0f} open edges at {where}",
+    Reason.OPEN: "the mesh is open at {where}",
 }
 
 
@@ -141,8 +141,9 @@ class ReadBack:
     ----------
     valid : bool
         Whether it passes the kernel's check, and nothing is worse.
-    counts : Counts
-    box : ((float, float, float), (float, float, float))
+    counts : Counts or None
+        None for a mesh.
+    box : ((float, float, float), (float, float, float)) or None
         Lowest and highest corner of the boxes of its faces, mm; never too small.
     volume : (float, float) or None
         In the document and in the file, mm³; None where no face is another one, so that it was not measured.
@@ -159,15 +160,23 @@ class ReadBack:
     """
 
     valid: bool
-    counts: Counts
-    box: tuple[tuple[float, ...], tuple[float, ...]]
-    volume: tuple[float, float] | None
-    tolerance: float
-    seams: int
-    gap: float
-    angle: float
-    faults: tuple[Fault, ...]
-    forgiven: tuple[Fault, ...]
+    faults: tuple[Fault, ...] = ()
+    forgiven: tuple[Fault, ...] = ()
+    counts: Counts | None = None
+    box: tuple[tuple[float, ...], tuple[float, ...]] | None = None
+    volume: tuple[float, float] | None = None
+    tolerance: float = 0.0
+    seams: int = 0
+    gap: float = 0.0
+    angle: float = 0.0
+
+
+def meshed(open_faces: Collection[int], before: Collection[int]) -> ReadBack:
+    """The verdict on a mesh that leaves faces of closed bodies open, those that it did ``before`` forgiven."""
+    fresh = tuple(sorted(set(open_faces) - set(before)))
+    known = tuple(sorted(set(open_faces) & set(before)))
+    faults, forgiven = ((Fault(Reason.OPEN, faces),) if faces else () for faces in (fresh, known))
+    return ReadBack(not open_faces, faults, forgiven)
 
 
 def read_back(file: Facts, faults: tuple[Fault, ...], forgiven: tuple[Fault, ...] = ()) -> ReadBack:
@@ -292,10 +301,11 @@ class _File:
 
     def seams(self, pairs: Collection[tuple[int, ...]]) -> dict[tuple[int, ...], list[SeamMeasure]]:
         """The seams between pairs of faces, measured."""
-        edges = [number for number, pair in enumerate(self.pairs) if pair in pairs]
-        open_ones = [number for number, edge in enumerate(self.facts.edges) if len(edge.faces) == 1]
-        if any(len(self.facts.edges[number].faces) == 1 for number in edges):
-            edges = sorted({*edges, *open_ones})
+        edges = {number for number, pair in enumerate(self.pairs) if pair in pairs}
+        free = {number for number, pair in enumerate(self.pairs) if len(pair) == 1}
+        near = {face for pair in pairs for face in pair}
+        if any(near.intersection(self.pairs[number]) for number in free):  # seams that are not sewn are found by place
+            edges |= free
         found: dict[tuple[int, ...], list[SeamMeasure]] = defaultdict(list)
         for measure in self.facts.probe.seams(edges) if edges else ():
             found[tuple(sorted(self.partners.get(face, -1) for face in measure.faces))].append(measure)
@@ -457,7 +467,7 @@ def _seams(base: _File, file: _File, slack: Slack, pairs: Collection[tuple[int, 
     """Seams that are gone, wider or less smooth."""
     new = file.seams(pairs)
     for pair, before in base.seams(pairs).items():
-        if len(pair) != 2 or pair[0] < 0 or (pair not in pairs and pair not in new):
+        if pair[0] < 0:
             continue
         found = new.get(pair, [])
         if not found:

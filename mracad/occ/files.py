@@ -52,10 +52,13 @@ class Written:
         What it lacks.
     cut : tuple of Cut
         The faces that it holds on NURBS or in several parts, because a reader would mistake them as they are.
+    open : tuple of int
+        The faces of closed bodies that a mesh leaves open.
     """
 
     lost: tuple[Lost, ...] = ()
     cut: tuple[Cut, ...] = ()
+    open: tuple[int, ...] = ()
 
 
 def read(source: str | os.PathLike | BinaryIO, input_unit: str | None = None, encoding: str | None = None) -> Document:
@@ -151,6 +154,7 @@ def write(
     name = Path(target).name if named else document.name  # type: ignore[arg-type]
     lost: tuple[Lost, ...] = ()
     cut: tuple[Cut, ...] = ()
+    torn: tuple[int, ...] = ()
     if format == "step":
         from mracad.occ.step import step
 
@@ -169,7 +173,7 @@ def write(
         from mracad.mesh import write as write_mesh
         from mracad.occ.scene import scene
 
-        seen, missing = scene(document, chord, angle)
+        seen, missing, torn = scene(document, chord, angle)
         data = write_mesh(seen, format, ascii)
         if missing:
             count, names = len(document.faces), tuple(f"#{face + 1}" for face in missing)
@@ -181,7 +185,7 @@ def write(
         counts = {what: (names, len(kept.get(what, ()))) for what, names in document.annotations.items()}
         lost += tuple(Lost(what, len(ns), count, ns) for what, (ns, count) in counts.items() if count < len(ns))
     put(data, target)
-    return Written(lost, cut)
+    return Written(lost, cut, torn)
 
 
 def _opaque(document: Document) -> tuple[Lost, ...]:

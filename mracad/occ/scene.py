@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
+from OCP.BRep import BRep_Tool
 from OCP.TDF import TDF_Label
+from OCP.TopAbs import TopAbs_FACE, TopAbs_SHELL, TopAbs_SOLID
 from OCP.XCAFDoc import XCAFDoc_ShapeTool
 
 from mracad.errors import FileError, UsageError
@@ -18,11 +22,13 @@ from mracad.occ.document import (
     nested_colours,
     referred,
 )
-from mracad.occ.topology import matrix
+from mracad.occ.topology import inside, matrix
 from mracad.occ.triangles import Triangles, triangles
 
 
-def scene(document: Document, chord: float | None = None, angle: float | None = None) -> tuple[Scene, tuple[int, ...]]:
+def scene(
+    document: Document, chord: float | None = None, angle: float | None = None
+) -> tuple[Scene, tuple[int, ...], tuple[int, ...]]:
     """Mesh a document.
 
     Parameters
@@ -38,6 +44,8 @@ def scene(document: Document, chord: float | None = None, angle: float | None = 
     Scene
     tuple of int
         Faces that the kernel could not mesh: the mesh has holes there.
+    tuple of int
+        Faces of closed bodies that their mesh leaves open.
 
     Raises
     ------
@@ -53,7 +61,11 @@ def scene(document: Document, chord: float | None = None, angle: float | None = 
         raise FileError(f"'{document.name}' gives no triangles", "check its geometry")
     bodies = _Bodies(document, mesh)
     nodes = [bodies.node(label) for label in labels(document.shape_tool.GetFreeShapes)]
-    return Scene(document.name, tuple(bodies.made), tuple(node for node in nodes if node)), mesh.missing
+    return (
+        Scene(document.name, tuple(bodies.made), tuple(node for node in nodes if node)),
+        mesh.missing,
+        _open(document, mesh),
+    )
 
 
 class _Bodies:
@@ -108,3 +120,21 @@ class _Bodies:
                 )
             )
         return self.place[number, colours]
+
+
+def _open(document: Document, mesh: Triangles) -> tuple[int, ...]:
+    """Faces of closed solids at which a side of a triangle is not met by one the other way round."""
+    sides = mesh.corners[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    keys = sides.min(axis=1) * len(mesh.points) + sides.max(axis=1)
+    _, place = np.unique(keys, return_inverse=True)
+    unmet = np.bincount(place, np.where(sides[:, 0] < sides[:, 1], 1.0, -1.0))[place] != 0
+    found = set(np.repeat(mesh.faces, 3)[unmet].tolist()) | set(mesh.missing)
+    return tuple(sorted(found & set(_enclosing(document)))) if found else ()
+
+
+def _enclosing(document: Document) -> Iterator[int]:
+    """The faces of solids of which every shell is closed."""
+    for part in document.parts:
+        for solid in inside(part.shape, TopAbs_SOLID):
+            if all(BRep_Tool.IsClosed_s(shell) for shell in inside(solid, TopAbs_SHELL)):
+                yield from (part.first + part.faces.FindIndex(face) - 1 for face in inside(solid, TopAbs_FACE))

@@ -115,10 +115,9 @@ def test_what_was_doctored_is_found(doctor: Doctor, expected: set[Reason]) -> No
 def panels(angle: float) -> TopoDS_Shape:
     """Two bilinear patches, joined along y, the second turned about the seam by an angle in degrees."""
     rise = np.tan(np.radians(angle))
-    one = cq.Face.makeNSidedSurface([cq.Wire.makePolygon([cq.Vector(*p) for p in _CORNERS], close=True)], [])
-    other = cq.Face.makeNSidedSurface(
-        [cq.Wire.makePolygon([cq.Vector(x + 20, y, rise * x) for x, y, _ in _CORNERS], close=True)], []
-    )
+    one = cq.Face.makeFromWires(cq.Wire.makePolygon([cq.Vector(*p) for p in _CORNERS], close=True))
+    corners = [cq.Vector(x + 20, y, rise * x) for x, y, _ in _CORNERS]
+    other = cq.Face.makeFromWires(cq.Wire.makePolygon(corners, close=True))
     sewn = cq.Shell.makeShell([one, other])
     return BRepBuilderAPI_NurbsConvert(sewn.wrapped, True).Shape()
 
@@ -174,3 +173,20 @@ def test_faults_are_put_down_to_edited_faces() -> None:
     near = accept.spoilt([far], set(range(1, memory.count)), memory)
     assert near and near == {f for edge in memory.edges if 0 in edge.faces for f in edge.faces} - {0}
     assert accept.spoilt([accept.Fault(Reason.SOLIDS)], {3, 4}, memory) == {3, 4}
+
+
+@pytest.mark.parametrize("height", [2e-3, 1.0])
+def test_seams_that_were_never_sewn_are_judged_too(height: float) -> None:
+    """A patch that lifts off its neighbour, so far that they do not look joined any more or not."""
+    memory, file = (facts(document(apart(lift))) for lift in (0.0, height))
+    for copy, expected in ((memory, {Reason.GAP, Reason.SEAM}), (file, set())):
+        left, _ = judge(memory, file, Slack(), lambda copy=copy: (memory, copy))
+        assert bool({fault.reason for fault in left} & {Reason.GAP, Reason.SEAM}) == bool(expected)
+
+
+def apart(height: float) -> TopoDS_Shape:
+    """Two patches side by side, each a shell of its own, the second lifted."""
+    pieces = [cq.Wire.makePolygon([cq.Vector(x + dx, y, dz) for x, y, _ in _CORNERS], close=True)
+              for dx, dz in ((0, 0), (20, height))]  # fmt: skip
+    whole = cq.Compound.makeCompound([cq.Face.makeFromWires(wire) for wire in pieces])
+    return BRepBuilderAPI_NurbsConvert(whole.wrapped, True).Shape()

@@ -6,8 +6,13 @@ import json
 from pathlib import Path
 
 import pytest
+from OCP.BRep import BRep_Tool
+from OCP.gp import gp_Vec
+from OCP.TopLoc import TopLoc_Location
 
+import mracad as library
 from mracad.occ import step as writer
+from mracad.produce import WORSE
 from tests.batch.runs import recipe
 
 SMOOTH = "--scale", "16mm"
@@ -70,3 +75,40 @@ def test_a_dry_run_speaks_of_memory(mracad, samples: Path) -> None:
     assert (
         result.code == 0 and result.out.splitlines()[-1] == "valid: yes, in memory (was yes); dry run, nothing written"
     )
+
+
+def test_in_python(samples: Path, tmp_path: Path) -> None:
+    document = library.read(samples / "panel.step")
+    library.write(document, tmp_path / "out.step")
+    assert library.read_back(document, tmp_path / "out.step").valid
+    library.write(library.read(samples / "bottle.step"), tmp_path / "other.step")
+    found = library.read_back(document, tmp_path / "other.step", original=lambda: document)
+    assert not found.valid and "face lost" in {fault.reason for fault in found.faults}
+
+
+def test_faces_of_which_the_file_would_be_worse_are_left(mracad, samples: Path, tmp_path: Path, monkeypatch) -> None:
+    """A writer that tears the corners off face #1 as soon as that has moved: it and its neighbours there are left."""
+    whole = writer.step
+    first = library.snapshot(library.read(samples / "panel.step")).surfaces[0].net.poles
+
+    def step(document, *options, **settings):
+        surface = BRep_Tool.Surface_s(document.faces[0], TopLoc_Location())
+        moved = (library.snapshot(document).surfaces[0].net.poles != first).any()
+        rows, columns = surface.NbUPoles(), surface.NbVPoles()
+        was = [(i, j, surface.Pole(i, j)) for i in (1, rows) for j in (1, columns)]
+        for i, j, pole in was if moved else ():
+            surface.SetPole(i, j, pole.Translated(gp_Vec(0, 0, 0.5)))
+        try:
+            return whole(document, *options, **settings)
+        finally:
+            for i, j, pole in was:
+                surface.SetPole(i, j, pole)
+
+    monkeypatch.setattr(writer, "step", step)
+    target, report = tmp_path / "out.step", tmp_path / "report.json"
+    result = mracad("smooth", samples / "panel.step", *SMOOTH, "-o", target, "--report", report)
+    assert result.code == 0, result.err
+    found = json.loads(report.read_text())
+    left = {face["face"] for face in found["faces"] if face["reason"] == WORSE}
+    assert 1 in left and 1 <= found["counts"]["edited"] == 6 - len(left)
+    assert found["read_back"]["out.step"]["valid"] and WORSE in result.out.splitlines()[0]

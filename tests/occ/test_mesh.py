@@ -1,13 +1,17 @@
 """Meshes of documents, and CadQuery selectors."""
 
+import io
 from collections import Counter
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox, BRepPrimAPI_MakeSphere
 
 from mracad import occ
+from mracad.audit import accept
 from mracad.errors import FileError, UsageError
+from mracad.occ import scene as scenes
 from mracad.occ.files import Lost
 from tests.occ import shapes
 
@@ -59,6 +63,30 @@ def test_a_face_that_cannot_be_meshed_is_named(tmp_path):
     bare = shapes.document(box).faces[2].EmptyCopied()  # no boundary at all
     assert occ.write(shapes.document(shapes.compound(box, bare)), tmp_path / "out.stl").lost == (
         Lost("faces", 7, 6, ("#7",)),
+    )
+
+
+def test_a_closed_body_whose_mesh_is_open_is_told(monkeypatch):
+    """The face without triangles, and those around it; not those of a shell that is open anyway."""
+    box = BRepPrimAPI_MakeBox(1, 2, 3).Shape()
+    whole = scenes.triangles
+
+    def torn(document, chord, angle):
+        mesh = whole(document, chord, angle)
+        keep = mesh.faces != 2
+        return replace(mesh, corners=mesh.corners[keep], faces=mesh.faces[keep], parts=mesh.parts[keep], missing=(2,))
+
+    assert scenes.scene(shapes.document(box))[2] == ()
+    monkeypatch.setattr(scenes, "triangles", torn)
+    assert scenes.scene(shapes.document(box))[2] == (0, 1, 2, 4, 5)
+    faces = shapes.document(box).faces
+    assert scenes.scene(shapes.document(shapes.compound(*faces)))[2] == ()
+    stream = io.BytesIO()
+    found = accept.meshed(occ.write(shapes.document(box), stream, "stl").open, before=(2, 4))
+    assert (
+        not found.valid
+        and [f.faces for f in found.faults] == [(0, 1, 5)]
+        and [f.faces for f in found.forgiven] == [(2, 4)]
     )
 
 
