@@ -68,7 +68,7 @@ def said(document):
     assembly, part = found.products
     title = next(title for title in document.titles.values() if title.name == part)
     (face,) = document.parts[0].face_names.values()
-    return assembly, part, title.identifier, found.tree[1].path[-1], face, found.layers[0][0]
+    return assembly, part, title.identifier, found.tree[1].path[-1], face, found.layers[0][1]
 
 
 @pytest.mark.parametrize("encoding", TEXTS)
