@@ -2,8 +2,8 @@
 
 A face that goes right round its surface has a closing edge.  STEP and IGES leave out what closes it at poles, and a
 reader guesses; where the face has other boundaries, too, it may guess wrong and keep the hole for the face.  Cut along
-a parameter line the parts close nowhere, and there is nothing to guess.  A surface of revolution is written without its
-limits, and whole it may touch its axis where the face does not: as NURBS it ends where the face ends.
+a parameter line, the parts close one way less, and there is nothing to guess.  A surface of revolution is written
+without its limits, and whole it may touch its axis where the face does not: as NURBS it ends where the face ends.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from OCP.BRep import BRep_Builder, BRep_Tool
@@ -41,9 +42,10 @@ from OCP.XCAFDoc import XCAFDoc_ShapeTool
 
 from mracad.errors import EditError
 from mracad.occ.convert import conversion, lay
-from mracad.occ.document import Document, Part, labels
+from mracad.occ.document import Conversion, Document, Part, labels
 from mracad.occ.instance import say
 from mracad.occ.topology import edge_uses, inside
+from mracad.occ.tubes import tubes
 
 Array = np.ndarray
 Copier = Callable[[TopoDS_Shape], TopoDS_Shape]
@@ -174,10 +176,11 @@ def _rewrite(document: Document, part: Part, faces: Sequence[int], copier: Copie
     context = ShapeBuild_ReShape()
     for index in faces:
         twin = twins.ModifiedShape(document.faces[index])
-        if _laid(document, index, twin, copier) or _divided(context.Apply(twin), copier, context):
-            yield Cut(index, len(_faces(context.Apply(twin))))
-        elif not _alike(twin, copier(twin), _OTHER):
-            raise _mistaken(document, index)
+        if not _mended(document, index, twin, copier, context):
+            if not _alike(twin, copier(twin), _OTHER):
+                raise _mistaken(document, index)
+            continue
+        yield Cut(index, len(_faces(context.Apply(twin))))
     whole = context.Apply(twins.Shape())
     if BRepCheck_Analyzer(part.shape).IsValid() and not BRepCheck_Analyzer(whole).IsValid():
         raise _mistaken(document, faces[0])
@@ -193,33 +196,55 @@ def _rewrite(document: Document, part: Part, faces: Sequence[int], copier: Copie
             say(document, label, tool.AddSubShape(part.label, other))
 
 
-def _laid(document: Document, index: int, twin: TopoDS_Shape, copier: Copier) -> bool:
-    """Whether a face that is not NURBS comes back as such: then its twin is."""
-    face = twin.Located(TopLoc_Location()).Oriented(TopAbs_FORWARD)
-    if isinstance(_basis(BRep_Tool.Surface_s(TopoDS.Face_s(face), TopLoc_Location())), _NURBS):
+def _mended(document: Document, index: int, twin: TopoDS_Shape, copier: Copier, context: ShapeBuild_ReShape) -> bool:
+    """Whether the twin of a face comes back on NURBS or in parts: then it is."""
+    made = _on_nurbs(document, index)
+    if made is not None:
+        trial = BRepBuilderAPI_Copy(_bare(twin), False, False).Shape()
+        lay(TopoDS.Face_s(trial), made.surface, made.pcurves, made.tolerances)
+        if BRepCheck_Analyzer(trial).IsValid() and _kept(trial, copier(trial)):
+            lay(_bare(twin), made.surface, made.pcurves, made.tolerances)
+            return True
+    if _divided(_bare(context.Apply(twin)), copier, context):
+        return True
+    if made is None or context.IsRecorded(twin):
         return False
+    lay(_bare(twin), made.surface, made.pcurves, made.tolerances)
+    return _divided(_bare(twin), copier, context)
+
+
+def _on_nurbs(document: Document, index: int) -> Conversion | None:
+    """The NURBS form of a face that has another one."""
+    if isinstance(_basis(BRep_Tool.Surface_s(document.faces[index], TopLoc_Location())), _NURBS):
+        return None
     try:
-        made = conversion(document, index)
+        return conversion(document, index)
     except EditError:
-        return False
+        return None
     finally:
         document.conversions.pop(index, None)
-    trial = BRepBuilderAPI_Copy(face, False, False).Shape()
-    lay(TopoDS.Face_s(trial), made.surface, made.pcurves, made.tolerances)
-    if not (BRepCheck_Analyzer(trial).IsValid() and _kept(trial, copier(trial))):
-        return False
-    lay(TopoDS.Face_s(face), made.surface, made.pcurves, made.tolerances)
-    return True
 
 
-def _divided(face: TopoDS_Shape, copier: Copier, context: ShapeBuild_ReShape) -> bool:
-    """Whether a face comes back in parts: then it is cut in a context, in one direction where that is enough."""
-    for directions in ((True, False), (False, True), (True, True)):
-        parts = _parts(face, directions, ShapeBuild_ReShape())
+def _bare(face: TopoDS_Shape) -> TopoDS_Face:
+    return TopoDS.Face_s(face.Located(TopLoc_Location()).Oriented(TopAbs_FORWARD))
+
+
+def _divided(face: TopoDS_Face, copier: Copier, context: ShapeBuild_ReShape) -> bool:
+    """Whether a face comes back in parts: then those take its place in a context."""
+    for divide in (_tubes, partial(_parts, axis=0), partial(_parts, axis=1)):
+        parts = divide(face, ShapeBuild_ReShape())
         if parts is not None and BRepCheck_Analyzer(parts).IsValid() and _kept(parts, copier(parts)):
-            _parts(face, directions, context)
+            divide(face, context)
             return True
     return False
+
+
+def _tubes(face: TopoDS_Face, context: ShapeBuild_ReShape) -> TopoDS_Shape | None:
+    """A face that goes round both ways as two tubes."""
+    shell = tubes(face)
+    if shell is not None:
+        context.Replace(face, shell)
+    return shell
 
 
 def _mistaken(document: Document, index: int) -> EditError:
@@ -231,36 +256,32 @@ def _faces(shape: TopoDS_Shape) -> list[TopoDS_Shape]:
     return list(inside(shape, TopAbs_FACE))
 
 
-def _parts(face: TopoDS_Shape, directions: tuple[bool, bool], context: ShapeBuild_ReShape) -> TopoDS_Shape | None:
-    """A face cut across the directions in which its surface closes."""
+def _parts(face: TopoDS_Face, context: ShapeBuild_ReShape, axis: int) -> TopoDS_Shape | None:
+    """A face cut across a direction in which its surface closes, u (0) or v (1)."""
     location = TopLoc_Location()
-    forward = TopoDS.Face_s(face.Located(location).Oriented(TopAbs_FORWARD))
-    surface = BRep_Tool.Surface_s(forward, location)
+    surface = BRep_Tool.Surface_s(face, location)
     basis = _basis(surface)
-    closed = basis.IsUClosed(), basis.IsVClosed()
-    if any(wanted and not closes for wanted, closes in zip(directions, closed, strict=True)):
+    if not (basis.IsUClosed(), basis.IsVClosed())[axis]:
         return None
-    bounds = BRepTools.UVBounds_s(forward)
+    bounds = BRepTools.UVBounds_s(face)
     splitter = ShapeUpgrade_SplitSurface()
     splitter.Init(surface, *bounds)
-    for axis, put in enumerate((splitter.SetUSplitValues, splitter.SetVSplitValues)):
-        if directions[axis]:
-            at = TColStd_HSequenceOfReal()
-            at.Append(_away(forward, axis, *bounds[2 * axis : 2 * axis + 2]))
-            put(at)
+    at = TColStd_HSequenceOfReal()
+    at.Append(_away(face, axis, *bounds[2 * axis : 2 * axis + 2]))
+    (splitter.SetUSplitValues, splitter.SetVSplitValues)[axis](at)
     splitter.Perform(False)
     shell = ShapeFix_ComposeShell()
-    shell.Init(splitter.ResSurfaces(), location, forward, _PRECISION)
+    shell.Init(splitter.ResSurfaces(), location, face, _PRECISION)
     shell.SetContext(context)
     if not shell.Perform():
         return None
     known = TopTools_MapOfShape()
-    for edge in edge_uses(forward):
+    for edge in edge_uses(face):
         known.Add(edge)
     for edge in inside(shell.Result(), TopAbs_EDGE):
         if known.Add(edge):
             _time(TopoDS.Edge_s(edge))
-    context.Replace(forward, shell.Result())
+    context.Replace(face, shell.Result())
     return shell.Result()
 
 

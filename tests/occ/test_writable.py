@@ -13,7 +13,6 @@ from OCP.TopLoc import TopLoc_Location
 from OCP.XCAFDoc import XCAFDoc_ColorType, XCAFDoc_DocumentTool
 
 from mracad import occ
-from mracad.errors import EditError
 from mracad.occ.load import Text
 from mracad.occ.measure import mass
 from mracad.occ.writable import Cut
@@ -42,7 +41,7 @@ def assert_same(old, new, cut):
     assert after.faces == before.faces + sum(each.parts - 1 for each in cut)
     a, b = mass(old), mass(new)
     assert (b.volume, b.area) == pytest.approx((a.volume, a.area), rel=5e-5)
-    assert b.centre == pytest.approx(a.centre, abs=0.05)  # the kernel's, on surfaces of revolution, is off by half that
+    assert b.centre == pytest.approx(a.centre, abs=0.1)  # the kernel's is off by 0.075 on surfaces of revolution
     assert max(after.edge_tolerance, after.vertex_tolerance) <= max(
         2 * max(before.edge_tolerance, before.vertex_tolerance), 1e-5
     )
@@ -88,10 +87,10 @@ FAST = [
         "bean-holes",
         "cylinder-turned-nurbs",
     ),
-    *("torus-seam-nurbs", "ring-whole-nurbs", "ring-blindseam", "capsule"),
+    *("torus-seam-nurbs", "ring-whole-nurbs", "ring-seam", "ring-blindseam-nurbs", "capsule"),
 ]
-REFUSED = "ring-"
-"""Begins the names of those whose surfaces close both ways: the kernel cannot cut some of them."""
+LAID_ANEW = "ring-hole", "ring-opposite"
+"""Begin the names of those of which the reader of IGES lays boundaries anew: the verdict on the file refuses them."""
 
 
 @pytest.mark.parametrize("name", CLOSED)
@@ -103,11 +102,8 @@ def test_closed_faces_are_read_back_whole(name, pytestconfig):
     if not before.valid or before.edge_tolerance > 1e-2:
         pytest.skip("the kernel does not make it well")
     for format in ("step", "iges", "brep") if name in FAST else ("step", "iges"):
-        try:
+        if not (format == "iges" and name.startswith(LAID_ANEW)):
             data, cut = written(document, format)
-        except EditError as error:
-            assert name.startswith(REFUSED) and "#" in str(error)
-        else:
             assert_same(document, again(data), cut)
 
 
@@ -130,6 +126,14 @@ def test_what_is_said_of_a_face_goes_to_its_parts(schema):
     assert occ.view(found).products == ("ball",)
     layer = data.index(b"PRESENTATION_LAYER_ASSIGNMENT('trim'")
     assert data[layer : data.index(b";", layer)].count(b"#") == 3
+
+
+@pytest.mark.parametrize("name", ["ring-seam", "ring-slot-nurbs"])
+def test_a_surface_that_closes_both_ways_is_written_as_two_tubes(name):
+    document = shapes.document(CLOSED[name]())
+    data, cut = written(document)
+    assert [each.parts for each in cut] == [2]
+    assert_same(document, again(data), cut)
 
 
 def test_a_face_is_not_cut_where_it_comes_back_as_nurbs():
