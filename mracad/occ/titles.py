@@ -18,11 +18,12 @@ from OCP.TDF import TDF_Label
 from mracad.occ.document import Document, components, label_key, label_name, labels, name_label
 from mracad.occ.literals import decoded
 
-_STRING = rb"'((?:[^']|'')*)'"
-_STATED = re.compile(
-    rb"\b(PRODUCT|NEXT_ASSEMBLY_USAGE_OCCURRENCE)(\s*\(\s*)" + _STRING + rb"(\s*,\s*)" + _STRING + rb"\s*,\s*"
-    rb"(?:" + _STRING + rb"|\$)"
+_STRING = rb"'([^']*+(?:''[^']*+)*+)'"
+_STATED = tuple(  # each begins with its word, for which the text is searched fast
+    re.compile(word + rb"(\s*\(\s*)" + _STRING + rb"(\s*,\s*)" + _STRING + rb"\s*,\s*(?:" + _STRING + rb"|\$)")
+    for word in (b"PRODUCT", b"NEXT_ASSEMBLY_USAGE_OCCURRENCE")
 )
+_WORD = re.compile(rb"[A-Z]+(?:_[A-Z]+)*")
 _MARK = "mracad title "
 
 
@@ -45,11 +46,17 @@ def marked(text: bytes) -> tuple[bytes, list[Title]]:
     titles: list[Title] = []
 
     def mark(found: re.Match[bytes]) -> bytes:
-        kind, opening, identifier, comma, name, description = found.groups()
+        start = found.start()
+        if text[start - 1 : start] in (b"_", b"'"):  # the end of another word, or text
+            return found[0]
+        opening, identifier, comma, name, description = found.groups()
         titles.append(Title(*map(decoded, (identifier, name, description or b""))))
-        return b"%s%s'%s'%s'%s',''" % (kind, opening, identifier, comma, _mark(len(titles) - 1))
+        word = _WORD.match(found[0])[0]  # type: ignore[index]
+        return b"%s%s'%s'%s'%s',''" % (word, opening, identifier, comma, _mark(len(titles) - 1))
 
-    return _STATED.sub(mark, text), titles
+    for pattern in _STATED:
+        text = pattern.sub(mark, text)
+    return text, titles
 
 
 def put_names(document: Document, titles: list[Title]) -> None:
