@@ -48,15 +48,19 @@ class Sheet:
     net : Net
         In the part's frame.
     faces : list of Face
+    frame : ndarray (4, 4)
+        From the surface's frame to the part's, as the first face has it; see :meth:`Ground.brought`.
     turn : ndarray (3, 3)
-        From the surface's frame to the part's.
+        Its rotation.
     """
+
+    frame: Array
 
     def __init__(self, model: Model, surface: int, faces: Collection[int], poles: Array | None = None) -> None:
         own = model.surfaces[surface].net
         self.index = surface
         self.faces = [model.faces[i] for i in model.surfaces[surface].faces if i in faces]
-        frame = self.faces[0].frame
+        self.frame = frame = self.faces[0].frame
         self.turn = frame[:3, :3]
         poles = own.poles if poles is None else poles
         self.net = Net(own.u, own.v, poles @ self.turn.T + frame[:3, 3], own.weights)
@@ -215,6 +219,31 @@ class Ground:
         self.model, self.chosen = model, frozenset(faces)
         surfaces = sorted({s for i in faces if (s := model.faces[i].surface) is not None})
         self.sheets = {i: Sheet(model, i, faces, (poles or {}).get(i)) for i in surfaces}
+
+    @cached_property
+    def _stands(self) -> list[tuple[int, Array]]:
+        """For surfaces that stand in several places, the motions from the others to the first."""
+        found: list[tuple[int, Array]] = []
+        for index, sheet in self.sheets.items():
+            for face in sheet.faces:
+                way = sheet.frame @ np.linalg.inv(face.frame)
+                known = [np.eye(4), *(other for surface, other in found if surface == index)]
+                if not any(np.allclose(way, other, rtol=0, atol=1e-12) for other in known):
+                    found.append((index, way))
+        return found
+
+    def brought(self, points: Array) -> Array:
+        """Points ``(m, 3)`` at any place of a surface that stands in several, brought to the first of them: an edit of
+        the surface is seen at all."""
+        if not self._stands or not len(points):
+            return points
+        best, least = points, self.feet(points).apart
+        for index, way in self._stands:
+            moved = points @ way[:3, :3].T + way[:3, 3]
+            feet = self.feet(moved)
+            nearer = (feet.surface == index) & (feet.apart < least - 1e-9)
+            best, least = np.where(nearer[:, None], moved, best), np.where(nearer, feet.apart, least)
+        return best
 
     def feet(self, points: Array) -> Feet:
         """The nearest points of the ground."""

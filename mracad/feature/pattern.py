@@ -33,7 +33,8 @@ def listed(ground: Ground, words: Sequence[str]) -> list[Place]:
             for name, row in table(word[1:]):
                 rotate, size, height = (row[3:] + [0.0, 1.0, 1.0][len(row) - 3 :])[:3]
                 label = f"{name} ({','.join(f'{x:g}' for x in row[:3])})"
-                found.append(Place(label, np.array(row[:3]), None, None, np.radians(rotate), size, height))
+                point = ground.brought(np.array([row[:3]]))[0]
+                found.append(Place(label, point, None, None, np.radians(rotate), size, height))
         else:
             found.append(place(ground, word, f"place {len(found) + 1}"))
     return found
@@ -121,6 +122,9 @@ def along(ground: Ground, text: str) -> list[Place]:
     if side is None or edge.degenerate:
         raise EditError(f"along: edge#{number} bounds no face to edit", "select one of its faces with --faces")
     points, tangents = _even(edge.points, edge.tangents, count)
+    face = model.faces[side.face]
+    way = ground.sheets[face.surface].frame @ np.linalg.inv(face.frame)  # type: ignore[index]  # it is a NURBS face
+    points, tangents = points @ way[:3, :3].T + way[:3, 3], tangents @ way[:3, :3].T
     inward = _inward(model, ground, edge.index, points, tangents) if offset else np.zeros_like(points)
     return [
         Place(f"place {k + 1} along edge#{number}", points[k] + offset * inward[k], direction=tangents[k])

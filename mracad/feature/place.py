@@ -92,7 +92,8 @@ def place(ground: Ground, text: str, label: str) -> Place:
         if not _within(sheet, uv) or not inside(ground.model.faces[face], sheet, uv[None])[0]:
             raise EditError(f"{label} is off the face: {_domain(sheet)}", "give parameters inside the face")
         return Place(label, np.asarray(sheet.net.evaluate(uv[None]))[0], face, uv)
-    return Place(label, np.array(numbers(text.removeprefix("near:"), label, PLACE, (3,))))
+    point = np.array(numbers(text.removeprefix("near:"), label, PLACE, (3,)))
+    return Place(label, ground.brought(point[None])[0])
 
 
 def table(path: str) -> list[tuple[str, list[float]]]:

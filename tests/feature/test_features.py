@@ -422,3 +422,36 @@ def test_transfer_of_the_character_of_a_face(tmp_path):
     run("transfer", texture, texture, "-o", same, "--from", "#1", "--to", "#1", *band, "--mode", "blend=0.4")
     one, two = model(texture).surfaces[0].net, model(same).surfaces[0].net
     assert np.abs(one.poles - two.poles).max() <= 1e-12
+
+
+@pytest.mark.parametrize("angle", [0.0, 1.0])
+def test_a_surface_that_stands_in_two_places_is_edited_from_either(angle):
+    """Places and windows mean the face they lie on, whichever of the two it is."""
+    from OCP.gp import gp_Ax1, gp_Dir, gp_Pnt, gp_Trsf, gp_Vec
+    from OCP.TopLoc import TopLoc_Location
+
+    import mracad
+    from tests.cli.declared import heights
+    from tests.occ import shapes
+
+    x, y = np.meshgrid(np.linspace(0, 10, 16), np.linspace(0, 10, 16), indexing="ij")
+    face = shapes.face_on(shapes.bspline(np.stack([x, y, heights(x, y)], axis=-1)))
+    there, turn = gp_Trsf(), gp_Trsf()
+    there.SetTranslation(gp_Vec(30, 0, 0))
+    turn.SetRotation(gp_Ax1(gp_Pnt(0, 0, 0), gp_Dir(0, 0, 1)), angle)
+    both = shapes.compound(face, face.Moved(TopLoc_Location(there.Multiplied(turn))))
+    model = mracad.snapshot(shapes.document(both))
+    assert len(model.surfaces) == 1
+
+    def at(number, *point):
+        return ",".join(repr(float(c)) for c in (model.faces[number].frame @ [*point, 1.0])[:3])
+
+    found = [
+        mracad.repeat(model, mracad.Repeat(feature=f"near:{at(i, 5, 5, 0.3)},radius:1.5", at=(at(j, 5, 7.5, 0.0),)))
+        for i in (0, 1)
+        for j in (0, 1)
+    ]
+    first = found[0].displacement.offsets[0]
+    assert np.abs(first.poles).max() > 0.1
+    for edit in found[1:]:
+        assert np.abs(edit.displacement.offsets[0].poles - first.poles).max() < 1e-9
