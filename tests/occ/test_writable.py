@@ -22,10 +22,10 @@ from tests.occ import shapes
 GREEN = Quantity_Color(0.0, 1.0, 0.0, Quantity_TOC_sRGB)
 
 
-def written(document, format="step", **options):
+def written(document, format="step", lacking=False, **options):
     stream = io.BytesIO()
     result = occ.write(document, stream, format, **options)
-    assert result.lost == ()
+    assert lacking or result.lost == ()
     return stream.getvalue(), result.cut
 
 
@@ -184,6 +184,14 @@ def test_other_files_are_what_they_were(samples, monkeypatch, name, format):
     assert cut == ()
     monkeypatch.setattr(f"mracad.occ.{format}.writable", nothing)
     assert written(document, format)[0] == data
+
+
+def test_real_files_are_what_they_were(refined_file, monkeypatch):
+    document = occ.read(refined_file)
+    data, cut = written(document, lacking=True)
+    assert cut == ()
+    monkeypatch.setattr("mracad.occ.step.writable", nothing)
+    assert written(document, lacking=True)[0] == data
 
 
 def test_reports_say_which_faces_are_in_parts(mracad, tmp_path):
