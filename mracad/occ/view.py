@@ -81,7 +81,8 @@ def view(document: Document, convert: Iterable[int] = (), edges: Container[int] 
         Faces on analytic, swept or offset surfaces that are to be seen as NURBS faces as well.  Their surfaces are
         put on them only by ``apply``, where they move.
     edges : container of int, optional
-        Edges that are sampled, and whose faces have trims; by default all.
+        Edges that are sampled, and whose faces have trims; by default all.  With some alone the diagonal is that of the
+        boxes of the parts' control points.
 
     Raises
     ------
@@ -122,9 +123,15 @@ def view(document: Document, convert: Iterable[int] = (), edges: Container[int] 
         products = tuple(part.product for part in document.parts)
         places = tuple(tuple(matrix(place) for place in part.placements) for part in document.parts)
         model = Model(document.name, surfaces, faces, lines, 0.0, document.unit, document.schema, products, places)
-        size = diagonal(document, model)
+        size = diagonal(document, model) if edges is None else _boxed(boxes)
         _refuse_absurd(document.name, [(0, size)])
     return replace(model, diagonal=size)
+
+
+def _boxed(boxes: list[Array]) -> float:
+    """The diagonal of boxes, as if every part stood in its own frame."""
+    low, high = np.min(boxes, axis=0)[0], np.max(boxes, axis=0)[1]
+    return float(np.linalg.norm(high - low))
 
 
 def _refuse_absurd(name: str, numbers: Iterable[tuple[int, Array | float]]) -> None:

@@ -17,10 +17,12 @@ from OCP.TopoDS import TopoDS, TopoDS_Shape
 
 from mracad.audit import accept
 from mracad.audit.accept import Reason, Slack, judge
+from mracad.audit.continuity import seams
 from mracad.occ import brep
 from mracad.occ.document import Document
 from mracad.occ.facts import facts
 from mracad.occ.load import Text
+from mracad.occ.view import view
 
 Doctor = Callable[[cq.Shape], TopoDS_Shape]
 
@@ -190,3 +192,12 @@ def apart(height: float) -> TopoDS_Shape:
               for dx, dz in ((0, 0), (20, height))]  # fmt: skip
     whole = cq.Compound.makeCompound([cq.Face.makeFromWires(wire) for wire in pieces])
     return BRepBuilderAPI_NurbsConvert(whole.wrapped, True).Shape()
+
+
+def test_a_few_seams_measure_as_all_do() -> None:
+    part = document(body().wrapped)
+    every = seams(view(part))
+    for number in (0, len(every) // 2):
+        edge = every[number].edge
+        (found,) = facts(part).probe.seams([edge])
+        assert found == every[number]

@@ -3,6 +3,8 @@
 import json
 from collections import Counter
 
+import pytest
+
 from tests.judge import LOOSE, SAMPLED, assert_as_good, judge, kernel_copy
 
 MOVED = {
@@ -80,3 +82,32 @@ def test_refinement_changes_every_file_with_detail(corpus_file, refined_file, mr
     kernel = judge(kernel_copy(refined_file, tmp_path / "kernel.step"))
     coupled, loose = pairs(body, "coupled"), pairs(body, "to tolerance")
     assert_as_good(judge(out), kernel, angles=False, coupled=coupled, loose=loose, source=judge(refined_file))
+
+
+@pytest.mark.parametrize("words", [(), ("--refine",)], ids=["", "refine"])
+def test_smooth_at_ten_percent(corpus_file, mracad, tmp_path, pytestconfig, words):
+    if not pytestconfig.getoption("--long"):
+        pytest.skip("pytest --long smooths at 10 %")
+    out, report = tmp_path / "out.step", tmp_path / "report.json"
+    result = mracad("smooth", corpus_file, "--scale", "10%", *words, "-o", out, "--report", report)
+    if result.code == 4:
+        assert "have detail to remove and none can move" in result.err and not words and not out.exists()
+        return
+    assert result.code == 0, result.err
+    body = json.loads(report.read_text())
+    found = body["read_back"]["out.step"]
+    assert found["faults"] == [] and found["valid"] == body["valid"]["before"]["valid"]
+    kernel = judge(kernel_copy(corpus_file, tmp_path / "kernel.step"))
+    coupled, loose = pairs(body, "coupled"), pairs(body, "to tolerance")
+    assert_as_good(judge(out), kernel, angles=not words, coupled=coupled, loose=loose, source=judge(corpus_file))
+
+
+@pytest.mark.parametrize("ending", ["step", "igs", "brep"])
+def test_converted_files_are_as_good_as_the_kernels_own(refined_file, mracad, tmp_path, ending):
+    out = tmp_path / f"out.{ending}"
+    result = mracad("convert", refined_file, "-o", out, "--json")
+    assert result.code == 0, result.err
+    found = json.loads(result.out)["read_back"][out.name]
+    assert found["valid"] and found["faults"] == []
+    if ending == "step":
+        assert_as_good(judge(out), judge(kernel_copy(refined_file, tmp_path / "kernel.step")))
