@@ -304,3 +304,17 @@ def noisy(shape: TopoDS_Shape, size: float = 0.03, seed: int = 1) -> Document:
                 break
     apply(document, model, Displacement(offsets))
     return document
+
+
+def bumped(place: tuple[float, float, float] = (-8.0, 0.0, 10.0), width: float = 1.2) -> Document:
+    """The rounded box as NURBS, with a bump on its top."""
+    document = shapes.document(nurbs(rounded_box().val().wrapped), names={0: "box"})
+    model = view(document)
+    tops = [s for s in model.surfaces if np.abs(s.net.poles[..., 2] - place[2]).max() < 1e-9]
+    inner = np.linspace(0, 1, 42)[1:-1]
+    knots = [low + (high - low) * inner for low, high in (kv.domain for kv in (tops[0].net.u, tops[0].net.v))]
+    poles = tops[0].net.refined(*knots).poles
+    rise = np.exp(-np.square(poles - place).sum(axis=-1) / (2 * width**2))
+    delta = np.where((rise > 1e-6)[..., None], rise[..., None] * np.array([0.0, 0.0, 0.5]), 0.0)
+    apply(document, model, Displacement({tops[0].index: Offset(delta, *knots)}))
+    return document

@@ -6,11 +6,12 @@ import pytest
 
 from mracad import job, occ
 from mracad.audit.continuity import seams
+from mracad.edit.features import move, repeat
 from mracad.edit.smooth import smooth
 from mracad.errors import EditError
 from mracad.occ.load import Text
 from mracad.occ.measure import mass
-from mracad.options import Smooth
+from mracad.options import Move, Repeat, Smooth
 from tests import zoo
 from tests.occ import shapes
 
@@ -78,4 +79,19 @@ def test_bodies_smoothed(name, scale, refine, quick):
     except EditError as error:
         pytest.skip(str(error))
     assert report.valid_after.valid
+    assert_kept(document, "step")
+
+
+@pytest.mark.parametrize(
+    ("edit", "options"),
+    [
+        (move, Move(feature="near:-8,0,10,radius:6", to="8,0,10")),
+        (repeat, Repeat(feature="near:-8,0,10,radius:6", at=("8,0,10", "0,1,10"))),
+    ],
+    ids=["moved", "repeated"],
+)
+def test_a_bump_elsewhere(edit, options):
+    document = zoo.bumped()
+    report = job.run(document, edit, options)
+    assert report.edit.faces("edited") and report.valid_after.valid
     assert_kept(document, "step")
