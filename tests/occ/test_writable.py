@@ -89,8 +89,9 @@ FAST = [
     ),
     *("torus-seam-nurbs", "ring-whole-nurbs", "ring-seam", "ring-blindseam-nurbs", "capsule"),
 ]
-LAID_ANEW = "ring-hole", "ring-opposite"
-"""Begin the names of those of which the reader of IGES lays boundaries anew: the verdict on the file refuses them."""
+LAID_ANEW = {"iges": ("ring-hole", "ring-opposite", "ring-ringcut"), "step": ("ring-ringcut-nurbs",), "brep": ()}
+"""Begin the names of those whose boundaries go beyond a surface that the kernel does not write as periodic, so that
+its reader lays them anew: the verdict on the file refuses them."""
 
 
 @pytest.mark.parametrize("name", CLOSED)
@@ -102,7 +103,7 @@ def test_closed_faces_are_read_back_whole(name, pytestconfig):
     if not before.valid or before.edge_tolerance > 1e-2:
         pytest.skip("the kernel does not make it well")
     for format in ("step", "iges", "brep") if name in FAST else ("step", "iges"):
-        if not (format == "iges" and name.startswith(LAID_ANEW)):
+        if not name.startswith(LAID_ANEW[format]):
             data, cut = written(document, format)
             assert_same(document, again(data), cut)
 
