@@ -100,7 +100,7 @@ def test_closed_faces_are_read_back_whole(name, pytestconfig):
         pytest.skip("pytest --long writes all of them")
     document = shapes.document(CLOSED[name]())
     before = occ.check(document)
-    if not before.valid or before.edge_tolerance > 1e-2:
+    if not before.valid or before.edge_tolerance > 1e-2 or mass(document).volume <= 0:
         pytest.skip("the kernel does not make it well")
     for format in ("step", "iges", "brep") if name in FAST else ("step", "iges"):
         if not name.startswith(LAID_ANEW[format]):
