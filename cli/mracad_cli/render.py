@@ -84,7 +84,10 @@ class Found:
 def found(made: Sequence[Made]) -> Found | None:
     """What is said of outputs; None where they were not read back."""
     known = [each.read_back for each in made if each.read_back]
-    return Found(all(each.valid for each in known)) if known else None
+    if not known:
+        return None
+    exact = any(each.counts for each in known)
+    return Found(all(each.valid for each in known), "as read back" if exact else "as meshed")
 
 
 def edit_lines(report: Report, options: Selection, end: str, found: Found | None = None) -> list[str]:

@@ -424,10 +424,10 @@ def _bodies(memory: _File, file: _File) -> Iterator[Fault]:
             others.append(Fault(Reason.AREA, (face,), value, was))
     yield from others
     solids = old.counts.solids and new.counts.solids
-    if solids and (lost or others or old.counts.solids != new.counts.solids):
+    if solids and (lost or old.counts.solids != new.counts.solids):  # exact volumes take long, and say nothing more
         value, was = new.probe.volume(), old.probe.volume()
         if abs(value - was) > SAME * abs(was):
-            yield Fault(Reason.VOLUME, (*lost, *(fault.faces[0] for fault in others)), value, was)
+            yield Fault(Reason.VOLUME, tuple(lost), value, was)
     room = SAME * old.diagonal + 2 * old.tolerance
     if np.abs(_hull(old.spots) - _hull(new.spots)).max() > room:
         far = float(np.abs(old.probe.box() - new.probe.box()).max())

@@ -77,6 +77,11 @@ def test_a_dry_run_speaks_of_memory(mracad, samples: Path) -> None:
     )
 
 
+def test_a_mesh_is_judged_by_its_triangles(mracad, samples: Path, tmp_path: Path) -> None:
+    result = mracad("convert", samples / "bottle.step", "-o", tmp_path / "out.stl")
+    assert result.code == 0 and "valid: yes, as meshed; wrote out.stl" in result.out
+
+
 def test_in_python(samples: Path, tmp_path: Path) -> None:
     document = library.read(samples / "panel.step")
     library.write(document, tmp_path / "out.step")
