@@ -35,8 +35,11 @@ LOOSE = 1e-4
 STEEPER = 0.01
 """Angle, degrees, by which a smooth seam may be less smooth in the file."""
 
-SAME = 1e-6
-"""Share of an area, a volume or a box by which these may differ, beyond what tolerances allow."""
+SAME = 1e-5
+"""Share of an area or a volume by which these may differ, beyond what tolerances allow: they are measured to 1e-6."""
+
+PLACED = 1e-6
+"""The same for the box, as a share of the diagonal."""
 
 
 class Reason(StrEnum):
@@ -428,7 +431,7 @@ def _bodies(memory: _File, file: _File) -> Iterator[Fault]:
         value, was = new.probe.volume(), old.probe.volume()
         if abs(value - was) > SAME * abs(was):
             yield Fault(Reason.VOLUME, tuple(lost), value, was)
-    room = SAME * old.diagonal + 2 * old.tolerance
+    room = PLACED * old.diagonal + 2 * old.tolerance
     if np.abs(_hull(old.spots) - _hull(new.spots)).max() > room:
         far = float(np.abs(old.probe.box() - new.probe.box()).max())
         if far > room:
