@@ -31,6 +31,10 @@ if TYPE_CHECKING:
 WIDER, STEEPER = 1e-5, 0.01
 """No seam may gape by so much more (mm), and no smooth one turn by so much more (degrees), after an edit."""
 
+ROUNDS = 8
+"""How often an edit is done again, each time without the faces that came out worse; then all are left that seams join
+to those, and if that does not help it is refused."""
+
 Progress = Callable[[str, int, int], None]
 """Called with the name of a stage, the steps done and the steps in all."""
 
@@ -143,8 +147,8 @@ def run(
     Raises
     ------
     EditError
-        When there is something to do and no face can move, or the result would be less valid than the input.
-        The document must then not be written.
+        When there is something to do and no face can move, or the result would be less valid than the input,
+        whatever faces are left.  The document must then not be written.
     """
     from mracad.occ.apply import apply as put
     from mracad.occ.apply import restore
@@ -166,10 +170,10 @@ def run(
     others = [view(read(file)) for file in options.models()]
     before: list[SeamMeasure] = []
     valid_before: Validity | None = None
-    spoiled = dict(spoiled)
+    left = _Left(model.name, dict(spoiled))
     while True:
-        result = edit(model, options, *others, scope=scope.holding(spoiled), progress=stage("editing"))
-        result = _named(result, {face: spoiled[face] for face in spoiled.keys() & scope.chosen})
+        result = edit(model, options, *others, scope=scope.holding(left.faces), progress=stage("editing"))
+        result = _named(result, {face: left.faces[face] for face in left.faces.keys() & scope.chosen})
         _refuse_if_stuck(model, result)
         stage("measuring seams")(0, 1)
         if valid_before is None:
@@ -181,9 +185,9 @@ def run(
         offsets = result.displacement.offsets
         after = remeasured(result.displacement.applied(model), before, offsets) if offsets else before
         torn = {i for i in _torn(before, after, result, options.keep) if model.faces[i].surface is not None}
-        torn -= spoiled.keys()
+        torn -= left.faces.keys()
         if torn:
-            spoiled |= dict.fromkeys(torn, "its seams would not hold")
+            left.leave(torn, "its seams would not hold", before, result)
             continue
         if not (apply and offsets):
             break
@@ -197,15 +201,15 @@ def run(
             valid_after = _verdict(valid_before, moved, touched)
             break
         restore(document, model, result.displacement)
-        if not worse <= touched - spoiled.keys():
+        if not worse <= touched - left.faces.keys():
             raise EditError(
                 f"{model.name}: the result would be less valid",
                 "leave faces out with --faces '!#N', or use --amount 0.5",
             )
-        spoiled |= dict.fromkeys(worse, "its result would not be valid")
+        left.leave(worse, "its result would not be valid", before, result)
     if isinstance(options, Fitting):
         reasons = {treatment.edge: treatment.reason for treatment in result.edges if treatment.reason}
-        movable = scope.chosen - spoiled.keys()
+        movable = scope.chosen - left.faces.keys()
         result = replace(
             result, notes=(*result.notes, *unmended(options, model.diagonal, movable, before, after, reasons))
         )
@@ -220,6 +224,43 @@ def run(
         valid_after,
         time.perf_counter() - start,
     )
+
+
+@dataclass
+class _Left:
+    """The faces that an edit may not touch, and why; they become more with every round.
+
+    Attributes
+    ----------
+    name : str
+        Of the model.
+    """
+
+    name: str
+    faces: dict[int, str]
+    rounds: int = 0
+
+    def leave(self, faces: set[int], reason: str, seams: Sequence[SeamMeasure], edit: Edit) -> None:
+        """Leave some more, for a reason; after enough rounds all edited ones that seams join to any of them."""
+        self.rounds += 1
+        if self.rounds > ROUNDS + 1:
+            names = " ".join(f"#{face + 1}" for face in sorted(faces)[:6]) + (" …" if len(faces) > 6 else "")
+            raise EditError(
+                f"{self.name}: {names} would come out worse, though {len(self.faces)} faces were left for that",
+                "leave them out with --faces '!#N', or use --amount 0.5",
+            )
+        if self.rounds > ROUNDS:
+            faces = _joined(faces | self.faces.keys(), seams, {outcome.face for outcome in edit.faces("edited")})
+        self.faces |= dict.fromkeys(faces - self.faces.keys(), reason)
+
+
+def _joined(faces: set[int], seams: Sequence[SeamMeasure], edited: set[int]) -> set[int]:
+    """Faces, and the edited ones that seams join to them, directly or through each other."""
+    found, fresh = set(faces), set(faces)
+    while fresh:
+        fresh = {face for seam in seams if fresh.intersection(seam.faces) for face in seam.faces} & edited - found
+        found |= fresh
+    return found
 
 
 def looked_at(document: Document, options: Selection) -> tuple[Model, Scope]:

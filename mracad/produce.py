@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, BinaryIO
 
 from mracad import review
 from mracad.audit import accept
-from mracad.audit.accept import Facts, Fault, ReadBack, Slack
-from mracad.errors import EditError
+from mracad.audit.accept import Facts, Fault, ReadBack, Reason, Slack
+from mracad.errors import EditError, FileError
 from mracad.formats import FORMATS, by_content
 from mracad.job import Judged, Original, Progress, Report, play
 from mracad.options import length
@@ -215,10 +215,16 @@ class _Copies:
         return _made(self.original(), target, "").written
 
     def of(self, target: Target) -> tuple[Facts, Facts]:
-        """Facts of the input and of its copy."""
+        """Facts of the input and of its copy; twice of the input where the copy cannot be read: that forgives nothing."""
         key = target.format, target.schema
         if key not in self._made:
-            self._made[key] = _read_back(_made(self.original(), target, "").data, target)
+            data = _made(self.original(), target, "").data
+            try:
+                self._made[key] = _read_back(data, target)
+            except Exception as error:
+                if not _unreadable(error):
+                    raise
+                self._made[key] = self.input, self.input
         return self.input, self._made[key]
 
 
@@ -250,21 +256,34 @@ def _read_back(data: bytes, target: Target) -> Facts:
     return facts(read(Text(data, target.name)))
 
 
+def _unreadable(error: Exception) -> bool:
+    """Whether an error says of a file that no document comes of it: those of files, and the kernel's own."""
+    return isinstance(error, FileError) or type(error).__module__.startswith("OCP")
+
+
 def _judged(made: Made, memory: _Memory, copies: _Copies) -> Made:
     """A file with what it is, read back."""
     if FORMATS[made.target.format].kind == "mesh":
         torn = made.written.open
         before = copies.mesh(made.target).open if torn and memory.edited else torn
         return replace(made, read_back=accept.meshed(torn, before))
-    file = _read_back(made.data, made.target)
     slack = replace(memory.slack, parts={cut.face: cut.parts for cut in made.written.cut})
     copy = partial(copies.of, made.target) if memory.edited else None
-    return replace(made, read_back=accept.read_back(file, *accept.judge(memory.facts, file, slack, copy)))
+    known = memory.facts
+    try:
+        file = _read_back(made.data, made.target)
+        found = accept.read_back(file, *accept.judge(known, file, slack, copy))
+    except Exception as error:
+        if not _unreadable(error):
+            raise
+        only = (0,) if known.count == 1 else ()
+        found = ReadBack(False, (Fault(Reason.UNREAD, only, status=getattr(error, "message", str(error))),))
+    return replace(made, read_back=found)
 
 
 def _refused(name: str, faults: Sequence[tuple[Target, Fault]]) -> EditError:
     """The error that names what would be worse, the worst kind first."""
-    target, fault = min(faults, key=lambda each: list(accept.Reason).index(each[1].reason))
+    target, fault = min(faults, key=lambda each: list(Reason).index(each[1].reason))
     more = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
     return EditError(
         f"{name}: the {target.format.upper()} file would be worse: {fault}{more}",

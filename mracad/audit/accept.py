@@ -45,6 +45,7 @@ PLACED = 1e-6
 class Reason(StrEnum):
     """What is worse in a file."""
 
+    UNREAD = "not read back"
     INVALID = "invalid"
     SOLIDS = "solids"
     SHELLS = "shells"
@@ -61,7 +62,7 @@ class Reason(StrEnum):
     OPEN = "open mesh"  # of a closed body
 
 
-CONTENT = frozenset({Reason.LOST, Reason.AREA, Reason.VOLUME, Reason.BOX})
+CONTENT = frozenset({Reason.UNREAD, Reason.LOST, Reason.AREA, Reason.VOLUME, Reason.BOX})
 """What is not forgiven though the kernel's own copy has it, too."""
 
 _LAID = 1e-8  # mm: an edge of which no point lies farther off is the same
@@ -95,7 +96,7 @@ class Fault:
     value, was : float
         The figure in the file and in the document: a count, mm, mm², mm³ or degrees.
     status : str
-        What the kernel calls it, for ``INVALID``.
+        What the kernel calls it, for ``INVALID``; what the reader says, for ``UNREAD``.
     """
 
     reason: Reason
@@ -111,10 +112,13 @@ class Fault:
 
     def __str__(self) -> str:
         where = " and ".join(f"#{face + 1}" for face in self.faces[:2]) + (" …" if len(self.faces) > 2 else "")
-        return _WORDS[self.reason].format(f=self, where=where or "somewhere", share=_share(self.value, self.was))
+        return _WORDS[self.reason].format(
+            f=self, where=where or _SOMEWHERE.get(self.reason, "somewhere"), share=_share(self.value, self.was)
+        )
 
 
 _WORDS = {
+    Reason.UNREAD: "{where} cannot be read back: {f.status}",
     Reason.INVALID: "{f.status} in {where}",
     Reason.SOLIDS: "{f.value:.0f} solids (were {f.was:.0f})",
     Reason.SHELLS: "{f.value:.0f} shells (were {f.was:.0f})",
@@ -130,6 +134,7 @@ _WORDS = {
     Reason.ANGLE: "an angle of {f.value:.2g}° between {where} (was {f.was:.2g}°)",
     Reason.OPEN: "the mesh is open at {where}",
 }
+_SOMEWHERE = {Reason.UNREAD: "it"}
 
 
 def _share(value: float, was: float) -> str:

@@ -7,13 +7,17 @@ from pathlib import Path
 
 import pytest
 from OCP.BRep import BRep_Tool
-from OCP.gp import gp_Vec
+from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeFace
+from OCP.Geom import Geom_OffsetSurface, Geom_SphericalSurface
+from OCP.GeomConvert import GeomConvert
+from OCP.gp import gp_Ax3, gp_Vec
 from OCP.TopLoc import TopLoc_Location
 
 import mracad as library
 from mracad.occ import step as writer
 from mracad.produce import WORSE
 from tests.batch.runs import recipe
+from tests.occ import shapes
 
 SMOOTH = "--scale", "16mm"
 
@@ -68,6 +72,36 @@ def test_the_report_says_what_the_file_is(mracad, samples: Path, tmp_path: Path,
     assert found["counts"]["free_edges"] == 10 and found["tolerance"] < 1e-4
     low, high = found["box"]
     assert all(a < b for a, b in zip(low, high, strict=True))
+
+
+@pytest.mark.parametrize("ending", ["step", "igs"])
+def test_an_output_that_reads_back_without_faces_is_refused(mracad, tmp_path: Path, ending: str) -> None:
+    """A face on an offset of a surface with poles: readers of STEP and IGES drop it.  That is not the input's fault."""
+    ball = GeomConvert.SurfaceToBSplineSurface_s(Geom_SphericalSurface(gp_Ax3(), 10.0))
+    face = BRepBuilderAPI_MakeFace(Geom_OffsetSurface(ball, 2.0), 1e-6).Face()
+    library.write(shapes.document(face), tmp_path / "in.brep")
+    result = mracad("convert", tmp_path / "in.brep", "-o", tmp_path / f"out.{ending}")
+    assert result.code == 4 and result.out == "" and result.err.count("\n") == 1
+    assert f"#1 cannot be read back: 'out.{ending}' holds no faces; write BREP" in result.err
+    assert [path.name for path in tmp_path.iterdir()] == ["in.brep"]
+    assert mracad("convert", tmp_path / "in.brep", "-o", tmp_path / "out.brep").code == 0
+
+
+def test_an_output_that_cannot_be_read_back_is_refused(mracad, samples: Path, tmp_path: Path, monkeypatch) -> None:
+    """A writer whose files end in the middle."""
+    whole = writer.step
+
+    def step(document, *options, **settings):
+        data, cut = whole(document, *options, **settings)
+        return data[: len(data) // 2], cut
+
+    monkeypatch.setattr(writer, "step", step)
+    for words in (("smooth", *SMOOTH), ("convert",)):
+        command, *rest = words
+        result = mracad(command, samples / "panel.step", *rest, "-o", tmp_path / "out.step")
+        assert result.code == 4 and result.out == "" and result.err.count("\n") == 1
+        assert "it cannot be read back: 'out.step' is truncated" in result.err
+        assert list(tmp_path.iterdir()) == []
 
 
 def test_a_dry_run_speaks_of_memory(mracad, samples: Path) -> None:

@@ -1,15 +1,24 @@
 """However badly seams hold, the work of a group stays in proportion to it; counted, not timed."""
 
+import sys
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from mracad import guard
+from mracad import guard, job, produce
+from mracad.audit.accept import Fault, ReadBack, Reason
 from mracad.edit import group as module
 from mracad.edit.group import Group
+from mracad.edit.result import Edit, FaceOutcome
 from mracad.edit.smooth import smooth
+from mracad.errors import Code, EditError
+from mracad.model import Displacement
 from mracad.occ.view import view
 from mracad.options import Smooth
+from mracad.recipe import Step
 from tests.edit import halves, panels
+from tests.occ import shapes
 
 
 @pytest.fixture
@@ -79,3 +88,76 @@ def test_what_a_group_is_at_is_noted(monkeypatch):
     monkeypatch.setattr(guard, "doing", lambda stage="", subject="": noted.append(stage))
     smooth(panel(2), Smooth(scale="60mm"))
     assert "smoothing group 1 of 1, round 1" in noted
+
+
+class Stub:
+    """An edit that says of every face that it may move that it did; the rounds are counted."""
+
+    def __init__(self):
+        self.rounds = 0
+
+    def __call__(self, model, options, *, scope, progress):
+        self.rounds += 1
+        faces = range(len(model.faces))
+        return Edit(
+            Displacement({}),
+            tuple(FaceOutcome(i, "edited") if i in scope.chosen else FaceOutcome(i, "held") for i in faces),
+        )
+
+
+def chains(*lengths):
+    """Rows of flat faces that seams join, each row apart from the others."""
+    grid = np.stack(np.meshgrid(np.arange(4.0), np.arange(4.0), [0.0], indexing="ij"), axis=-1)[:, :, 0]
+    rows = [
+        [shapes.face_on(shapes.bspline(grid + np.array([3.0 * i, 10.0 * row, 0.0]))) for i in range(length)]
+        for row, length in enumerate(lengths)
+    ]
+    return shapes.document(shapes.compound(*(shapes.sewn(*faces) for faces in rows)))
+
+
+def first_edited(faces):
+    """A finding of the first of some faces that is edited, each time, as if there were no end of them."""
+
+    def found(before, after, edit, keep):
+        return set(sorted({outcome.face for outcome in edit.faces("edited")} & set(faces))[:1])
+
+    return found
+
+
+def test_an_edit_is_done_again_a_bounded_number_of_times(monkeypatch):
+    """Then all that seams join to what came out worse is left, and the rest is edited."""
+    stub, document = Stub(), chains(job.ROUNDS + 6, 3)
+    row = range(job.ROUNDS + 6)
+    monkeypatch.setattr(job, "_torn", first_edited(row))
+    report = job.run(document, stub, Smooth(level=1))
+    assert stub.rounds == job.ROUNDS + 2
+    stuck = report.edit.faces("stuck")
+    assert [outcome.face for outcome in stuck] == list(row)
+    assert {outcome.reason for outcome in stuck} == {"its seams would not hold"}
+    assert [outcome.face for outcome in report.edit.faces("edited")] == [row.stop, row.stop + 1, row.stop + 2]
+
+
+def test_an_edit_that_never_comes_out_is_refused_after_these_rounds(monkeypatch):
+    stub, document = Stub(), chains(*[1] * (job.ROUNDS + 4))
+    monkeypatch.setattr(job, "_torn", first_edited(range(job.ROUNDS + 4)))
+    with pytest.raises(EditError, match=f"#{job.ROUNDS + 2} would come out worse") as caught:
+        job.run(document, stub, Smooth(level=1))
+    assert caught.value.code == Code.CANNOT_EDIT and stub.rounds == job.ROUNDS + 2
+
+
+def test_files_are_made_again_a_bounded_number_of_times(monkeypatch):
+    """Every file is worse at one more face; the last is named."""
+    stub, document = Stub(), chains(*[1] * (produce.ROUNDS + 4))
+
+    def judged(made, memory, copies):
+        assert memory.edited == set(range(stub.rounds - 1, produce.ROUNDS + 4))
+        return replace(made, read_back=ReadBack(False, (Fault(Reason.AREA, (min(memory.edited),), 2.0, 1.0),)))
+
+    monkeypatch.setattr("mracad.produce._judged", judged)
+    monkeypatch.setattr(sys.modules["mracad.edit.smooth"], "smooth", stub)
+    step = Step("smooth", "smooth", Smooth(level=1))
+    with pytest.raises(EditError, match=f"the area of #{produce.ROUNDS} changes") as caught:
+        produce.produce(
+            document, lambda: chains(*[1] * (produce.ROUNDS + 4)), [step], [produce.Target("out.brep", "brep")]
+        )
+    assert caught.value.code == Code.CANNOT_EDIT and stub.rounds == produce.ROUNDS
