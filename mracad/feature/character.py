@@ -100,7 +100,7 @@ class Character:
     def frames(self, uv: Array) -> Array:
         """Frames ``(q, 3, 3)``: rows S_u, N × S_u, N of the coarse surface."""
         _, su, sv = self.coarse.evaluate(uv, 1)
-        normal = self.sheet.sign * np.cross(su, sv)
+        normal = self.sheet.signs(uv)[:, None] * np.cross(su, sv)
         x, n = (d / np.maximum(np.linalg.norm(d, axis=1, keepdims=True), 1e-300) for d in (su, normal))
         return np.stack([x, np.cross(n, x), n], axis=1)
 

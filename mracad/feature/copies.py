@@ -236,7 +236,7 @@ class Copies:
     def _congruent(
         self, source: Sheet, target: Sheet, box: tuple[tuple[int, int], ...], shift: tuple[int, int], near: Array
     ) -> Array | None:
-        """The rotation that takes the source's net to the target's, where they are congruent."""
+        """The rotation that takes the source's net to the target's, where they are congruent and their outsides are."""
         index = [np.arange(a, b) for a, b in box]
         one = source.net.poles[np.ix_(*index)].reshape(-1, 3)
         there = np.ix_(*((k + s) % kv.count for k, s, kv in zip(index, shift, target.knots, strict=True)))
@@ -249,13 +249,13 @@ class Copies:
             return None
         a, b = one - one.mean(axis=0), two - two.mean(axis=0)
         limit = CONGRUENT * self.height
-        if np.abs(a - b).max() <= limit:
-            return np.eye(3)
-        u, _, vt = np.linalg.svd(b.T @ a)
-        turn = u @ np.diag([1, 1, np.sign(np.linalg.det(u @ vt))]) @ vt
+        turn = np.eye(3)
+        if np.abs(a - b).max() > limit:
+            u, _, vt = np.linalg.svd(b.T @ a)
+            turn = u @ np.diag([1, 1, np.sign(np.linalg.det(u @ vt))]) @ vt
         if np.abs(a @ turn.T - b).max() > limit or np.abs(turn - near).max() > 0.05:
             return None
-        return np.asarray(turn)
+        return turn
 
     def laid(self, wishes: Wishes, coupled: bool, clip: bool, removed: Mapping[int, Array]) -> Laid:
         """The copies as offsets.
@@ -469,9 +469,7 @@ class Copies:
         if key in self._kept:
             return self._kept[key]
         us, vs = u.greville(), v.greville()
-        points, su, sv = sheet.net.grid(us, vs, 1)
-        normals = sheet.sign * np.cross(su, sv)
-        normals /= np.maximum(np.linalg.norm(normals, axis=-1, keepdims=True), 1e-300)
+        points, normals = sheet.lattice(us, vs)
         values, count = self.ideal(sheet, points.reshape(-1, 3), normals.reshape(-1, 3), self.matched)
         values, near = values.reshape(points.shape), count.reshape(points.shape[:2]) > 0
         weights = weights_over(sheet, u, v)

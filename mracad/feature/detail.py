@@ -447,7 +447,5 @@ def _under(sheet: Sheet, chart: Charts, ab: Array) -> tuple[Array, Array]:
 def _grid(sheet: Sheet) -> tuple[Array, Array]:
     """Greville points of a sheet and outward normals there, ``(nu nv, 3)``."""
     net = sheet.net
-    s, su, sv = net.grid(net.u.greville(), net.v.greville(), 1)
-    normal = sheet.sign * np.cross(su, sv)
-    normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-300)
-    return s.reshape(-1, 3), normal.reshape(-1, 3)
+    points, normals = sheet.lattice(net.u.greville(), net.v.greville())
+    return points.reshape(-1, 3), normals.reshape(-1, 3)

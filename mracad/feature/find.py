@@ -84,13 +84,12 @@ def _on(sheet: Sheet) -> list[Found]:
     net = sheet.net
     lengths = [arc_lengths(net, axis) for axis in (0, 1)]
     us, vs = net.u.greville(), net.v.greville()
-    points, su, sv = net.grid(us, vs, 1)
-    normals = sheet.sign * np.cross(su, sv)
-    normals /= np.maximum(np.linalg.norm(normals, axis=-1, keepdims=True), 1e-300)
+    points, normals = sheet.lattice(us, vs)
     uv = np.stack(np.meshgrid(us, vs, indexing="ij"), axis=-1).reshape(-1, 2)
     seen = sheet.covers(uv).reshape(points.shape[:2])
     if seen.sum() < 64:
         return []
+    _, su, sv = net.grid(us, vs, 1)
     area = np.linalg.norm(np.cross(su, sv), axis=-1) * np.outer(np.gradient(us), np.gradient(vs))
     scale = 4 * min(float(np.median(x)) for x in lengths)
     kept: list[Found] = []

@@ -64,7 +64,6 @@ class Sheet:
         self.turn = frame[:3, :3]
         poles = own.poles if poles is None else poles
         self.net = Net(own.u, own.v, poles @ self.turn.T + frame[:3, 3], own.weights)
-        self.sign = -1.0 if self.faces[0].reversed else 1.0
 
     @property
     def knots(self) -> tuple[KnotVector, KnotVector]:
@@ -100,10 +99,24 @@ class Sheet:
     def periodic(self) -> Array:
         return np.array([k.periodic for k in self.knots])
 
+    def signs(self, uv: Array) -> Array:
+        """1.0 where S_u × S_v points outward on the face at, or nearest to, parameters ``(q, 2)``, else -1.0."""
+        signs = np.array([-1.0 if face.reversed else 1.0 for face in self.faces])
+        if (signs == signs[0]).all():
+            return np.full(len(uv), signs[0])
+        return signs[np.argmin([_off(face, self, uv) for face in self.faces], axis=0)]
+
+    def lattice(self, us: Array, vs: Array) -> tuple[Array, Array]:
+        """Points and unit normals (outward) at all pairs of parameters, ``(m, n, 3)``."""
+        points, su, sv = self.net.grid(us, vs, 1)
+        uv = np.stack(np.meshgrid(us, vs, indexing="ij"), axis=-1).reshape(-1, 2)
+        normals = self.signs(uv).reshape(*points.shape[:2], 1) * np.cross(su, sv)
+        return points, normals / np.maximum(np.linalg.norm(normals, axis=-1, keepdims=True), 1e-300)
+
     def evaluate(self, uv: Array) -> tuple[Array, Array, Array, Array]:
         """Points, derivatives and unit normals (outward)."""
         s, su, sv = self.net.evaluate(uv, 1)
-        normal = self.sign * np.cross(su, sv)
+        normal = self.signs(uv)[:, None] * np.cross(su, sv)
         size = np.linalg.norm(normal, axis=1, keepdims=True)
         return s, su, sv, normal / np.maximum(size, 1e-300)
 
@@ -342,9 +355,13 @@ def axes(normals: Array, directions: Array) -> Array:
 
 def inside(face: Face, sheet: Sheet, uv: Array, margin: float = 1e-6) -> Array:
     """Whether parameters ``(q, 2)`` lie within a face or on its boundary."""
-    found = np.zeros(len(uv), bool)
+    return np.asarray(_off(face, sheet, uv) <= margin)
+
+
+def _off(face: Face, sheet: Sheet, uv: Array) -> Array:
+    """How far parameters ``(q, 2)`` lie outside a face, in shares of the domain; 0 within."""
     if not face.trims:
-        return ~found
+        return np.zeros(len(uv))
     low, size = sheet.domain[0], sheet.size
     lines = []
     for trim in face.trims:
@@ -354,14 +371,16 @@ def inside(face: Face, sheet: Sheet, uv: Array, margin: float = 1e-6) -> Array:
     p, q = (np.concatenate([line[s] for line in lines]) for s in (slice(None, -1), slice(1, None)))
     way = q - p
     length = np.maximum((way**2).sum(axis=1), 1e-300)
+    off = np.full(len(uv), np.inf)
     turns = [(-1, 0, 1) if periodic else (0,) for periodic in sheet.periodic]
     for turn in ((u, v) for u in turns[0] for v in turns[1]):
         for block in np.array_split(np.arange(len(uv)), max(len(uv) * len(p) >> 20, 1)):
             at = ((uv[block] - low) / size + np.array(turn))[:, None]
             t = np.clip(((at - p) * way).sum(axis=2) / length, 0, 1)
-            near = np.linalg.norm(p + t[..., None] * way - at, axis=2).min(axis=1) <= margin
+            apart = np.linalg.norm(p + t[..., None] * way - at, axis=2).min(axis=1)
             cross = (p[:, 1] > at[..., 1]) != (q[:, 1] > at[..., 1])
             slope = np.where(way[:, 1] == 0, np.inf, way[:, 1])
             x = p[:, 0] + (at[..., 1] - p[:, 1]) * way[:, 0] / slope
-            found[block] |= near | ((cross & (x > at[..., 0])).sum(axis=1) % 2 == 1)
-    return found
+            within = (cross & (x > at[..., 0])).sum(axis=1) % 2 == 1
+            off[block] = np.minimum(off[block], np.where(within, 0.0, apart))
+    return off

@@ -455,3 +455,20 @@ def test_a_surface_that_stands_in_two_places_is_edited_from_either(angle):
     assert np.abs(first.poles).max() > 0.1
     for edit in found[1:]:
         assert np.abs(edit.displacement.offsets[0].poles - first.poles).max() < 1e-9
+
+
+def test_a_copy_stands_out_of_the_face_that_it_is_on():
+    """Two faces on one surface, the second turned over: its outside is below."""
+    net = grounds.plane(120.0, (30.0, 30.0))
+    surface = make.surface(net.poles, net.u.knots, net.v.knots, (3, 3))
+    faces = shapes.face_on(surface, 0.0, 60.0, 0.0, 120.0), shapes.face_on(surface, 60.0, 120.0, 0.0, 120.0).Reversed()
+    for number, order in enumerate((faces, faces[::-1])):
+        before = view(shapes.document(shapes.compound(*order)))
+        assert len(before.surfaces) == 1 and [face.reversed for face in before.faces] == [number == 1, number == 0]
+        change = repeat(before, Repeat(feature="near:30,30,0,radius:18", at=("90,40,0", "30,85,0")))
+        points = net.evaluate(uv := square(net))
+        moved = change.displacement.applied(before).surfaces[0].net.evaluate(uv) - points
+        wanted = bump(np.hypot(points[:, 0] - 30, points[:, 1] - 85)) - bump(
+            np.hypot(points[:, 0] - 90, points[:, 1] - 40)
+        )
+        assert np.abs(moved - wanted[:, None] * [0, 0, 1]).max() <= 1e-3 * HEIGHT
