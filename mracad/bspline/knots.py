@@ -109,7 +109,8 @@ class KnotVector:
     def __repr__(self) -> str:
         kind = ", periodic" if self.periodic else ""
         low, high = self.domain
-        return f"KnotVector(degree {self.degree}, {self.count} poles, {self.spans} spans on [{low:g}, {high:g}]{kind})"
+        what = f"degree {self.degree}, {self.count} control points, {self.spans} spans"
+        return f"KnotVector({what} on [{low:g}, {high:g}]{kind})"
 
     @classmethod
     def from_multiplicities(

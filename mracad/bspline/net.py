@@ -37,7 +37,9 @@ class Curve:
 
     def __post_init__(self) -> None:
         if self.poles.ndim != 2 or len(self.poles) != self.knots.count:
-            raise UsageError(f"poles of shape {self.poles.shape} for a knot vector of {self.knots.count} poles")
+            raise UsageError(
+                f"control points of shape {self.poles.shape} where the knot vector wants {self.knots.count}"
+            )
         _check_weights(self.weights, self.poles.shape[:1])
 
     def evaluate(self, t: Array, derivatives: int = 0, side: Side = "right") -> Array:
@@ -116,7 +118,9 @@ class Net:
 
     def __post_init__(self) -> None:
         if self.poles.ndim != 3 or self.poles.shape[:2] != (self.u.count, self.v.count):
-            raise UsageError(f"poles of shape {self.poles.shape} for a net of {self.u.count} × {self.v.count} poles")
+            raise UsageError(
+                f"control points of shape {self.poles.shape} where the knots want {self.u.count} × {self.v.count}"
+            )
         _check_weights(self.weights, self.poles.shape[:2])
 
     def evaluate(
@@ -288,7 +292,7 @@ def _check_weights(weights: Array | None, shape: tuple[int, ...]) -> None:
     if weights is None:
         return
     if weights.shape != shape:
-        raise UsageError(f"weights of shape {weights.shape} for poles of shape {shape}")
+        raise UsageError(f"weights of shape {weights.shape} for control points of shape {shape}")
     if not (weights > 0).all():
         raise UsageError("a weight is not positive")
 

@@ -63,9 +63,9 @@ CLUSTER = 1e-6, 1e-4
 
 CROWDED = "knots of the two sides nearly meet"
 OPEN = f"{TRIMMED}: not within the tolerance"
-ENTANGLED = "poles of a face there cannot move one by one"
+ENTANGLED = "control points of a face there cannot move one by one"
 FOLDED = "would kink where a face closes on itself"
-STUCK = "a face there has no free poles"
+STUCK = "a face there has no free control points"
 
 LEAST = 0.5
 """A seam with less of the freedom of the smoother of its two sides is frozen."""
@@ -241,7 +241,8 @@ class Group:
         """The trimmed seams, or all where that was done before, with the reason for leaving them as they are."""
         some = self._every() if self.allowance.given_up or not self.trimmed else self.trimmed
         self.allowance = Allowance(LAST_WORK * self.points, self.allowance.rounds, given_up=True)
-        return {seam.edge: f"given up after {self.allowance.rounds} rounds" for seam in some}
+        rounds = f"{self.allowance.rounds} round" + "s" * (self.allowance.rounds != 1)
+        return {seam.edge: f"given up after {rounds}" for seam in some}
 
     def _spend(self, work: float) -> None:
         self.allowance = replace(self.allowance, work=self.allowance.work - work)

@@ -181,9 +181,9 @@ class _SurfaceSmoothing:
         elif self.options.amount == 0:
             status, reason = "unchanged", "amount 0"
         else:
-            status, reason = "stuck", "no free poles" if not free else "no free poles where the detail is"
+            status, reason = "stuck", "no free control points" + (" where the detail is" if free else "")
             if self.entangled:
-                reason = "its poles cannot move one by one"
+                reason = "its control points cannot move one by one"
         return FaceOutcome(
             face.index,
             status,

@@ -106,7 +106,9 @@ class Projection:
         """Coarse poles of the projection of poles ``c`` along ``axis``; ``c`` itself where the spaces are the same."""
         c = np.asarray(c, dtype=float)
         if c.shape[axis] != self.fine_knots.count:
-            raise UsageError(f"{c.shape[axis]} poles along axis {axis} where the knots want {self.fine_knots.count}")
+            raise UsageError(
+                f"{c.shape[axis]} control points along axis {axis} where the knots want {self.fine_knots.count}"
+            )
         if self.coarse_knots == self.fine_knots:
             return c
         middle = c.mean(axis=axis, keepdims=True)

@@ -71,7 +71,7 @@ class Step:
         """Coarse poles and details of poles ``c`` along ``axis``; they may take its place if ``overwrite`` says so."""
         c = np.asarray(c, dtype=float)
         if c.shape[axis] != self.fine.count:
-            raise UsageError(f"{c.shape[axis]} poles along axis {axis} where the knots want {self.fine.count}")
+            raise UsageError(f"{c.shape[axis]} control points along axis {axis} where the knots want {self.fine.count}")
         coarse, detail = slice(None, self._m), slice(self._m, None)
         if self.exact:
             both = self._solver.solve(c, axis, overwrite)
@@ -90,8 +90,8 @@ class Step:
         """
         if (coarse.shape[axis], detail.shape[axis]) != (self._m, self.fine.count - self._m):
             raise UsageError(
-                f"{coarse.shape[axis]} coarse poles and {detail.shape[axis]} details along axis {axis} where the "
-                f"knots want {self._m} and {self.fine.count - self._m}"
+                f"{coarse.shape[axis]} coarse control points and {detail.shape[axis]} details along axis {axis} where "
+                f"the knots want {self._m} and {self.fine.count - self._m}"
             )
         axis %= coarse.ndim
         if out is None:
@@ -259,7 +259,7 @@ def decompose(poles: Array, ladder_u: Sequence[KnotVector], ladder_v: Sequence[K
     poles = np.asarray(poles, dtype=float)
     ladders = [ladder_u] if ladder_v is None else [ladder_u, ladder_v]
     if poles.shape[:-1] != tuple(ladder[0].count for ladder in ladders):
-        raise UsageError(f"poles of shape {poles.shape} do not fit the finest knots of the ladders")
+        raise UsageError(f"control points of shape {poles.shape} do not fit the finest knots of the ladders")
     steps = [[step(b, a) for a, b in pairwise(ladder)] for ladder in ladders]
     flat = poles.reshape(-1, poles.shape[-1])
     centroid = np.full(len(flat), 1.0 / len(flat)) @ flat

@@ -10,6 +10,7 @@ from mracad.bspline.net import Net
 from mracad.edit.smooth import smooth
 from mracad.errors import UsageError
 from mracad.options import Smooth
+from mracad.select import Scope
 from tests.edit.models import fitted, rotation, sheet
 
 
@@ -158,7 +159,7 @@ def test_a_face_without_free_points_is_stuck_until_it_is_refined():
     net = stuck_net()
     result, edit = smoothed(net, scale="4mm")
     outcome = edit.outcomes[0]
-    assert outcome.status == "stuck" and outcome.reason == "no free poles" and outcome.detail > 0.01
+    assert outcome.status == "stuck" and outcome.reason == "no free control points" and outcome.detail > 0.01
     assert np.array_equal(result.poles, net.poles)
     result, edit = smoothed(net, scale="4mm", refine=True)
     assert edit.outcomes[0].status == "edited" and edit.outcomes[0].inserted > 0
@@ -186,8 +187,11 @@ def test_a_crease_line_stays_and_a_smooth_line_of_full_multiplicity_goes():
 
 def test_held_and_unselected_faces_stay():
     model = sheet(rough())
-    for settings, status in (({"held": {0}}, "held"), ({"faces": set()}, "unselected")):
-        edit = smooth(model, Smooth(scale="4mm"), **settings)
+    for scope, status in (
+        (Scope(frozenset({0}), held=frozenset({0})), "held"),
+        (Scope(frozenset()), "unselected"),
+    ):
+        edit = smooth(model, Smooth(scale="4mm"), scope=scope)
         assert edit.outcomes[0].status == status and not edit.displacement.offsets
 
 
