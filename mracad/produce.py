@@ -215,7 +215,7 @@ class _Copies:
         return _made(self.original(), target, "").written
 
     def of(self, target: Target) -> tuple[Facts, Facts]:
-        """Facts of the input and of its copy; twice of the input where the copy cannot be read: that forgives nothing."""
+        """Facts of the input and of its copy; where it cannot be read the input, so that nothing is forgiven."""
         key = target.format, target.schema
         if key not in self._made:
             data = _made(self.original(), target, "").data
@@ -224,7 +224,7 @@ class _Copies:
             except Exception as error:
                 if not _unreadable(error):
                     raise
-                self._made[key] = self.input, self.input
+                self._made[key] = self.input
         return self.input, self._made[key]
 
 

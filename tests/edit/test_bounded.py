@@ -59,7 +59,10 @@ def test_rounds_do_not_grow_with_the_seams_of_a_group(side, solved, monkeypatch)
     assert sum(solved) <= (module.WORK + module.LAST_WORK) * own_points(model)
     given_up = [edge for edge in edit.edges if edge.reason.startswith("given up after ")]
     assert len(given_up) > len(edit.edges) / 4 and all(edge.how == "frozen" for edge in given_up)
-    assert {edge.reason for edge in given_up} <= {f"given up after {n} rounds" for n in range(1, 12)}
+    assert {edge.reason for edge in given_up} <= {
+        "given up after 1 round",
+        *(f"given up after {n} rounds" for n in range(2, 12)),
+    }
     assert all(edge.how == "frozen" for edge in edit.edges) and edit.faces("edited")
 
 
