@@ -38,11 +38,17 @@ class TimeLimitError(LimitError):
     """Work that took more time than it may."""
 
 
-class _Note:
-    """A few words from a child to its parent, which remain when the child is lost."""
+class Note:
+    """A few words from a child to its parent, which remain when the child is lost.
 
-    def __init__(self) -> None:
-        self._memory = mmap.mmap(-1, mmap.PAGESIZE)
+    Parameters
+    ----------
+    file : int
+        Descriptor of a file of a page that both have, where the child is no fork.
+    """
+
+    def __init__(self, file: int = -1) -> None:
+        self._memory = mmap.mmap(file, mmap.PAGESIZE)
         self.stage = self.subject = ""
 
     def write(self, stage: str, subject: str, ending: bool = False) -> None:
@@ -59,8 +65,14 @@ class _Note:
         return f" while {text}" if text else ""
 
 
-_note: _Note | None = None  # of this process, when it is a child
+_note: Note | None = None  # of this process, when it is a child
 _memory: int | None = None  # that this process may hold, when it is a child with a limit
+
+
+def noting(note: Note) -> None:
+    """Let :func:`doing` write to a note, as in a child."""
+    global _note
+    _note = note
 
 
 def doing(stage: str = "", subject: str = "") -> None:
@@ -118,7 +130,7 @@ def run(
     sys.stdout.flush()
     sys.stderr.flush()
     reader, writer = os.pipe()
-    note = _Note()
+    note = Note()
     child = os.fork()
     if not child:
         _note, _memory = note, memory
@@ -203,7 +215,7 @@ def _terminated(*_: object) -> None:
     raise SystemExit(128 + signal.SIGTERM)
 
 
-def _received(reader: int, seconds: float | None, note: _Note) -> tuple[bytes, bool]:
+def _received(reader: int, seconds: float | None, note: Note) -> tuple[bytes, bool]:
     """All that the child sends, and whether it ended in time."""
     late = False
     end = None if seconds is None else time.monotonic() + seconds

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, BinaryIO
 
-from mracad import review
+from mracad import guard, review
 from mracad.audit import accept
 from mracad.audit.accept import Facts, Fault, ReadBack, Reason, Slack
 from mracad.errors import EditError, FileError
@@ -120,12 +120,10 @@ def produce(
         done = Production(tuple(results))
         if not (targets and done.passed):
             return done
-        if progress:
-            progress("writing", 0, 1)
+        _tell("writing", progress)
         made = tuple(_made(document, target, title) for target in targets)
         if verify:
-            if progress:
-                progress("reading back", 0, 1)
+            _tell("reading back", progress)
             memory = _Memory(document, results)
             made = tuple(_judged(each, memory, copies) for each in made)
         faults = tuple((each.target, fault) for each in made if each.read_back for fault in each.read_back.faults)
@@ -171,6 +169,12 @@ def read_back(
     copy = partial(_Copies(original).of, target) if original else None
     slack = Slack(parts={cut.face: cut.parts for cut in written.cut} if written else {})
     return accept.read_back(found, *accept.judge(facts(document), found, slack, copy))
+
+
+def _tell(stage: str, progress: Progress | None) -> None:
+    guard.doing(stage)
+    if progress:
+        progress(stage, 0, 1)
 
 
 class _Memory:

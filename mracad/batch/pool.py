@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import math
+import mmap
 import os
 import pickle
 import queue
@@ -16,6 +17,7 @@ import signal
 import struct
 import subprocess
 import sys
+import tempfile
 import threading
 import time
 from collections.abc import Callable
@@ -29,7 +31,7 @@ import psutil
 
 from mracad import wire
 from mracad.errors import CrashError, LimitError, MracadError
-from mracad.guard import end_with_parent
+from mracad.guard import Note, end_with_parent, noting
 
 TICK = 0.05
 """Seconds between two looks at the workers."""
@@ -162,7 +164,9 @@ class Pool(Executor):
             for worker in list(self._workers):
                 if time.monotonic() > worker.deadline:
                     hint = "raise --time-limit, or look into the file"
-                    worker.kill(LimitError(f"not done within the time limit of {worker.seconds:g} s", hint))
+                    worker.kill(
+                        LimitError(f"not done within the time limit of {worker.seconds:g} s{worker.note}", hint)
+                    )
                 elif (used := worker.used()) > self._memory:
                     text = f"over the memory limit of {self._memory / 1e6:.0f} MB (at {used / 1e6:.0f} MB)"
                     worker.kill(LimitError(text, "raise --memory-limit, or use fewer workers"))
@@ -183,14 +187,19 @@ class _Worker:
         environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
         for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
             environment.setdefault(name, "1")  # as in one command: results must not depend on the number of cores
-        self.process = subprocess.Popen(
-            [sys.executable, "-P", "-c", "from mracad.batch.pool import serve; serve()"],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-            env=environment,
-            process_group=None if sys.platform == "win32" else 0,  # an interrupt is for the client to act upon
-        )
+        with tempfile.TemporaryFile() as page:
+            page.truncate(mmap.PAGESIZE)
+            self.note = Note(page.fileno())
+            shared = [] if sys.platform == "win32" else [page.fileno()]
+            self.process = subprocess.Popen(
+                [sys.executable, "-P", "-c", f"from mracad.batch.pool import serve; serve(*{shared})"],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.DEVNULL,
+                env=environment,
+                pass_fds=shared,
+                process_group=None if sys.platform == "win32" else 0,  # an interrupt is for the client to act upon
+            )
         self.reason: MracadError | None = None
         self.seconds, self.deadline = 0.0, math.inf
         self.ready = 0  # bytes occupied before the first task
@@ -199,6 +208,7 @@ class _Worker:
     def call(self, seconds: float, payload: bytes, returns: Any) -> Any:
         """Do a task and return its result, or raise its error."""
         assert self.process.stdin and self.process.stdout
+        self.note.write("", "")
         self.seconds, self.deadline = seconds, time.monotonic() + seconds
         try:
             pickle.dump((seconds, payload), self.process.stdin, protocol=5)
@@ -245,9 +255,11 @@ class _Worker:
         if self.reason:
             return self.reason
         if code == -getattr(signal, "SIGKILL", 9):
-            return CrashError("the worker was killed (out of memory, maybe)", "try again with fewer workers")
+            return CrashError(
+                f"the worker was killed (out of memory, maybe){self.note}", "try again with fewer workers"
+            )
         name = signal.Signals(-code).name if code < 0 else f"exit code {code}"
-        return CrashError(f"the worker crashed ({name})", "the file breaks the CAD kernel: export it again")
+        return CrashError(f"the worker crashed ({name}){self.note}", "the file breaks the CAD kernel: export it again")
 
 
 def _occupied(process: psutil.Process) -> int:
@@ -268,9 +280,14 @@ def _children(process: psutil.Process) -> list[psutil.Process]:
         return []
 
 
-def serve() -> None:
-    """What a worker process does: tasks from standard input, results to standard output, until that is closed."""
+def serve(page: int | None = None) -> None:
+    """What a worker process does: tasks from standard input, results to standard output, until that is closed.
+
+    What it is at goes to a note in the file with that descriptor, where such can be passed on.
+    """
     end_with_parent()
+    if page is not None:
+        noting(Note(page))
     requests, replies = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
     os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
     os.dup2(2, 1)

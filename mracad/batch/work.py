@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from mracad import guard
 from mracad.audit.accept import ReadBack
 from mracad.errors import Code, MracadError
 from mracad.options import STEPS
@@ -99,6 +100,7 @@ def do(work: Work) -> Product:
     target = Target(work.name, work.format, work.schema)
     with tempfile.TemporaryDirectory() as folder:
         steps = _here(work, Path(folder))
+        guard.doing("reading", work.name)
         document = _read(work)
         done = produce(document, lambda: _read(work), steps, [target], title=title(work.steps), verify=work.verify)
     last = done.results[-1]

@@ -36,6 +36,14 @@ def work(what: str) -> object:
         os._exit(3)
     elif what == "hang":
         time.sleep(60)
+    elif what == "hang at a stage":
+        guard.doing("looking", "part.step")
+        time.sleep(60)
+    elif what == "crash at a stage":
+        guard.doing("looking", "part.step")
+        os.kill(os.getpid(), signal.SIGSEGV)
+    elif what == "note":
+        guard.doing("looking", "part.step")
     elif what == "eat":
         eaten = []
         while True:

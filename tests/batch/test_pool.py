@@ -20,6 +20,8 @@ def test_bad_tasks_cost_themselves_alone():
         "kill": (CrashError, "killed"),
         "exit": (CrashError, "exit code 3"),
         "hang": (LimitError, "time limit of 2 s"),
+        "hang at a stage": (LimitError, "time limit of 2 s while looking 'part.step'"),
+        "crash at a stage": (CrashError, "(SIGSEGV) while looking 'part.step'"),
         "eat": (LimitError, "memory limit of 400 MB"),
         "wrong": (UsageError, "no"),
         "bug": (CrashError, "EOFError: of a file"),
@@ -30,13 +32,20 @@ def test_bad_tasks_cost_themselves_alone():
         good = [pool.submit(work, "good") for _ in range(20)]
         assert all(future.result() == "good" for future in good)
         for name, future in futures.items():
-            what = name.split()[0]
+            what = name.rpartition(" ")[0]
             if what in bad:
                 kind, text = bad[what]
                 error = future.exception()
                 assert isinstance(error, kind) and text in str(error), what
             else:
                 assert future.result() == what
+
+
+def test_what_one_task_was_at_is_not_said_of_the_next():
+    with Pool(1, Limits(1.0)) as pool:
+        assert pool.submit(work, "note").result() == "note"
+        error = pool.submit(work, "hang").exception()
+    assert str(error).startswith("not done within the time limit of 1 s;")
 
 
 def test_what_a_child_of_a_worker_holds_counts():

@@ -180,7 +180,7 @@ def test_what_a_child_sends_is_data(tmp_path):
         with pytest.raises(MracadError, match="internal error") as error:
             guard.run(work, object)
         assert error.value.code == Code.INTERNAL and not list(tmp_path.iterdir())
-    layer = Layer("mesh", "fail", "text", (Finding("text", "rule", (1, 2), None, (1.0, 2.0, 3.0)),), {"a": {"b": 1}})
+    layer = Layer("mesh", "fail", "text", (Finding("rule", (1, 2), None, (1.0, 2.0, 3.0)),), {"a": {"b": 1}})
     assert guard.run(lambda: layer, Layer) == layer
 
 
