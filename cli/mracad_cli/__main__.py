@@ -81,6 +81,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         failure = error
     except KeyboardInterrupt:
         failure = MracadError("interrupted", "nothing was written", Code.INTERRUPTED)
+    except MemoryError as error:
+        failure = internal(error)
     from mracad_cli.render import json_text, say
 
     if "--json" in arguments:
@@ -120,8 +122,8 @@ def _done(arguments: list[str]) -> int:
     except BrokenPipeError as error:
         raise _unread() from error
     except Exception as error:
-        if "--debug" in arguments or isinstance(error, MracadError):
-            raise
+        if "--debug" in arguments or isinstance(error, MracadError | MemoryError):
+            raise  # a limit of memory is known to the guard
         if not type(error).__module__.startswith("OCP"):
             raise internal(error) from error
         what = f"{type(error).__name__}: {error}"
