@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, BinaryIO
 
 from mracad import guard, review
 from mracad.audit import accept
-from mracad.audit.accept import Facts, Fault, ReadBack, Reason, Slack
+from mracad.audit.accept import Slack
+from mracad.audit.faults import Facts, Fault, ReadBack, Reason
 from mracad.errors import EditError, FileError
 from mracad.formats import FORMATS, by_content
 from mracad.job import Judged, Original, Progress, Report, play

@@ -16,8 +16,8 @@ import msgspec
 from mracad.options import Selection
 
 if TYPE_CHECKING:
-    from mracad.audit.accept import Fault, ReadBack
     from mracad.audit.continuity import SeamMeasure, SeamSummary
+    from mracad.audit.faults import Fault, ReadBack
     from mracad.constraint.seam import Treatment
     from mracad.edit.result import FaceOutcome
     from mracad.job import Judged, Report

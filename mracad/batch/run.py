@@ -15,7 +15,7 @@ from typing import Any, Literal, Protocol
 
 from msgspec import structs
 
-from mracad.audit.accept import ReadBack
+from mracad.audit.faults import ReadBack
 from mracad.batch.cluster import lost
 from mracad.batch.manifest import Manifest, digest
 from mracad.batch.work import Product, Work, do

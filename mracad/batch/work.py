@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mracad import guard
-from mracad.audit.accept import ReadBack
+from mracad.audit.faults import ReadBack
 from mracad.errors import Code, MracadError
 from mracad.options import STEPS
 from mracad.recipe import Step, title, versions

@@ -16,8 +16,9 @@ from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS, TopoDS_Shape
 
 from mracad.audit import accept
-from mracad.audit.accept import Reason, Slack, judge
+from mracad.audit.accept import Slack, judge
 from mracad.audit.continuity import seams
+from mracad.audit.faults import Fault, Reason
 from mracad.occ import brep
 from mracad.occ.document import Document
 from mracad.occ.facts import facts
@@ -169,12 +170,12 @@ def test_faces_are_told_whatever_their_numbers() -> None:
 
 def test_faults_are_put_down_to_edited_faces() -> None:
     memory = facts(document(body().wrapped))
-    fault = accept.Fault(Reason.GAP, (0, 1))
+    fault = Fault(Reason.GAP, (0, 1))
     assert accept.spoilt([fault], {1, 2}, memory) == {1}
     far = replace(fault, faces=(0,))
     near = accept.spoilt([far], set(range(1, memory.count)), memory)
     assert near and near == {f for edge in memory.edges if 0 in edge.faces for f in edge.faces} - {0}
-    assert accept.spoilt([accept.Fault(Reason.SOLIDS)], {3, 4}, memory) == {3, 4}
+    assert accept.spoilt([Fault(Reason.SOLIDS)], {3, 4}, memory) == {3, 4}
 
 
 @pytest.mark.parametrize("height", [2e-3, 1.0])

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from mracad import guard, job, produce
-from mracad.audit.accept import Fault, ReadBack, Reason
+from mracad.audit.faults import Fault, ReadBack, Reason
 from mracad.edit import group as module
 from mracad.edit.group import Group
 from mracad.edit.result import Edit, FaceOutcome
