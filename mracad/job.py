@@ -289,8 +289,13 @@ def _refuse_if_stuck(model: Model, result: Edit) -> None:
     stuck = result.faces("stuck")
     if stuck and not result.faces("edited"):
         names = " ".join(f"#{o.face + 1}" for o in stuck[:6]) + (" …" if len(stuck) > 6 else "")
+        what = (
+            "one face has detail to remove and cannot"
+            if len(stuck) == 1
+            else f"{len(stuck)} faces have detail to remove and none can"
+        )
         raise EditError(
-            f"{model.name}: {len(stuck)} faces have detail to remove and none can move ({names}: {stuck[0].reason})",
+            f"{model.name}: {what} move ({names}: {stuck[0].reason})",
             "try --refine, --keep g0 or a smaller scale",
         )
 

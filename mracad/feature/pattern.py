@@ -113,7 +113,8 @@ def along(ground: Ground, text: str) -> list[Place]:
     number = whole(name.strip().removeprefix("edge#").removeprefix("#")) or 0
     model = ground.model
     if not 1 <= number <= len(model.edges):
-        raise UsageError(f"along: {name!r}: the model has edges edge#1 to edge#{len(model.edges)}", ALONG)
+        known = f"edges edge#1 to edge#{len(model.edges)}" if model.edges else "no edges"
+        raise UsageError(f"along: {name!r}: the model has {known}", ALONG)
     first, comma, last = rest.partition(",")
     count = _counted(first.strip(), f"along: {text!r}", ALONG)
     offset = numbers(last, "along", ALONG, (1,))[0] if comma else 0.0
