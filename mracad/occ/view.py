@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container, Iterable, Iterator
+from collections.abc import Container, Iterable, Iterator
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 from OCP.BRep import BRep_Tool
 from OCP.BRepAdaptor import BRepAdaptor_Curve, BRepAdaptor_Surface
-from OCP.Geom import Geom_Plane, Geom_Surface
+from OCP.Geom import Geom_Surface
 from OCP.Geom2d import Geom2d_Curve, Geom2d_Line
-from OCP.GeomAbs import GeomAbs_Line
-from OCP.gp import gp_Pnt, gp_Vec
+from OCP.GeomAbs import GeomAbs_Line, GeomAbs_Plane, GeomAbs_SurfaceType
+from OCP.gp import gp_Ax3, gp_Pnt, gp_Vec
 from OCP.ShapeFix import ShapeFix_Edge
 from OCP.TopAbs import TopAbs_FORWARD, TopAbs_REVERSED
 from OCP.TopLoc import TopLoc_Location
@@ -210,25 +210,27 @@ def _edges(document: Document, found: _Found, edges: Container[int] | None) -> I
     by_edge: list[list[_Use]] = [[] for _ in document.edges]
     for use in found.uses:
         by_edge[use.edge].append(use)
-    walls = {use.face: _wall(found, use.face) for use in found.uses if found.surface_of[use.face] is None}
+    seen = [edges is None or index in edges for index in range(len(by_edge))]
+    lost = [BRep_Tool.Degenerated_s(edge) for edge in document.edges]
+    along = [
+        _along(edge) if shown and not gone else (_NONE, _NONE)
+        for edge, shown, gone in zip(document.edges, seen, lost, strict=True)
+    ]
+    fixed = [use for use in found.uses if found.surface_of[use.face] is None and seen[use.edge] and not lost[use.edge]]
+    beside = _beside(found, fixed, along)
     for index, (edge, uses) in enumerate(zip(document.edges, by_edge, strict=True)):
-        if edges is not None and index not in edges:
-            unseen = tuple(Side(use.face, points=_NONE, normals=_NONE) for use in uses)
-            yield Edge(index, _NONE, _NONE, unseen, BRep_Tool.Tolerance_s(edge), True, part_of[index])
-            continue
-        degenerate = BRep_Tool.Degenerated_s(edge)
-        points, tangents = (_NONE, _NONE) if degenerate else _along(edge)
+        points, tangents = along[index]
         sides = []
         for use in uses:
-            if use.face not in walls:
-                sides.append(Side(use.face, uv=_parameters(use)))
-            elif degenerate:
+            if not seen[index] or (lost[index] and found.surface_of[use.face] is None):
                 sides.append(Side(use.face, points=_NONE, normals=_NONE))
-            else:
-                feet, normals, bends = walls[use.face](use, points, tangents)
+            elif found.surface_of[use.face] is None:
+                feet, normals, bends = beside[id(use)]
                 sides.append(Side(use.face, points=feet, normals=normals, curvatures=bends))
+            else:
+                sides.append(Side(use.face, uv=_parameters(use)))
         yield Edge(
-            index, points, tangents, tuple(sides), BRep_Tool.Tolerance_s(edge), degenerate,
+            index, points, tangents, tuple(sides), BRep_Tool.Tolerance_s(edge), lost[index] or not seen[index],
             part_of[index],
         )  # fmt: skip
 
@@ -251,34 +253,79 @@ def _along(edge: TopoDS_Edge) -> tuple[Array, Array]:
     return table[:, :3], _unit(table[:, 3:])
 
 
-def _wall(found: _Found, index: int) -> Callable[[_Use, Array, Array], tuple[Array, Array, Array]]:
-    """How a face that does not move gives its points, outward normals and curvatures across an edge."""
-    face = found.faces[index]
-    sign = -1.0 if face.Orientation() == TopAbs_REVERSED else 1.0
-    surface = BRepAdaptor_Surface(face, False)
-    if isinstance(found.grounds[index], Geom_Plane):
-        plane = surface.Plane()
-        origin = np.array(plane.Location().Coord())
-        normal = np.array(plane.Axis().Direction().Coord()) * (sign if plane.Direct() else -sign)
-        return lambda use, points, tangents: (
-            points - ((points - origin) @ normal)[:, None] * normal,
-            np.tile(normal, (_SAMPLES, 1)),
-            np.zeros(_SAMPLES),
-        )
-
-    def on_surface(use: _Use, _: Array, tangents: Array) -> tuple[Array, Array, Array]:
-        point, *derivatives = gp_Pnt(), *(gp_Vec() for _ in range(5))
-        du, dv, duu, dvv, duv = derivatives
-        rows = []
-        for u, v in _parameters(use).tolist():
-            surface.D2(u, v, point, du, dv, duu, dvv, duv)
-            rows.append(point.Coord() + du.Coord() + dv.Coord() + duu.Coord() + duv.Coord() + dvv.Coord())
-        feet, su, sv, *second = np.array(rows).reshape(-1, 6, 3).swapaxes(0, 1)
+def _beside(found: _Found, uses: list[_Use], along: list[tuple[Array, Array]]) -> dict[int, tuple[Array, Array, Array]]:
+    """Points, outward normals and curvatures across an edge of faces that do not move, by the ``id`` of their uses."""
+    sides: dict[int, tuple[Array, Array, Array]] = {}
+    grounds = {face: BRepAdaptor_Surface(found.faces[face], False) for face in {use.face for use in uses}}
+    signs = {face: -1.0 if found.faces[face].Orientation() == TopAbs_REVERSED else 1.0 for face in grounds}
+    bent, jets = [], []
+    for use in uses:
+        surface = grounds[use.face]
+        if surface.GetType() == GeomAbs_Plane:
+            plane, points = surface.Plane(), along[use.edge][0]
+            origin = np.array(plane.Location().Coord())
+            normal = np.array(plane.Axis().Direction().Coord()) * signs[use.face] * (1.0 if plane.Direct() else -1.0)
+            feet = points - ((points - origin) @ normal)[:, None] * normal
+            sides[id(use)] = feet, np.tile(normal, (_SAMPLES, 1)), np.zeros(_SAMPLES)
+        else:
+            bent.append(use)
+            jets.append(_jets(surface, _parameters(use)))
+    if bent:
+        feet, su, sv, *second = np.concatenate(jets).swapaxes(0, 1)
+        sign = np.repeat([signs[use.face] for use in bent], _SAMPLES)
         normals = _unit(cross(su, sv))
+        tangents = np.concatenate([along[use.edge][1] for use in bent])
         bends = sign * curvature((su, sv, *second), cross(normals, tangents))
-        return feet, sign * normals, bends
+        split = (np.split(values, len(bent)) for values in (feet, sign[:, None] * normals, bends))
+        sides |= {id(use): side for use, side in zip(bent, zip(*split, strict=True), strict=True)}
+    return sides
 
-    return on_surface
+
+def _jets(surface: BRepAdaptor_Surface, uv: Array) -> Array:
+    """Points and derivatives u, v, uu, uv, vv of a surface that is no plane, ``(k, 6, 3)``."""
+    round_about = _profile(surface, uv[:, 1])
+    if round_about is not None:
+        position, rho, zeta = round_about
+        x, y, z = (np.array(d.Coord()) for d in (position.XDirection(), position.YDirection(), position.Direction()))
+        cos, sin = np.cos(uv[:, 0])[:, None], np.sin(uv[:, 0])[:, None]
+        out, on = cos * x + sin * y, cos * y - sin * x
+        (r, dr, ddr), (h, dh, ddh) = (each[..., None] for each in rho), (each[..., None] for each in zeta)
+        origin = np.array(position.Location().Coord())
+        jet = origin + r * out + h * z, r * on, dr * out + dh * z, -r * out, dr * on, ddr * out + ddh * z
+        return np.stack(jet, axis=1)
+    point, *derivatives = gp_Pnt(), *(gp_Vec() for _ in range(5))
+    du, dv, duu, dvv, duv = derivatives
+    rows = []
+    for u, v in uv.tolist():
+        surface.D2(u, v, point, du, dv, duu, dvv, duv)
+        rows.append(point.Coord() + du.Coord() + dv.Coord() + duu.Coord() + duv.Coord() + dvv.Coord())
+    return np.array(rows).reshape(-1, 6, 3)
+
+
+def _profile(surface: BRepAdaptor_Surface, v: Array) -> tuple[gp_Ax3, Array, Array] | None:
+    """The frame of a surface that a line or circle draws round an axis, and that one's distance from the axis and its
+    height, with two derivatives each, ``(3, k)``; None for other surfaces."""
+    zero, one = np.zeros_like(v), np.ones_like(v)
+    cos, sin = np.cos(v), np.sin(v)
+    match surface.GetType():
+        case GeomAbs_SurfaceType.GeomAbs_Cylinder:
+            kind = surface.Cylinder()
+            rho, zeta = (kind.Radius() * one, zero, zero), (v, one, zero)
+        case GeomAbs_SurfaceType.GeomAbs_Cone:
+            kind = surface.Cone()
+            slope, rise = np.sin(kind.SemiAngle()), np.cos(kind.SemiAngle())
+            rho, zeta = (kind.RefRadius() + slope * v, slope * one, zero), (rise * v, rise * one, zero)
+        case GeomAbs_SurfaceType.GeomAbs_Sphere:
+            kind = surface.Sphere()
+            r = kind.Radius()
+            rho, zeta = (r * cos, -r * sin, -r * cos), (r * sin, r * cos, -r * sin)
+        case GeomAbs_SurfaceType.GeomAbs_Torus:
+            kind = surface.Torus()
+            r = kind.MinorRadius()
+            rho, zeta = (kind.MajorRadius() + r * cos, -r * sin, -r * cos), (r * sin, r * cos, -r * sin)
+        case _:
+            return None
+    return kind.Position(), np.array(rho), np.array(zeta)
 
 
 def _parameters(use: _Use) -> Array:
