@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import sys
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -202,3 +203,12 @@ def test_a_few_seams_measure_as_all_do() -> None:
         edge = every[number].edge
         (found,) = facts(part).probe.seams([edge])
         assert found == every[number]
+
+
+def test_a_few_edges_are_seen_without_the_true_box(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The box of a face needs all of its edges: of a few of them it came out without an end, and a sound file as
+    damaged."""
+    part = document(body().wrapped)
+    whole = view(part).diagonal
+    monkeypatch.setattr(sys.modules[view.__module__], "diagonal", lambda document, model: np.inf)
+    assert whole <= view(part, edges=frozenset({0})).diagonal <= 1.01 * whole
