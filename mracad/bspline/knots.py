@@ -219,6 +219,12 @@ class KnotVector:
             raise UsageError(f"a knot to be inserted lies outside ({low:g}, {high:g})")
         return KnotVector(np.sort(np.concatenate([self.knots, extra])), self.degree)
 
+    def beyond(self, coarse: KnotVector) -> Array:
+        """Knots, each as often as it is to be inserted, that refine ``coarse`` of the same degree to this."""
+        place = np.minimum(np.searchsorted(coarse.breaks, self.breaks), len(coarse.breaks) - 1)
+        there = np.where(coarse.breaks[place] == self.breaks, coarse.multiplicities[place], 0)
+        return np.repeat(self.breaks[1:-1], (self.multiplicities - there)[1:-1])
+
     def elevated(self, degree: int) -> KnotVector:
         """The least vector of that degree whose splines include all of this one's; itself where its degree suffices.
 

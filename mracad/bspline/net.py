@@ -151,7 +151,7 @@ class Net:
             out[:, block] = self._sums(poles, uv[block], derivatives, orders, side)
         stack = tuple(out)
         if self.weights is not None:
-            stack = _surface_quotient(stack)
+            stack = surface_quotient(stack)
         return stack if derivatives else stack[0]
 
     def _sums(
@@ -183,7 +183,7 @@ class Net:
         along_u = [rows.apply(poles, 0) for rows in in_u]
         stack = tuple(in_v[s].apply(along_u[r], 1) for total in range(derivatives + 1) for r, s in _pairs(total))
         if self.weights is not None:
-            stack = _surface_quotient(stack)
+            stack = surface_quotient(stack)
         return stack if derivatives else stack[0]
 
     def tangents(self, us: Array, vs: Array, axis: int) -> Array:
@@ -332,7 +332,7 @@ def _curve_quotient(stack: Array) -> Array:
     return top
 
 
-def _surface_quotient(stack: tuple[Array, ...]) -> tuple[Array, ...]:
+def surface_quotient(stack: tuple[Array, ...]) -> tuple[Array, ...]:
     """Derivatives of ``A / w`` from those of ``(A, w)``, up to the second."""
     top, w = [x[..., :-1] for x in stack], [x[..., -1:] for x in stack]
     s = top[0] / w[0]

@@ -146,7 +146,7 @@ def frozen_along(net: Net, curves: Sequence[Curve], region: Region, keep: str = 
             if np.ptp(at) <= 2 * ISO * local_span(knots, position):
                 rows = jet_support(knots, position, CONTINUITY[keep])
                 across = curve.poles[:, 1 - axis]
-                columns = _meeting((net.u, net.v)[1 - axis], float(across.min()), float(across.max()))
+                columns = meeting((net.u, net.v)[1 - axis], float(across.min()), float(across.max()))
                 frozen |= rows[:, None] & columns if axis == 0 else columns[:, None] & rows
                 break
         else:
@@ -209,7 +209,7 @@ def local_span(knots: KnotVector, at: float) -> float:
     return float((near[1:] - near[:-1]).min())
 
 
-def _meeting(knots: KnotVector, low: float, high: float) -> Array:
+def meeting(knots: KnotVector, low: float, high: float) -> Array:
     """Basis functions ``(n,)`` whose open support meets [low, high]."""
     start, end = knots.domain
     first = knots.knots[: knots.count]

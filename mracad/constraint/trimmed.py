@@ -19,14 +19,14 @@ from typing import Any
 
 import numpy as np
 
-from mracad.bspline.basis import jet
+from mracad.bspline.functions import functions
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.knots import Side as Limit
 from mracad.bspline.net import Curve, Net, curvature
 from mracad.constraint.frozen import CONTINUITY, local_span
 from mracad.constraint.region import meeting
 from mracad.constraint.seam import CREASE, UNEVEN, Seam, Wishes, between, from_inside, runs_back
-from mracad.model import Edge, Face, Model
+from mracad.model import Edge, Face, Model, Trim
 
 Array = np.ndarray
 
@@ -167,7 +167,7 @@ def trimmed(model: Model, edge: Edge, twin: Edge, wishes: Wishes) -> TrimmedSeam
         return "faces are placed differently"
     if faces[0] is faces[1]:
         return "a face that meets itself"
-    a, b = _trace(model, faces[0], edge), _trace(model, faces[1], twin)
+    a, b = (trace_of(model, face, _trim(face, each)) for face, each in zip(faces, (edge, twin), strict=True))
     if edge is not twin:
         fractions = _followed(model, a, b, runs_back(edge.points, twin.points))
         if (np.diff(fractions) * (fractions[-1] - fractions[0]) <= 0).any():
@@ -213,11 +213,16 @@ def _judged(model: Model, edge: int, twin: int, traces: tuple[Trace, Trace], wis
     return TrimmedSeam(edge, twin, *traces, order, opening, close, fit)
 
 
-def _trace(model: Model, face: Face, edge: Edge) -> Trace:
+def _trim(face: Face, edge: Edge) -> Trim:
+    return next(trim for trim in face.trims if trim.edge == edge.index)
+
+
+def trace_of(model: Model, face: Face, trim: Trim) -> Trace:
+    """The trace by which a face meets one of its edges."""
     assert face.surface is not None
     net = model.surfaces[face.surface].net
-    trace = Trace(face.index, face.surface, next(trim.curve for trim in face.trims if trim.edge == edge.index))
-    uv, limits = from_inside(face, net, edge.index, trace.places(_SHARES))
+    trace = Trace(face.index, face.surface, trim.curve)
+    uv, limits = from_inside(face, net, trim.edge, trace.places(_SHARES))
     lines = [axis for axis in (0, 1) if np.ptp(uv[:, axis]) == 0.0]
     return replace(trace, line=(lines[0], float(uv[0, lines[0]])) if lines else None, limits=limits)
 
@@ -311,19 +316,12 @@ def collocation(
     entries: list[tuple[Array, Array, Array]] = [(np.empty(0, int), np.empty(0, int), np.empty(0))]
     count = 0
     for seam, share in zip(seams, shares, strict=True):
-        ways = _ways(ground, seam, share)
+        ways = conormals(ground, seam.a, seam.b, share)
         for order in range(seam.order + 1):
             row = count + np.arange(len(share))
             for trace, (way, bend), sign in zip((seam.b, seam.a), ways[::-1], (1.0, -1.0), strict=True):
-                index, table = _jet(nets[trace.surface], trace, share, order)
-                x, y = way[:, :1], way[:, 1:]
-                if order == 0:
-                    value = table[0]
-                elif order == 1:
-                    value = x * table[1] + y * table[2]
-                else:
-                    value = x * x * table[3] + 2 * x * y * table[4] + y * y * table[5]
-                    value += bend[:, :1] * table[1] + bend[:, 1:] * table[2]
+                index, table = functions(nets[trace.surface], trace.places(share), order, trace.limits)
+                value = derived(table, way, bend, order)
                 where = np.repeat(row, index.shape[1])
                 entries.append((where, first[trace.surface] + index.ravel(), sign * value.ravel()))
             count += len(share)
@@ -331,13 +329,37 @@ def collocation(
     return csr_array((value, (row, column)), shape=(count, sum(sizes)))
 
 
-def _ways(ground: Mapping[int, Net], seam: TrimmedSeam, share: Array) -> list[tuple[Array, Array]]:
+def derived(table: Sequence[Array], way: Array, bend: Array, order: int) -> Array:
+    """D_c of an order of basis functions, and D_z with the second.
+
+    Parameters
+    ----------
+    table : sequence of ndarray (q, k)
+        As :func:`mracad.bspline.functions.functions` gives them.
+    way, bend : ndarray (q, 2)
+        c and z.
+    order : {0, 1, 2}
+
+    Returns
+    -------
+    ndarray (q, k)
+    """
+    x, y = way[:, :1], way[:, 1:]
+    if order == 0:
+        return table[0]
+    if order == 1:
+        return x * table[1] + y * table[2]
+    twice = x * x * table[3] + 2 * x * y * table[4] + y * y * table[5]
+    return twice + bend[:, :1] * table[1] + bend[:, 1:] * table[2]
+
+
+def conormals(ground: Mapping[int, Net], a: Trace, b: Trace, share: Array) -> list[tuple[Array, Array]]:
     """For a and b the directions c and z ``(q, 2)`` in the parameter planes."""
-    _, su, sv, *second = seam.a.on(ground[seam.a.surface], share, 2)
-    way = seam.a.way(share)
+    _, su, sv, *second = a.on(ground[a.surface], share, 2)
+    way = a.way(share)
     conormal = np.cross(np.cross(su, sv), su * way[:, :1] + sv * way[:, 1:])
     conormal /= np.maximum(np.linalg.norm(conormal, axis=1, keepdims=True), 1e-300)
-    _, tu, tv, *other = seam.b.on(ground[seam.b.surface], share, 2)
+    _, tu, tv, *other = b.on(ground[b.surface], share, 2)
     ways = _components(su, sv, conormal), _components(tu, tv, conormal)
     bends = [_twice(x, y) for x, y in zip(ways, (second, other), strict=True)]
     return [(ways[0], np.zeros_like(way)), (ways[1], _components(tu, tv, bends[0] - bends[1]))]
@@ -354,27 +376,3 @@ def _components(su: Array, sv: Array, vector: Array) -> Array:
     e, f, g, p, q = ((x * y).sum(axis=1) for x, y in ((su, su), (su, sv), (sv, sv), (su, vector), (sv, vector)))
     determinant = np.maximum(e * g - f * f, 1e-300)
     return np.stack([p * g - q * f, q * e - p * f], axis=1) / determinant[:, None]
-
-
-def _jet(net: Net, trace: Trace, share: Array, order: int) -> tuple[Array, list[Array]]:
-    """Control points ``(q, k)``, and the rational basis functions at fractions of a trace with their derivatives."""
-    uv = trace.places(share)
-    first_u, in_u = jet(net.u, uv[:, 0], range(order + 1), trace.limits[0])
-    first_v, in_v = jet(net.v, uv[:, 1], range(order + 1), trace.limits[1])
-    row = (first_u[:, None] + np.arange(net.u.degree + 1)) % net.u.count
-    column = (first_v[:, None] + np.arange(net.v.degree + 1)) % net.v.count
-    index = (row[:, :, None] * net.v.count + column[:, None, :]).reshape(len(uv), -1)
-    table = [
-        (in_u[:, i, :, None] * in_v[:, j, None, :]).reshape(len(uv), -1)
-        for i, j in ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))[: (1, 3, 6)[order]]
-    ]
-    if net.weights is None:
-        return index, table
-    weights = net.weights.ravel()[index]
-    top = [value * weights for value in table]
-    w = [value.sum(axis=1, keepdims=True) for value in top]
-    found = [top[0] / w[0]]
-    found += [(t - x * found[0]) / w[0] for t, x in zip(top[1:3], w[1:3], strict=True)]
-    for t, x, (i, j) in zip(top[3:], w[3:], ((1, 1), (1, 2), (2, 2)), strict=False):
-        found.append((t - w[i] * found[j] - w[j] * found[i] - x * found[0]) / w[0])
-    return index, found
