@@ -1,0 +1,166 @@
+"""Conditions along seams, as rows on the control points of a problem.
+
+A seam along knot lines of both surfaces, whose degrees and knots along it are made the same, exactly, keeps on a
+displacement δ, at the Greville points of the splines along it,
+
+    G0   δ_b = δ_a,   G1   ∂_n δ_b = a ∂_n δ_a + b ∂_t δ_a,   G2   ∂_nn δ_b = a² ∂_nn δ_a + r ∂_n δ_a + s ∂_t δ_a
+
+(a, b, r, s of the input's joint: :class:`mracad.constraint.seam.Joint`).  As many conditions as the space has functions
+are exact where the joint's coefficients are constant, and never lock where they vary.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from mracad.bspline.functions import functions
+from mracad.bspline.knots import KnotVector
+from mracad.bspline.net import Net
+from mracad.constraint.seam import Border, Joint, Seam
+
+Array = np.ndarray
+
+SAME = 1e-9
+"""Fraction of a seam within which knots of its two sides are the same."""
+
+
+def laid_out(nets: Mapping[int, Net]) -> tuple[dict[int, int], int]:
+    """Where the control points of each net begin when all are laid out one after another, and how many there are."""
+    ends = np.cumsum([0, *(net.u.count * net.v.count for net in nets.values())]).tolist()
+    return dict(zip(nets, ends[:-1], strict=True)), ends[-1]
+
+
+def matched(nets: Mapping[int, Net], seams: Sequence[Seam]) -> dict[int, Net]:
+    """The nets with the degrees and the knots of their neighbours along seams, exactly.
+
+    Both sides of every seam then have the same splines along it.
+    """
+    result = _elevated(nets, seams)
+    for _ in nets:  # what one needs is handed on from seam to seam
+        wanted: dict[int, tuple[list[float], list[float]]] = {i: ([], []) for i in result}
+        for seam in seams:
+            a, b = (_inner(result, border) for border in (seam.a, seam.b))
+            for border, own, other in ((seam.a, a, b), (seam.b, b, a)):
+                for share, count in other.items():
+                    have = max((n for x, n in own.items() if abs(x - share) <= SAME), default=0)
+                    at = border.start + share * (border.stop - border.start)
+                    wanted[border.surface][1 - border.axis].extend([_near(result, border, at)] * (count - have))
+        if not any(u or v for u, v in wanted.values()):
+            break
+        for i, new in wanted.items():
+            result[i] = result[i].refined(*(_most(each) for each in new))
+    return result
+
+
+def _elevated(nets: Mapping[int, Net], seams: Sequence[Seam]) -> dict[int, Net]:
+    """The nets with the highest degree of those that seams join along them."""
+    degrees = {(i, axis): knots.degree for i, net in nets.items() for axis, knots in enumerate((net.u, net.v))}
+    sides = [[(border.surface, 1 - border.axis) for border in (seam.a, seam.b)] for seam in seams]
+    for _ in nets:
+        for pair in sides:
+            degrees |= dict.fromkeys(pair, max(degrees[each] for each in pair))
+    return {i: net.over(net.u.elevated(degrees[i, 0]), net.v.elevated(degrees[i, 1])) for i, net in nets.items()}
+
+
+def _inner(nets: Mapping[int, Net], border: Border) -> dict[float, int]:
+    """Fractions of a seam at which a border has knots, and their multiplicities."""
+    knots = _along(nets[border.surface], border)
+    breaks, counts = knots.breaks, knots.multiplicities
+    if knots.periodic:
+        turns = knots.period * np.arange(-2, 3)
+        breaks, counts = (breaks[:-1] + turns[:, None]).ravel(), np.tile(counts[:-1], len(turns))
+    share = (breaks - border.start) / (border.stop - border.start)
+    order = np.argsort(share)
+    return {float(x): int(n) for x, n in zip(share[order], counts[order], strict=True) if SAME < x < 1 - SAME}
+
+
+def _near(nets: Mapping[int, Net], border: Border, at: float) -> float:
+    """A knot of the border that is as good as the same as ``at``, or itself."""
+    knots = _along(nets[border.surface], border)
+    breaks = knots.breaks
+    if knots.periodic:
+        at = float(knots.wrap(np.array([at]))[0])
+    nearest = float(breaks[np.argmin(np.abs(breaks - at))])
+    return nearest if abs(nearest - at) <= SAME * abs(border.stop - border.start) else at
+
+
+def _most(values: Iterable[float]) -> Array:
+    """Knots wanted by several seams, those within rounding of each other once."""
+    result: list[float] = []
+    for value in sorted(values):
+        if not result or value - result[-1] > 1e-12 * max(1.0, abs(value)):
+            result.append(value)
+    return np.array(result)
+
+
+def _along(net: Net, border: Border) -> KnotVector:
+    return (net.u, net.v)[1 - border.axis]
+
+
+def rows(nets: Mapping[int, Net], seams: Sequence[Seam]) -> tuple[Any, Array]:
+    """The conditions of seams on displacements of surfaces.
+
+    Parameters
+    ----------
+    nets : mapping of int to Net
+        Spaces of the displacements by surface, with the same knots on both sides of every seam (:func:`matched`); their
+        control points are laid out one after another.
+    seams : sequence of Seam
+
+    Returns
+    -------
+    scipy.sparse.csr_array (conditions, points)
+    ndarray of bool (conditions,)
+        Those of which the input's defect is to be mended.
+    """
+    from scipy.sparse import csr_array
+
+    first, total = laid_out(nets)
+    entries: list[tuple[Array, Array, Array]] = [(np.empty(0, int), np.empty(0, int), np.empty(0))]
+    count, mended = 0, [np.empty(0, bool)]
+    for seam in seams:
+        share = _sites(nets, seam)
+        sides = [(_sided(nets[b.surface], b, share), first[b.surface]) for b in (seam.b, seam.a)]
+        for order in range(seam.joint.order + 1):
+            row = count + np.arange(len(share))
+            for ((index, _), begin), value in zip(sides, _terms(seam.joint, order, share, sides), strict=True):
+                entries.append((np.repeat(row, index.shape[1]), begin + index.ravel(), value.ravel()))
+            mended.append(np.full(len(share), (seam.joint.close, seam.joint.fit, False)[order]))
+            count += len(share)
+    row, column, value = (np.concatenate(part) for part in zip(*entries, strict=True))
+    return csr_array((value, (row, column)), shape=(count, total)), np.concatenate(mended)
+
+
+def _terms(joint: Joint, order: int, share: Array, sides: Sequence[Any]) -> tuple[Array, Array]:
+    """What a condition takes of side b and of side a."""
+    b, a = (table for (_, table), _ in sides)
+    if order == 0:
+        return b["s"], -a["s"]
+    if order == 1:
+        return b["n"], -(_law(joint.across, share) * a["n"] + _law(joint.along, share) * a["t"])
+    return b["nn"], -(joint.across[0] ** 2 * a["nn"] + joint.bend * a["n"] + joint.shear * a["t"])
+
+
+def _law(coefficients: Array, share: Array) -> Array:
+    """A polynomial of the joint at fractions of the seam, ``(q, 1)``."""
+    return np.polynomial.polynomial.polyval(share, np.append(coefficients, 0.0))[:, None]
+
+
+def _sites(nets: Mapping[int, Net], seam: Seam) -> Array:
+    """Fractions of the seam at which conditions are asked: the Greville points of the larger space on it."""
+    found = []
+    for border in (seam.a, seam.b):
+        degree, inner = _along(nets[border.surface], border).degree, _inner(nets, border)
+        counts = [degree + 1, *(min(n, degree) for n in inner.values()), degree + 1]
+        found.append(KnotVector.from_multiplicities([0.0, *inner, 1.0], counts, degree).greville())
+    return max(found, key=len)
+
+
+def _sided(net: Net, border: Border, share: Array) -> tuple[Array, dict[str, Array]]:
+    """Control points ``(q, k)`` and the rational functions with derivatives n across, t along at fractions."""
+    index, (s, u, v, uu, _, vv) = functions(net, border.places(share), 2, border.limits("right"))
+    n, t, nn = (u, v, uu) if border.axis == 0 else (v, u, vv)
+    return index, {"s": s, "n": n, "t": t * (border.stop - border.start), "nn": nn}

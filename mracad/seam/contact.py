@@ -1,0 +1,144 @@
+"""Contacts along trim curves: seams whose two sides have no common spline space, and rims held at what stays.
+
+They cannot be kept exactly without freezing all that meets the curve.  A displacement δ is instead asked, at Gauss
+points of every piece between knot lines of either side,
+
+    G0   δ_b = δ_a,      G1   D_c δ_b = D_c δ_a,      G2   D_c² δ_b + D_z δ_b = D_c² δ_a
+
+(δ_b = 0 at a rim; directions as in :mod:`mracad.constraint.trimmed`), weighted with the inverse square of what each may
+be off: where the net can, it does, and where it cannot δ gives way.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from mracad.bspline.functions import functions
+from mracad.bspline.net import Net
+from mracad.constraint.trimmed import Trace, conormals, crossings, derived
+from mracad.seam.conditions import laid_out
+
+Array = np.ndarray
+
+GAUSS = 5
+"""Conditions in each piece of a contact between knot lines."""
+
+_EVENLY = np.linspace(0.0, 1.0, 129)
+
+
+@dataclass(frozen=True, eq=False)
+class Contact:
+    """A trace of a surface that moves, and that of the one that moves with it, or None at a rim.
+
+    Attributes
+    ----------
+    a : Trace
+    b : Trace or None
+    order : {0, 1, 2}
+        Derivatives across the trace that are kept.
+    close, fit : bool
+        Whether the gap and the tilt of the input are pulled shut.
+    """
+
+    a: Trace
+    b: Trace | None
+    order: int
+    close: bool = False
+    fit: bool = False
+
+    @property
+    def surfaces(self) -> set[int]:
+        """The one or two that move."""
+        return {trace.surface for trace in (self.a, self.b) if trace is not None}
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """Conditions of contacts on the control points of nets laid out one after another.
+
+    Attributes
+    ----------
+    matrix : scipy.sparse.csr_array (conditions, points)
+        C.
+    order : ndarray (conditions,) of int
+        0 position (mm), 1 slope, 2 curvature (1/mm).
+    width : ndarray (conditions,)
+        Length of the contact that each stands for, mm.
+    owner : ndarray (conditions,) of int
+        Number of its contact.
+    """
+
+    matrix: Any
+    order: Array
+    width: Array
+    owner: Array
+
+    def form(self, tolerances: Sequence[float]) -> Any:
+        """``Cᵀ W C``, ``(points, points)``, W the widths over the squared tolerances of each order."""
+        scaled = self.matrix.multiply(np.sqrt(self._weights(tolerances))[:, None]).tocsr()
+        return scaled.T @ scaled
+
+    def pull(self, wanted: Array, tolerances: Sequence[float]) -> Array:
+        """``Cᵀ W wanted``, ``(points, 3)``: what draws the contacts to values ``(conditions, 3)``."""
+        return np.asarray(self.matrix.T @ (self._weights(tolerances)[:, None] * wanted))
+
+    def off(self, delta: Array, wanted: Array, tolerances: Sequence[float]) -> Array:
+        """How far each contact is off what is wanted, as a multiple of its tolerances."""
+        ratio = np.linalg.norm(self.matrix @ delta - wanted, axis=1) / np.asarray(tolerances)[self.order]
+        worst = np.zeros(int(self.owner.max(initial=-1)) + 1)
+        np.maximum.at(worst, self.owner, ratio)
+        return worst
+
+    def _weights(self, tolerances: Sequence[float]) -> Array:
+        return self.width / np.asarray(tolerances)[self.order] ** 2
+
+
+def rows(nets: Mapping[int, Net], contacts: Sequence[Contact]) -> Rows:
+    """The conditions of contacts on displacements of surfaces.
+
+    Parameters
+    ----------
+    nets : mapping of int to Net
+        The surfaces undisplaced, in the spaces of their displacements, by index; their control points are laid out one
+        after another.
+    contacts : sequence of Contact
+    """
+    from scipy.sparse import csr_array
+
+    first, total = laid_out(nets)
+    places, columns, values = [np.empty(0, int)], [np.empty(0, int)], [np.empty(0)]
+    orders, widths, owners, count = [np.empty(0, int)], [np.empty(0)], [np.empty(0, int)], 0
+    for number, contact in enumerate(contacts):
+        sides = [contact.a] + ([contact.b] if contact.b else [])
+        share, part = _sites(sides, nets)
+        ways = conormals(nets, contact.a, contact.b or contact.a, share)
+        curve = nets[contact.a.surface].evaluate(contact.a.places(_EVENLY))
+        width = np.linalg.norm(np.diff(curve, axis=0), axis=1).sum() * part
+        for order in range(contact.order + 1):
+            row = count + np.arange(len(share))
+            for side, (way, bend), sign in zip(sides, ways, (1.0, -1.0), strict=False):
+                index, table = functions(nets[side.surface], side.places(share), order, side.limits)
+                places.append(np.repeat(row, index.shape[1]))
+                columns.append(first[side.surface] + index.ravel())
+                values.append(sign * derived(table, way, bend, order).ravel())
+            orders.append(np.full(len(share), order))
+            widths.append(width)
+            owners.append(np.full(len(share), number))
+            count += len(share)
+    matrix = csr_array(
+        (np.concatenate(values), (np.concatenate(places), np.concatenate(columns))), shape=(count, total)
+    )
+    return Rows(matrix, np.concatenate(orders), np.concatenate(widths), np.concatenate(owners))
+
+
+def _sites(sides: Sequence[Trace], nets: Mapping[int, Net]) -> tuple[Array, Array]:
+    """Gauss points of the pieces of a contact, fractions, and their shares of it."""
+    breaks = np.unique(np.concatenate([crossings(t, (nets[t.surface].u, nets[t.surface].v)) for t in sides]))
+    breaks = breaks[np.append(True, np.diff(breaks) > 1e-9)]
+    place, weight = np.polynomial.legendre.leggauss(GAUSS)
+    step = np.diff(breaks)[:, None]
+    return (breaks[:-1, None] + step * (place + 1) / 2).ravel(), (step * weight / 2).ravel()

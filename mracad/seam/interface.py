@@ -1,0 +1,202 @@
+"""What joins the surfaces that an edit may move, and what holds them.
+
+Edges between two faces that both move are exact seams, where both sides end there along parameter lines with a law
+between them, or contacts along trim curves; every other edge is a rim.  A seam keeps the continuity that it has, or
+that is asked for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from mracad.bspline.net import Net, cross
+from mracad.constraint.frozen import meeting, reached
+from mracad.constraint.seam import CREASE, TRIMMED, UNEVEN, Border, Seam, Wishes, seams
+from mracad.constraint.trimmed import TrimmedSeam, beside, trace_of, trimmed
+from mracad.model import Edge, Face, Model, Side, Trim
+from mracad.seam.contact import Contact
+from mracad.seam.space import line
+
+Array = np.ndarray
+
+RIM_POINTS = 65
+"""Points of a boundary curve from which distances are taken."""
+
+END = 1e-9
+"""Fraction of the domain within which a parameter line is its end."""
+
+
+@dataclass(frozen=True, eq=False)
+class Joints:
+    """The edges of the faces that an edit may move.
+
+    Attributes
+    ----------
+    exact : tuple of Seam
+    loose : tuple of TrimmedSeam
+        Seams kept to a tolerance.
+    closing : mapping of int to (Border, Border)
+        Closing edges that a periodic space keeps smooth by itself.
+    frozen : mapping of int to str
+        Edges that stay, and why.
+    """
+
+    exact: tuple[Seam, ...] = ()
+    loose: tuple[TrimmedSeam, ...] = ()
+    closing: Mapping[int, tuple[Border, Border]] = field(default_factory=dict)
+    frozen: Mapping[int, str] = field(default_factory=dict)
+
+    @property
+    def moving(self) -> frozenset[int]:
+        """Edges that move."""
+        exact = (edge for seam in self.exact for edge in (seam.edge, seam.twin))
+        loose = (edge for seam in self.loose for edge in (seam.edge, seam.twin))
+        return frozenset(self.closing).union(exact, loose)
+
+    def pairs(self) -> Iterator[tuple[int, int]]:
+        """Surfaces that a seam joins."""
+        yield from ((seam.a.surface, seam.b.surface) for seam in self.exact)
+        yield from ((seam.a.surface, seam.b.surface) for seam in self.loose)
+
+    def among(self, surfaces: Collection[int]) -> Joints:
+        """Those between some surfaces, all the others' rims."""
+        exact = tuple(s for s in self.exact if s.a.surface in surfaces and s.b.surface in surfaces)
+        loose = tuple(s for s in self.loose if s.a.surface in surfaces and s.b.surface in surfaces)
+        return replace(self, exact=exact, loose=loose)
+
+
+def joints(model: Model, movable: Collection[int], wishes: Wishes) -> Joints:
+    """The joints of faces that may move."""
+    known = seams(model, movable, wishes)
+    exact, frozen, loose = list(known.found), dict(known.frozen), []
+    for index, reason in known.frozen.items():
+        edge = model.edges[index]
+        twin = model.edges[known.twins.get(index, index)]
+        if reason in (TRIMMED, UNEVEN) and len({edge.index, twin.index}) + len(edge.sides) == 3:
+            found = trimmed(model, edge, twin, wishes)
+            if isinstance(found, TrimmedSeam):
+                loose.append(found)
+                frozen.pop(index)
+                frozen.pop(twin.index, None)
+            else:
+                frozen[index] = found
+    for seam in [seam for seam in exact if seam.loose and seam.joint.order == 0]:
+        rest = beside(model, seam, wishes)
+        if isinstance(rest, TrimmedSeam):
+            loose.append(rest)
+        else:
+            exact.remove(seam)
+            frozen |= dict.fromkeys((seam.edge, seam.twin), rest)
+    return Joints(tuple(exact), tuple(loose), known.closing, frozen)
+
+
+def contact(seam: TrimmedSeam) -> Contact:
+    """A seam kept to a tolerance, as conditions see it."""
+    return Contact(seam.a, seam.b, seam.order, seam.close, seam.fit)
+
+
+def rims(
+    model: Model, net: Net, faces: Iterable[Face], movable: Collection[int], moving: Collection[int], keep: int
+) -> tuple[Array, list[Contact]]:
+    """What holds a surface: control points that stay, and contacts with what stays.
+
+    Parameters
+    ----------
+    model : Model
+    net : Net
+        The surface in the space of its displacement.
+    faces : iterable of Face
+        All faces on it.
+    movable, moving : collection of int
+        Faces and edges that may move.
+    keep : {0, 1, 2}
+        Derivatives that smooth rims keep.
+
+    Returns
+    -------
+    held : ndarray of bool (nu, nv)
+    contacts : list of Contact
+    """
+    held, contacts = np.zeros(net.poles.shape[:2], bool), []
+    for face in faces:
+        if face.index not in movable:
+            held |= reached(net, [face])[face.index]
+            continue
+        for trim in face.trims:
+            edge = model.edges[trim.edge]
+            if edge.index in moving:
+                continue
+            order = keep if smooth(model, edge) else 0
+            found = end(net, trim)
+            if found is not None:
+                held |= _rows(net, trim, *found, order)
+            elif not edge.degenerate:
+                contacts.append(Contact(trace_of(model, face, trim), None, order))
+    return held, contacts
+
+
+def away(model: Model, net: Net, faces: Iterable[Face], moving: Collection[int]) -> Array:
+    """Distance of a surface from the edges of faces on it that do not move.
+
+    Returns
+    -------
+    ndarray (nu, nv)
+        At the Greville points, mm; infinite where nothing holds it.
+    """
+    from scipy.spatial import KDTree
+
+    trims = [trim for face in faces for trim in face.trims if trim.edge not in moving]
+    if not trims:
+        return np.full(net.poles.shape[:2], np.inf)
+    curves = [trim.curve.evaluate(np.linspace(*trim.curve.knots.domain, RIM_POINTS))[0] for trim in trims]
+    points = np.asarray(net.grid(net.u.greville(), net.v.greville())).reshape(-1, 3)
+    rim = np.asarray(net.evaluate(np.concatenate(curves)))
+    return np.asarray(KDTree(rim).query(points)[0]).reshape(net.poles.shape[:2])
+
+
+def end(net: Net, trim: Trim) -> tuple[int, int] | None:
+    """The axis across a boundary curve and the end (0, −1) of a clamped net on which it lies, if it does."""
+    axis = line(net, trim)
+    if axis is None:
+        return None
+    knots = (net.u, net.v)[axis]
+    if knots.periodic:
+        return None
+    at, (low, high) = float(trim.curve.poles[:, axis].mean()), knots.domain
+    for place, limit, multiplicity in ((0, low, knots.multiplicities[0]), (-1, high, knots.multiplicities[-1])):
+        if abs(at - limit) <= END * (high - low) and multiplicity == knots.degree + 1:
+            return axis, place
+    return None
+
+
+def _rows(net: Net, trim: Trim, axis: int, place: int, order: int) -> Array:
+    """Control points on which the derivatives up to an order along a boundary curve at an end depend."""
+    across = np.zeros(net.poles.shape[axis], bool)
+    across[: order + 1] = place == 0
+    across[len(across) - order - 1 :] |= place == -1
+    along = trim.curve.poles[:, 1 - axis]
+    columns = meeting((net.u, net.v)[1 - axis], float(along.min()), float(along.max()))
+    return across[:, None] & columns if axis == 0 else columns[:, None] & across
+
+
+def smooth(model: Model, edge: Edge) -> bool:
+    """Whether two faces meet at an edge without a crease."""
+    if edge.degenerate or len(edge.sides) != 2 or not len(edge.points):
+        return False
+    one, other = (_normals(model, side) for side in edge.sides)
+    angle = np.arctan2(np.linalg.norm(cross(one, other), axis=1), (one * other).sum(axis=1))
+    return bool(np.nanmax(angle, initial=0.0) <= CREASE)
+
+
+def _normals(model: Model, side: Side) -> Array:
+    """Outward normals along an edge."""
+    if side.uv is None:
+        assert side.normals is not None
+        return side.normals
+    face = model.faces[side.face]
+    assert face.surface is not None
+    found = model.surfaces[face.surface].net.normals(side.uv) @ face.frame[:3, :3].T
+    return -found if face.reversed else found

@@ -1,0 +1,70 @@
+"""The surface in whose metric displacements are measured: a smoothed copy of the edited one.
+
+In a surface's own metric its second derivatives are purely normal, so that noise along the surface is invisible and
+the noise of its Christoffel symbols is differentiated.  Two passes: the net of mean chord lengths, a plane; in its
+metric, the surface smoothed at a few wavelengths.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mracad.bspline.net import Net
+from mracad.constraint.crease import crease_lines
+from mracad.inspect.cells import Quadrature
+from mracad.seam.energy import Forms, forms
+from mracad.seam.solve import Problem, Space
+
+Array = np.ndarray
+
+SMOOTHER = 2.5
+"""The metric is smoothed at so many times the wavelength of the edit."""
+
+BARELY = 1e-12
+"""Share of the largest mass below which a control point does not reach into a face."""
+
+
+def planar(net: Net) -> Net:
+    """A plane with the mean chord lengths of a surface along its parameters."""
+    columns = np.linalg.norm(np.diff(net.poles, axis=0), axis=2).mean(axis=1)
+    rows = np.linalg.norm(np.diff(net.poles, axis=1), axis=2).mean(axis=0)
+    points = np.zeros(net.poles.shape)
+    points[..., 0] = _walked(net.u.count, columns)[:, None]
+    points[..., 1] = _walked(net.v.count, rows)
+    return Net(net.u, net.v, points)
+
+
+def _walked(count: int, steps: Array) -> Array:
+    """Where steps lead from 0, ``(count,)``; none of them is nothing."""
+    steps = np.maximum(steps, 1e-9 * steps.max(initial=1e-300))
+    return np.append(0.0, np.cumsum(steps))[:count]
+
+
+def seen(net: Net, masses: Forms) -> Array:
+    """Control points ``(nu, nv)`` that reach into the faces over which masses were taken."""
+    diagonal = masses.mass.diagonal()
+    return np.asarray(diagonal > BARELY * diagonal.max(initial=0.0)).reshape(net.poles.shape[:2])
+
+
+def creases(net: Net, points: Array) -> tuple[frozenset[float], frozenset[float]]:
+    """Crease lines of a surface in u and v, on which one of ``points`` (nu, nv) lies."""
+    return crease_lines(net, 0, points), crease_lines(net, 1, points)
+
+
+def smoothed(net: Net, rule: Quadrature, stiffness: float) -> Net:
+    """The surface smoothed by itself, in the metric of its mean chord lengths.
+
+    Parameters
+    ----------
+    net : Net
+    rule : Quadrature
+        Gauss points over its faces.
+    stiffness : float
+        ℓ⁴, mm⁴, of the filter of gain 1 / (1 + (ℓ ω)⁴).
+    """
+    flat = planar(net)
+    form = forms(net, flat, rule)
+    points = seen(net, form)
+    problem = Problem({0: Space(net, form, points, points)})
+    moved = net.poles + problem.faired(stiffness).reshape(net.poles.shape)
+    return Net(net.u, net.v, moved, net.weights)

@@ -1,0 +1,242 @@
+"""Conditions along seams on displacements that keep a joint, and on such that do not, against finite differences."""
+
+import numpy as np
+import pytest
+from scipy.sparse import eye_array
+
+from mracad.bspline.interpolate import interpolated
+from mracad.bspline.knots import KnotVector
+from mracad.bspline.net import Net
+from mracad.constraint.seam import Border, Joint, Seam
+from mracad.seam.conditions import laid_out, matched, rows
+from mracad.seam.solve import Constrained
+
+NONE = np.empty(0)
+
+
+def chart(place, degrees=(3, 3), spans=(3, 4)):
+    """A net over the unit square whose points are ``place(u, v)``, a polynomial in its space."""
+    u, v = (KnotVector.clamped(np.linspace(0, 1, n + 1) ** 1.3, d) for n, d in zip(spans, degrees, strict=True))
+    x, y = np.meshgrid(u.greville(), v.greville(), indexing="ij")
+    points = np.stack(np.broadcast_arrays(*place(x, y), 0.0), axis=-1)
+    return Net(u, v, interpolated(u, v, points))
+
+
+def turned(net, how):
+    """The net with its first or second parameter reversed (``u``, ``v``) and both swapped (``x``)."""
+    u, v, poles = net.u, net.v, net.poles
+    if "u" in how:
+        u, poles = KnotVector(1.0 - u.knots[::-1], u.degree), poles[::-1]
+    if "v" in how:
+        v, poles = KnotVector(1.0 - v.knots[::-1], v.degree), poles[:, ::-1]
+    return Net(v, u, poles.swapaxes(0, 1)) if "x" in how else Net(u, v, poles)
+
+
+def border(surface, low, how=""):
+    """The side u = 0 (``low``) or u = 1 of a chart, after turning it."""
+    at = float(low == ("u" in how))
+    start, stop = (1.0, 0.0) if "v" in how else (0.0, 1.0)
+    return Border(surface, surface, int("x" in how), at, "right" if at == 0.0 else "left", start, stop)
+
+
+def joined(a, b, joint):
+    return Seam(0, 0, a, b, joint, 0.0, 0.0)
+
+
+def field(net, function):
+    """Control points of ``function(x, y)`` on a chart."""
+    points = net.grid(net.u.greville(), net.v.greville())
+    return interpolated(net.u, net.v, function(points[..., 0], points[..., 1])[..., None]).reshape(-1, 1)
+
+
+LEFT = chart(lambda u, v: (u - 1, v))
+
+SMOOTH = (
+    lambda x, y: 1 + x - 2 * y,
+    lambda x, y: x**3 - x * y + y**2 * x - 3 * y**3,
+    lambda x, y: x**2 * y - x * y**2,
+)
+
+
+def across(sign, how):
+    """The joint's coefficients have the sign of the parameter across."""
+    return sign if "u" not in how else -sign
+
+
+@pytest.mark.parametrize("how", ["", "u", "v", "x", "uv", "uvx", "vx"])
+@pytest.mark.parametrize("degrees", [(3, 3), (5, 4)])
+def test_fields_that_are_smooth_across_the_seam_obey_up_to_the_second_order(how, degrees):
+    right = turned(chart(lambda u, v: (2 * u, v), degrees, (4, 3)), how)
+    joint = Joint(2, np.array([across(2.0, how)]), NONE)
+    seam = joined(border(0, False), border(1, True, how), joint)
+    nets = matched({0: LEFT, 1: right}, [seam])
+    form, mended = rows(nets, [seam])
+    assert not mended.any()
+    for function in SMOOTH:
+        delta = np.concatenate([field(net, function) for net in nets.values()])
+        assert np.abs(form @ delta).max() < 1e-11
+    third = form.shape[0] // 3
+    for power in range(3):  # a bend of each order on one side only
+        one = np.concatenate([0 * field(nets[0], SMOOTH[0]), field(nets[1], lambda x, y: x**power)])  # noqa: B023
+        broken = np.abs(form @ one).reshape(3, third).max(axis=1) > 1e-3
+        assert broken.tolist() == [order == power for order in range(3)]
+
+
+@pytest.mark.parametrize(
+    ("place", "laws"),
+    [
+        (lambda u, v: (u * (1 + v / 2), v), ([1.0, 0.5], NONE)),
+        (lambda u, v: (u, v + 0.3 * u), ([1.0], [0.3])),
+        (lambda u, v: (u, v + 0.3 * u * v), ([1.0], [0.0, 0.3])),
+    ],
+)
+def test_the_laws_of_a_joint_follow_its_parameters(place, laws):
+    seam = joined(border(0, False), border(1, True), Joint(1, *map(np.asarray, laws)))
+    nets = matched({0: LEFT, 1: chart(place, (6, 6))}, [seam])
+    for function in SMOOTH:
+        delta = np.concatenate([field(net, function) for net in nets.values()])
+        assert np.abs(rows(nets, [seam])[0] @ delta).max() < 1e-11
+
+
+def test_a_bend_and_a_shear_of_second_derivatives():
+    """x = u + r u² / 2, y = v + s u² / 2 has T_uu = S_uu + r S_u + s S_v on u = 0."""
+    right = chart(lambda u, v: (u + 0.4 * u**2, v + 0.25 * u**2), (6, 6))
+    seam = joined(border(0, False), border(1, True), Joint(2, np.ones(1), NONE, 0.8, 0.5))
+    nets = matched({0: LEFT, 1: right}, [seam])
+    delta = np.concatenate([field(net, SMOOTH[1]) for net in nets.values()])
+    assert np.abs(rows(nets, [seam])[0] @ delta).max() < 1e-10
+
+
+def ring(radii, spans, degree=3):
+    """A ring in the plane, periodic in its second direction, of whose splines circles are no part."""
+    u = KnotVector.clamped(np.linspace(0, 1, 4), degree)
+    v = KnotVector.from_multiplicities(np.linspace(0, 1, spans + 1), [1] * (spans + 1), degree, periodic=True)
+    t = 2 * np.pi * v.greville()
+    r = radii[0] + (radii[1] - radii[0]) * u.greville()
+    return Net(u, v, np.stack([np.outer(r, np.cos(t)), np.outer(r, np.sin(t)), np.zeros((len(r), len(t)))], axis=-1))
+
+
+def weighted(net):
+    return Net(net.u, net.v, net.poles, np.random.default_rng(8).uniform(0.7, 1.4, net.poles.shape[:2]))
+
+
+PAIRS = {
+    "plain": (LEFT, border(0, False), chart(lambda u, v: (u, v), (4, 5), (3, 2)), border(1, True)),
+    "swapped": (LEFT, border(0, False), turned(chart(lambda u, v: (u, v)), "vx"), border(1, True, "vx")),
+    "rational": (weighted(LEFT), border(0, False), weighted(chart(lambda u, v: (u, v))), border(1, True)),
+    "periodic": (
+        ring((1, 2), 7),
+        Border(0, 0, 0, 1.0, "left", 0.3, 1.3),
+        ring((2, 3), 10),
+        Border(1, 1, 0, 0.0, "right", 0.0, 1.0),
+    ),
+}
+
+
+@pytest.mark.parametrize("pair", PAIRS)
+def test_any_displacement_against_finite_differences(pair):
+    a, side_a, b, side_b = PAIRS[pair]
+    joint = Joint(2, np.array([0.8, 0.3]), np.array([0.1, -0.2]), 0.6, -0.4)
+    seam = joined(side_a, side_b, joint)
+    nets = matched({0: a, 1: b}, [seam])
+    rng = np.random.default_rng(3)
+    moved = {i: Net(n.u, n.v, rng.standard_normal((*n.poles.shape[:2], 1)), n.weights) for i, n in nets.items()}
+    delta = np.concatenate([net.poles.reshape(-1, 1) for net in moved.values()])
+    found = (rows(nets, [seam])[0] @ delta).reshape(3, -1)
+    share = sites(nets, (side_a, side_b), found.shape[1])
+    step = 1e-4
+
+    def value(side, where, inwards=0.0):
+        uv = side.places(where)
+        uv[:, side.axis] += inwards
+        return moved[side.surface].evaluate(uv)[:, 0]
+
+    jets = {}
+    for side in (side_a, side_b):
+        h = step if side.limit == "right" else -step
+        s = [value(side, share, k * h) for k in range(5)]
+        n = (-25 * s[0] + 48 * s[1] - 36 * s[2] + 16 * s[3] - 3 * s[4]) / (12 * h)
+        nn = (35 * s[0] - 104 * s[1] + 114 * s[2] - 56 * s[3] + 11 * s[4]) / (12 * h * h)
+        ahead = [value(side, share + k * step) for k in range(5)]
+        t = (-25 * ahead[0] + 48 * ahead[1] - 36 * ahead[2] + 16 * ahead[3] - 3 * ahead[4]) / (12 * step)
+        jets[side.surface] = s[0], n, nn, t
+    (s, n, nn, t), (z, m, mm, _) = jets[0], jets[1]
+    law, along = 0.8 + 0.3 * share, 0.1 - 0.2 * share
+    smooth = share < 1 - 1e-3
+    assert np.abs(found[0] - (z - s)).max() < 1e-12
+    assert np.abs(found[1] - (m - law * n - along * t))[smooth].max() < 1e-5
+    assert np.abs(found[2] - (mm - 0.8**2 * nn - 0.6 * n + 0.4 * t))[smooth].max() < 1e-2
+
+
+def sites(nets, sides, count):
+    """Greville points of the larger spline space along a seam, as fractions."""
+    for side in sides:
+        knots = (nets[side.surface].u, nets[side.surface].v)[1 - side.axis]
+        if not knots.periodic:
+            share = np.sort((knots.greville() - side.start) / (side.stop - side.start))
+        else:
+            breaks = np.unique(np.concatenate([knots.breaks[:-1] + k for k in (-1, 0, 1, 2)]))
+            inner = (breaks - side.start) / (side.stop - side.start)
+            inner = inner[(inner > 1e-9) & (inner < 1 - 1e-9)]
+            share = KnotVector.clamped(np.r_[0, inner, 1], knots.degree).greville()
+        if len(share) == count:
+            return share
+    raise AssertionError("no side has so many functions along the seam")
+
+
+@pytest.mark.parametrize("order", [0, 1, 2])
+def test_what_obeys_is_smooth_all_along_the_seam(order):
+    right = chart(lambda u, v: (2 * u, v), (4, 5), (4, 3))
+    seam = joined(border(0, False), border(1, True), Joint(order, np.array([2.0]), NONE))
+    nets = matched({0: LEFT, 1: right}, [seam])
+    form, _ = rows(nets, [seam])
+    total = form.shape[1]
+    solver = Constrained(eye_array(total, format="csr"), form, np.ones(total, bool))
+    delta = solver.settled(np.random.default_rng(0).standard_normal((total, 1)))
+    assert np.abs(delta).max() > 1.0
+    first, count = laid_out(nets)
+    assert count == total
+    share = np.linspace(0, 1, 301)
+    jets = []
+    for i, net in nets.items():
+        own = delta[first[i] : first[i] + net.u.count * net.v.count].reshape(net.u.count, net.v.count, 1)
+        side = (seam.a, seam.b)[i]
+        found = Net(net.u, net.v, own).evaluate(side.places(share), 2, side.limits("right"))
+        jets.append([found[0], found[1], found[3]])
+    for k in range(order + 1):
+        assert np.abs(jets[1][k] - 2.0**k * jets[0][k]).max() < 1e-10
+    if order < 2:
+        assert np.abs(jets[1][order + 1] - 2.0 ** (order + 1) * jets[0][order + 1]).max() > 1e-3
+
+
+@pytest.mark.parametrize("pair", PAIRS)
+def test_matched_nets_are_the_same_surfaces_with_the_same_knots_on_both_sides(pair):
+    a, side_a, b, side_b = PAIRS[pair]
+    seam = joined(side_a, side_b, Joint(0, np.ones(1), NONE))
+    nets = matched({0: a, 1: b}, [seam])
+    inner = []
+    for old, side in ((a, side_a), (b, side_b)):
+        new = nets[side.surface]
+        uv = np.random.default_rng(1).uniform(0, 1, (200, 2))
+        assert np.abs(new.evaluate(uv) - old.evaluate(uv)).max() < 1e-13 * max(np.abs(old.poles).max(), 1.0)
+        assert (new.u, new.v)[side.axis] == (old.u, old.v)[side.axis]
+        knots = (new.u, new.v)[1 - side.axis]
+        share = np.unique(
+            np.round((knots.breaks[:, None] + np.arange(-2, 3) - side.start) / (side.stop - side.start), 9)
+        )
+        inner.append(share[(share > 1e-6) & (share < 1 - 1e-6)].tolist())
+    assert inner[0] == inner[1] and len(inner[0]) > 2
+
+
+def test_knots_are_handed_on_through_a_strip():
+    nets = {i: chart(lambda u, v, i=i: (u + i, v), (3, 3 + i // 8), spans=(2, 3 + i)) for i in range(9)}
+    seams = [joined(border(i, False), border(i + 1, True), Joint(0, np.ones(1), NONE)) for i in range(8)]
+    found = matched(nets, seams)
+    assert len({net.v for net in found.values()}) == 1 and found[0].u == nets[0].u
+
+
+def test_defects_to_be_mended_are_named():
+    seam = joined(border(0, False), border(1, True), Joint(1, np.ones(1), NONE, close=True))
+    nets = matched({0: LEFT, 1: chart(lambda u, v: (u, v))}, [seam])
+    _, mended = rows(nets, [seam])
+    assert mended[: len(mended) // 2].all() and not mended[len(mended) // 2 :].any()
