@@ -4,7 +4,7 @@ import numpy as np
 
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.net import Curve, Net
-from mracad.model import Face, Model, Surface, Trim
+from mracad.model import Edge, Face, Model, Side, Surface, Trim
 
 
 def segment(a, b):
@@ -20,7 +20,17 @@ def sheet(net, frame=None, diagonal=None):
     box = np.array([flat.min(axis=0), flat.max(axis=0)])
     face = Face(0, "bspline", 0, trims, False, np.eye(4) if frame is None else frame, box)
     size = float(np.linalg.norm(box[1] - box[0])) if diagonal is None else diagonal
-    return Model("sheet", (Surface(0, net, (0,)),), (face,), (), size)
+    edges = tuple(free_edge(i, net, trim.curve) for i, trim in enumerate(trims))
+    return Model("sheet", (Surface(0, net, (0,)),), (face,), edges, size)
+
+
+def free_edge(index, net, curve):
+    """An edge of one face along a pcurve."""
+    uv = curve.evaluate(0.5 - 0.5 * np.cos(np.pi * (np.arange(25) + 0.5) / 25))[0]
+    points = net.evaluate(uv)
+    tangents = np.gradient(points, axis=0)
+    tangents /= np.maximum(np.linalg.norm(tangents, axis=1, keepdims=True), 1e-300)
+    return Edge(index, points, tangents, (Side(0, uv=uv),), 1e-7)
 
 
 def fitted(u, v, height, size=100.0, u_of=None, v_of=None):

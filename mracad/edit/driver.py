@@ -1,0 +1,183 @@
+"""The loop of every edit: solve, judge, give something up, solve again.
+
+An edit says what it wants of surfaces that seams join (a :class:`mracad.edit.trial.Wish`); the solver finds what is
+nearest to it under the conditions of seams and rims; the judge says how much of that may be done.  A surface of which
+next to nothing may be done is left, and its neighbours are solved again without it: at first each surface by itself,
+then together with those that seams join to it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mracad.bspline.net import Net
+from mracad.constraint.seam import Seam
+from mracad.constraint.trimmed import TrimmedSeam
+from mracad.edit.target import Sheet
+from mracad.edit.trial import Scene, Trial, Verdict, Wish, displaced
+from mracad.inspect.roughness import Change, Worse
+from mracad.inspect.survey import changes, surveys
+from mracad.model import Displacement, Offset
+from mracad.seam.interface import Joints
+
+Array = np.ndarray
+
+ROUNDS = 4
+"""Most times that a group is solved."""
+
+LEAST = 0.25
+"""A surface of which less may be done is left, so that the others can do more."""
+
+ENOUGH = 0.9
+"""Where more than this of a displacement may be done, no other is tried."""
+
+WHOLE = 1.25
+"""What may be done in whole is preferred to a part of what comes nearer to the target by less than this factor: a part
+leaves something of every wave everywhere."""
+
+
+@dataclass(frozen=True, eq=False)
+class Moved:
+    """What was done to a surface.
+
+    Attributes
+    ----------
+    sheet : Sheet
+    net : Net
+        Before, in the space of the displacement.
+    offset : ndarray (nu, nv, 3)
+    amount : float
+        Share of what was wanted that could be done.
+    change : Change
+        Of its roughness.
+    limits : tuple of Worse
+        What kept it from more.
+    free : int
+        Free control points.
+    gain : float
+        By how much the surfaces that move with it came nearer to what was wanted, as a squared norm.
+    """
+
+    sheet: Sheet
+    net: Net
+    offset: Array
+    amount: float
+    change: Change
+    limits: tuple[Worse, ...]
+    free: int
+    gain: float
+
+    def scaled(self, amount: float) -> Moved:
+        """The same with another share of it done."""
+        if amount == self.amount:
+            return self
+        watched = surveys([(self.net, self.sheet.faces, self.net.u, self.net.v)])
+        offset = self.offset * (amount / self.amount)
+        return replace(self, offset=offset, amount=amount, change=changes(watched, [displaced(self.net, offset)])[0])
+
+    def displacement(self) -> Offset:
+        """The displacement over the surface as it is."""
+        own, degrees = self.sheet.origin, (self.net.u.degree, self.net.v.degree)
+        inserted = [
+            fine.beyond(kv.elevated(degree))
+            for fine, kv, degree in zip((self.net.u, self.net.v), (own.u, own.v), degrees, strict=True)
+        ]
+        return Offset(self.offset, inserted[0], inserted[1], degrees)
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """What became of all surfaces, and the joints that moved with them."""
+
+    moved: Mapping[int, Moved]
+    joints: Joints
+
+    def displacement(self) -> Displacement:
+        """What moves."""
+        return Displacement({i: each.displacement() for i, each in self.moved.items() if np.any(each.offset)})
+
+
+def drive(scene: Scene, wish: Wish, progress: Callable[[int, int], None] | None = None) -> Result:
+    """Do as much of a wish as the judge allows."""
+    tell = progress or (lambda done, total: None)
+    result: dict[int, Moved] = {}
+    lone = Joints(closing=scene.joints.closing)
+    for done, (i, sheet) in enumerate(scene.sheets.items()):
+        tell(done, 2 * len(scene.sheets))
+        result |= _attempt(scene, wish, {i: sheet}, lone)
+    rest = [i for i, moved in result.items() if moved.amount >= LEAST]
+    exact: list[Seam] = []
+    loose: list[TrimmedSeam] = []
+    done = len(scene.sheets)
+    for group in groups(rest, scene.joints.among(rest)):
+        tell(done, 2 * len(scene.sheets))
+        done += len(group)
+        for part, joined in _together(scene, wish, group, result):
+            exact += joined.exact
+            loose += joined.loose
+            result |= part
+    return Result(result, replace(scene.joints, exact=tuple(exact), loose=tuple(loose)))
+
+
+def _together(
+    scene: Scene, wish: Wish, group: Sequence[int], alone: Mapping[int, Moved]
+) -> Iterable[tuple[dict[int, Moved], Joints]]:
+    """What becomes of surfaces that seams join, in the parts in which they move together."""
+    waiting = [(list(group), ROUNDS)]
+    while waiting:
+        part, rounds = waiting.pop()
+        joined = scene.joints.among(part)
+        if not (joined.exact or joined.loose) or not rounds:
+            continue
+        found = _attempt(scene, wish, {i: scene.sheets[i] for i in part}, joined)
+        good = [i for i, moved in found.items() if moved.amount >= LEAST]
+        if len(good) < len(part):
+            waiting += [(each, rounds - 1) for each in groups(good, scene.joints.among(good))]
+            continue
+        if found[part[0]].gain < sum(alone[i].gain for i in part):
+            continue
+        least = min(moved.amount for moved in found.values())
+        yield {i: moved.scaled(least) for i, moved in found.items()}, joined
+
+
+def groups(surfaces: Iterable[int], joined: Joints) -> list[list[int]]:
+    """Surfaces that seams join, directly or through others."""
+    leader = {i: i for i in surfaces}
+
+    def root(i: int) -> int:
+        while leader[i] != i:
+            leader[i] = leader[leader[i]]
+            i = leader[i]
+        return i
+
+    for a, b in joined.pairs():
+        if a in leader and b in leader:
+            leader[max(root(a), root(b))] = min(root(a), root(b))
+    found: dict[int, list[int]] = {}
+    for i in leader:
+        found.setdefault(root(i), []).append(i)
+    return list(found.values())
+
+
+def _attempt(scene: Scene, wish: Wish, members: Mapping[int, Sheet], joined: Joints) -> dict[int, Moved]:
+    """The best that can be done to surfaces that move together; amounts may differ."""
+    trial = Trial(scene, wish, members, joined)
+    target = wish.target(trial.problem)
+    best = trial.nothing()
+    for batch in wish.ways(trial.problem, target) if trial.problem.free.any() else ():
+        best = max([best, *(trial.judged(wanted, target) for wanted in batch)], key=_worth)
+        if best.least > ENOUGH:
+            break
+    return {
+        i: Moved(members[i], space.net, amount * part, amount, change, limits, int(space.free.sum()), best.gain)
+        for (i, space), part, amount, change, limits in zip(
+            trial.problem.spaces.items(), best.parts, best.amounts, best.changes, best.limits, strict=True
+        )
+    }
+
+
+def _worth(verdict: Verdict) -> float:
+    return verdict.gain * (WHOLE if verdict.least > ENOUGH else 1.0)

@@ -1,0 +1,244 @@
+"""One attempt of an edit on surfaces that move together: their problem, and what the judge makes of displacements."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+
+from mracad.bspline.net import Net
+from mracad.edit.bound import bounded
+from mracad.edit.target import Sheet
+from mracad.inspect.cells import quadrature
+from mracad.inspect.roughness import Change, Growth, Worse, worse
+from mracad.inspect.survey import Survey, changes, surveys
+from mracad.model import Model
+from mracad.seam.conditions import matched
+from mracad.seam.conditions import rows as seam_rows
+from mracad.seam.contact import rows as contact_rows
+from mracad.seam.energy import forms
+from mracad.seam.interface import Joints, away, contact, rims
+from mracad.seam.metric import seen
+from mracad.seam.solve import Problem, Space
+from mracad.seam.space import refined
+
+Array = np.ndarray
+
+BISECTIONS = 5
+"""Steps in which the amount is found."""
+
+GROWTH = Growth(0.005, 0.005, 0.005, 0.02, 30.0)
+"""What the judge lets pass by default: a quarter of the 2 % that count as worse where faces are compared."""
+
+TIGHT = 0.3
+"""Share of what a contact may be off at which its conditions aim."""
+
+
+class Wish(Protocol):
+    """What an edit wants."""
+
+    @property
+    def wavelength(self) -> float:
+        """Length within which a displacement fades beside what is held, mm."""
+        ...
+
+    def target(self, problem: Problem) -> Array:
+        """What it would do were no rim held, ``(points, 3)``."""
+        ...
+
+    def ways(self, problem: Problem, target: Array) -> Iterable[Iterable[Array]]:
+        """Displacements ``(points, 3)`` of a problem, of which that is done that may come nearest to the target.
+
+        They come in batches: the next is looked at only where the judge takes much off the one before.
+        """
+        ...
+
+
+@dataclass(frozen=True)
+class Tolerances:
+    """What a result may be worse in.
+
+    Attributes
+    ----------
+    gap : float
+        Of a contact, mm.
+    angle, bend : float
+        By which the angle (radians) and the curvature (over the wavelength of the edit) along a contact may grow.
+    growth : Growth
+        Of roughness.
+    deviation : float
+        Largest deviation along the normal, mm.
+    """
+
+    gap: float
+    angle: float = 1.4e-4
+    bend: float = 1e-3
+    growth: Growth = GROWTH
+    deviation: float = np.inf
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """What an edit works on.
+
+    Attributes
+    ----------
+    model : Model
+    sheets : mapping of int to Sheet
+        The surfaces that it may move.
+    joints : Joints
+    keep : {0, 1, 2}
+        Derivatives that smooth rims keep.
+    tolerances : Tolerances
+    refine : bool
+        Whether control points may be added beside rims.
+    """
+
+    model: Model
+    sheets: Mapping[int, Sheet]
+    joints: Joints
+    keep: int
+    tolerances: Tolerances
+    refine: bool = True
+
+
+@dataclass(frozen=True, eq=False)
+class Verdict:
+    """What the judge makes of a displacement.
+
+    Attributes
+    ----------
+    parts : sequence of ndarray (nu, nv, 3)
+        What is done to each surface, mm.
+    amounts : sequence of float
+        How much of it may be done.
+    changes : sequence of Change
+        What that makes of its roughness.
+    limits : sequence of tuple of Worse
+        What keeps it from more.
+    gain : float
+        By how much the least of the amounts comes nearer to the target, as a squared norm.
+    """
+
+    parts: Sequence[Array]
+    amounts: Sequence[float]
+    changes: Sequence[Change]
+    limits: Sequence[tuple[Worse, ...]]
+    gain: float
+
+    @property
+    def least(self) -> float:
+        """What may be done to all of them."""
+        return min(self.amounts)
+
+
+class Trial:
+    """Surfaces that move together: their problem, and the judge of what is done to them."""
+
+    def __init__(self, scene: Scene, wish: Wish, members: Mapping[int, Sheet], joined: Joints) -> None:
+        self.tolerances = scene.tolerances
+        movable = {face for sheet in members.values() for face in sheet.movable}
+        nets = {i: _space(scene, wish, sheet, joined.moving) for i, sheet in members.items()}
+        nets = matched(nets, joined.exact)
+        spaces, contacts = {}, [contact(seam) for seam in joined.loose]
+        for i, net in nets.items():
+            sheet = members[i]
+            form = forms(net, sheet.metric, quadrature(net, sheet.faces), sheet.creases)
+            points = seen(net, form)
+            held, more = rims(scene.model, net, sheet.all_faces, movable, joined.moving, scene.keep)
+            contacts += more
+            far = away(scene.model, net, sheet.faces, joined.moving)
+            trend = sheet.trend.over(net.u, net.v).poles
+            spaces[i] = Space(net, form, points & ~held, points, trend, far)
+        t = self.tolerances
+        self.limits = t.gap, t.angle, t.bend / wish.wavelength
+        self.contacts = contact_rows(nets, contacts)
+        self.owners = [each.surfaces for each in contacts]
+        f = np.concatenate([net.poles.reshape(-1, 3) for net in nets.values()])
+        closing = np.array([(each.close, each.fit, False) for each in contacts]).reshape(-1, 3)
+        closed = closing[self.contacts.owner, self.contacts.order]
+        self.wanted = _mended(self.contacts.matrix, f, closed)
+        rows, mended = seam_rows(nets, joined.exact)
+        weight = max(sheet.detail for sheet in members.values()) ** 2 * wish.wavelength
+        tight = [TIGHT * limit for limit in self.limits]
+        soft = pull = None
+        if contacts:
+            soft, pull = weight * self.contacts.form(tight), weight * self.contacts.pull(self.wanted, tight)
+        self.problem = Problem(spaces, rows, _mended(rows, f, mended), soft, pull)
+        self.watched = surveys([(s.net, members[i].faces, s.net.u, s.net.v) for i, s in spaces.items()])
+
+    def nothing(self) -> Verdict:
+        """What the judge makes of leaving everything as it is."""
+        parts = [np.zeros(space.net.poles.shape) for space in self.problem.spaces.values()]
+        still = changes(self.watched, [space.net for space in self.problem.spaces.values()])
+        return Verdict(parts, [0.0] * len(parts), still, [()] * len(parts), 0.0)
+
+    def judged(self, delta: Array, target: Array) -> Verdict:
+        """How much of a displacement may be done to each surface."""
+        problem = self.problem
+        bound = self.tolerances.deviation
+        if np.isfinite(bound) and np.linalg.norm(delta, axis=1).max(initial=0.0) > bound:
+            within = [bounded(part, bound).reshape(-1, 3) for part in problem.split(delta).values()]
+            delta = problem.nearest(np.concatenate(within))
+        parts = list(problem.split(delta).values())
+        ceiling = self._ceilings(delta)
+        amounts, found, limits = _amounts(self.watched, list(problem.spaces.values()), parts, ceiling, self.tolerances)
+        done = min(amounts) * delta
+        gain = float((done * (problem.mass @ (2 * target - done))).sum())
+        return Verdict(parts, amounts, found, limits, gain)
+
+    def _ceilings(self, delta: Array) -> Array:
+        """How much of a displacement contacts allow each surface."""
+        ceiling = dict.fromkeys(self.problem.spaces, 1.0)
+        for surfaces, off in zip(self.owners, self.contacts.off(delta, self.wanted, self.limits), strict=True):
+            for i in surfaces & ceiling.keys():
+                ceiling[i] = min(ceiling[i], 1.0 / max(off, 1.0))
+        return np.array(list(ceiling.values()))
+
+
+def _mended(rows: Any, f: Array, which: Array) -> Array:
+    """What conditions ask of a displacement, ``(conditions, 3)``: some that it mend what the input lacks."""
+    return np.where(which[:, None], -(rows @ (f - f.mean(axis=0))), 0.0)
+
+
+def _space(scene: Scene, wish: Wish, sheet: Sheet, moving: frozenset[int]) -> Net:
+    """The surface with control points enough beside its rims."""
+    if not scene.refine:
+        return sheet.net
+    held = [(face, trim) for face in sheet.faces for trim in face.trims if trim.edge not in moving]
+    return refined(sheet.net, held, wish.wavelength / 4)
+
+
+def displaced(net: Net, offset: Array) -> Net:
+    """The surface with control points moved by ``(nu, nv, 3)``, mm."""
+    return Net(net.u, net.v, net.poles + offset, net.weights)
+
+
+def _amounts(
+    watched: Sequence[Survey],
+    spaces: Sequence[Space],
+    parts: Sequence[Array],
+    ceiling: Array,
+    tolerances: Tolerances,
+) -> tuple[list[float], list[Change], list[tuple[Worse, ...]]]:
+    """For each surface the largest amount of its displacement that makes it no rougher, by bisection."""
+    low, high, test = np.zeros(len(parts)), ceiling.copy(), ceiling.copy()
+    best: list[Change] = []
+    why: list[tuple[Worse, ...]] = [()] * len(parts)
+    for step in range(BISECTIONS + 2):
+        nets = [displaced(s.net, amount * part) for s, part, amount in zip(spaces, parts, test, strict=True)]
+        found = changes(watched, nets)
+        best = best or list(found)
+        for i, change in enumerate(found):
+            wrong = worse(change, tolerances.growth) if test[i] else ()
+            far = change.deviation > tolerances.deviation * (1 + 1e-9)
+            if wrong or far:
+                high[i], why[i] = test[i], why[i] or wrong
+            else:
+                low[i], best[i] = test[i], change
+        if (low >= high).all() or step == BISECTIONS + 1:
+            break
+        test = np.where(low >= high, low, (low + high) / 2) if step < BISECTIONS else low.copy()
+    return low.tolist(), best, why
