@@ -20,7 +20,12 @@ DEFECT = 1e-6, math.radians(1e-3)
 """Gap, mm, and angle from which on a seam is worth mending."""
 
 IDLE = "nothing to smooth on either side"
+LARGE = "too many faces there to move together"
 SHORT = "knots of a face there nearly meet"
+
+
+MOST_TOGETHER = 16_000
+"""Most control points of surfaces that trimmed seams join: one factorisation of them all grows faster than they do."""
 
 
 class Together:
@@ -54,6 +59,7 @@ class Together:
         self._supplement()
         idle = (s for s in self._every() if not (self.coarser & {s.a.surface, s.b.surface} or self._to_mend(s)))
         self._freeze({seam.edge: IDLE for seam in idle})
+        self._freeze(self._parting())
 
     def _try_trimmed(self) -> None:
         """Let seams that cannot move exactly move to the gap tolerance."""
@@ -85,6 +91,29 @@ class Together:
                 self.trimmed.append(rest)
             else:
                 self._freeze({seam.edge: rest})
+
+    def _parting(self) -> dict[int, str]:
+        """Trimmed seams that would join more surfaces than can be solved at once in time that grows with the model."""
+        leader = {i: i for seam in self._every() for i in (seam.a.surface, seam.b.surface)}
+        points = {i: self.model.surfaces[i].net.u.count * self.model.surfaces[i].net.v.count for i in leader}
+
+        def root(i: int) -> int:
+            while leader[i] != i:
+                leader[i] = leader[leader[i]]
+                i = leader[i]
+            return i
+
+        parted: dict[int, str] = {}
+        for seam in self._every():
+            one, other = root(seam.a.surface), root(seam.b.surface)
+            if one == other:
+                continue
+            if isinstance(seam, TrimmedSeam) and points[one] + points[other] > MOST_TOGETHER:
+                parted[seam.edge] = LARGE
+            else:
+                leader[other] = one
+                points[one] += points[other]
+        return parted
 
     @staticmethod
     def _to_mend(seam: Seam | TrimmedSeam) -> bool:

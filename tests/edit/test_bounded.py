@@ -164,3 +164,14 @@ def test_files_are_made_again_a_bounded_number_of_times(monkeypatch):
             document, lambda: chains(*[1] * (produce.ROUNDS + 4)), [step], [produce.Target("out.brep", "brep")]
         )
     assert caught.value.code == Code.CANNOT_EDIT and stub.rounds == produce.ROUNDS
+
+
+def test_trimmed_seams_join_no_more_surfaces_than_can_be_solved_at_once(monkeypatch):
+    left, right = halves.surfaces(0.2, (30, 60))[1:]
+    model = view(halves.document(left, right))
+    for most, how in ((own_points(model), "to tolerance"), (own_points(model) - 1, "frozen")):
+        monkeypatch.setattr("mracad.edit.together.MOST_TOGETHER", most)
+        edit = smooth(model, Smooth(scale="30mm"))
+        (seam,) = (edge for edge in edit.edges if len(edge.faces) == 2)
+        assert seam.how == how and (how != "frozen" or seam.reason == "too many faces there to move together")
+        assert len(edit.faces("edited")) == 2
