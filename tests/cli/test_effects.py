@@ -141,6 +141,7 @@ OWN = {
     "compare max_angle_growth": ("--max-angle-growth 0", "REF smooth.step IN sheet.step"),
     "info keep": ("--keep g2",),
     "feature extract keep": ("--keep g2",),
+    "feature extract faces": ("--faces #2",),
     "transfer faces": ("--faces #2",),
     "transfer edges": ("--edges frozen", "--to 10,5,0 --clip"),
     "transfer hold": ("--hold #1",),
