@@ -223,47 +223,57 @@ def seams(model: Model, movable: Collection[int], wishes: Wishes) -> Seams:
     wishes : Wishes
     """
     result = Seams()
-    found, closing, frozen = result.found, result.closing, result.frozen
     for edge in model.edges:
-        if not any(side.face in movable for side in edge.sides):
-            continue
-        if edge.index in wishes.hold:
-            frozen[edge.index] = HELD
-        elif edge.degenerate:
-            frozen[edge.index] = "pole"
-        elif len(edge.sides) == 1:
-            frozen[edge.index] = FREE
-        elif len(edge.sides) > 2:
-            frozen[edge.index] = "more than two faces"
-        else:
-            seam = _seam(model, movable, wishes, (edge, edge), edge.sides)
-            if isinstance(seam, Seam):
-                found.append(seam)
-            elif isinstance(seam, str):
-                frozen[edge.index] = seam
-            else:
-                closing[edge.index] = seam
+        if any(side.face in movable for side in edge.sides):
+            _sort(result, edge, _still(edge, wishes) or _seam(model, movable, wishes, (edge, edge), edge.sides))
     for edge, one, two in coinciding(model):
-        other = _twin(model, edge, two.face)
-        if edge.index not in frozen or (other and other.index not in frozen):
-            continue
-        if other is None:
-            frozen[edge.index] = "coincides with a part of another edge"
-            continue
-        result.twins[edge.index] = other.index
-        if wishes.hold & {edge.index, other.index}:
-            frozen |= dict.fromkeys((edge.index, other.index), HELD)
-            continue
-        seam = _seam(model, movable, wishes, (edge, other), (one, other.sides[0]))
-        if isinstance(seam, Seam):
-            found.append(seam)
-            del frozen[seam.edge], frozen[seam.twin]
-        elif isinstance(seam, str):
-            frozen[edge.index] = seam
-    for index in touching(model) & frozen.keys():
-        if frozen[index] == FREE:
-            frozen[index] = ELSEWHERE
+        _unsewn(result, model, movable, wishes, edge, (one, two))
+    for index in touching(model) & result.frozen.keys():
+        if result.frozen[index] == FREE:
+            result.frozen[index] = ELSEWHERE
     return result
+
+
+def _still(edge: Edge, wishes: Wishes) -> str:
+    """Why an edge stays whatever its faces do; empty where it may move."""
+    if edge.index in wishes.hold:
+        return HELD
+    if edge.degenerate:
+        return "pole"
+    if len(edge.sides) == 1:
+        return FREE
+    return "more than two faces" if len(edge.sides) > 2 else ""
+
+
+def _sort(result: Seams, edge: Edge, seam: Seam | str | tuple[Border, Border]) -> None:
+    """Put what is known of an edge where it belongs."""
+    if isinstance(seam, Seam):
+        result.found.append(seam)
+        for each in (seam.edge, seam.twin):
+            result.frozen.pop(each, None)
+    elif isinstance(seam, str):
+        result.frozen[edge.index] = seam
+    else:
+        result.closing[edge.index] = seam
+
+
+def _unsewn(
+    result: Seams, model: Model, movable: Collection[int], wishes: Wishes, edge: Edge, sides: tuple[Side, Side]
+) -> None:
+    """Look at a free edge that coincides with one of another face."""
+    other = _twin(model, edge, sides[1].face)
+    if edge.index not in result.frozen or (other and other.index not in result.frozen):
+        return
+    if other is None:
+        result.frozen[edge.index] = "coincides with a part of another edge"
+        return
+    result.twins[edge.index] = other.index
+    if wishes.hold & {edge.index, other.index}:
+        result.frozen.update(dict.fromkeys((edge.index, other.index), HELD))
+        return
+    seam = _seam(model, movable, wishes, (edge, other), (sides[0], other.sides[0]))
+    if not isinstance(seam, tuple):
+        _sort(result, edge, seam)
 
 
 def _twin(model: Model, edge: Edge, face: int) -> Edge | None:
