@@ -46,7 +46,7 @@ def placed(document: Document) -> Placed:
         for i in range(part.faces.Extent()):
             at = one.faces.FindIndex(part.faces.FindKey(i + 1).Moved(frame)) - 1
             faces[at] = part.first + i
-            colours[at] = part.face_colours.get(i) or colour or label_colour(part.label)
+            colours[at] = part.face_colour(i, colour)
         for i in range(part.edges.Extent()):
             edges[one.edges.FindIndex(part.edges.FindKey(i + 1).Moved(frame)) - 1] = part.first_edge + i
     return Placed(whole, tuple(faces), tuple(edges), tuple(colours))

@@ -10,7 +10,7 @@ from OCP.BRepFilletAPI import BRepFilletAPI_MakeFillet
 from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox, BRepPrimAPI_MakeCylinder
 from OCP.gp import gp_Ax2, gp_Dir, gp_Pnt, gp_Trsf, gp_Vec
 from OCP.ShapeUpgrade import ShapeUpgrade_ShapeDivideClosed
-from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE
+from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_SOLID
 from OCP.TopExp import TopExp_Explorer
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS
@@ -18,9 +18,10 @@ from OCP.TopoDS import TopoDS
 from mracad import occ
 from mracad.formats import unheld
 from mracad.occ.files import read, write
-from mracad.occ.topology import inside
+from mracad.occ.topology import compound, inside
 from tests.cli.test_check import flat
 from tests.occ import shapes
+from tests.occ.test_colours import colour
 
 SMALL = 300_000
 """Real models of more bytes than this are converted only where ``--long`` asks for it."""
@@ -223,3 +224,20 @@ def test_instances_are_compared_where_they_stand(mracad, tmp_path):
     occ.write_step(shapes.assembly(block, *places(0, 10, 40.001)), apart)
     body, _ = compared(mracad, ref, converted(mracad, apart, tmp_path / "apart.igs"))
     assert "deviation" in body["failed"]
+
+
+def test_the_colour_of_a_body_is_that_of_its_faces(mracad, tmp_path):
+    """STEP colours one body of a part, IGES its faces."""
+    boxes = [BRepPrimAPI_MakeBox(gp_Pnt(x, 0, 0), 1, 2, 3).Shape() for x in (0, 5)]
+    document = shapes.document(compound(boxes), names={0: "part"})
+    body = TopExp_Explorer(document.parts[0].shape, TopAbs_SOLID).Current()
+    colour(document, document.shape_tool.AddSubShape(document.parts[0].label, body), "#0000ff")
+    write(document, tmp_path / "ref.step")
+    assert [face["colour"] for face in json.loads(mracad("info", tmp_path / "ref.step", "--json").out)["faces"]] == [
+        *["#0000ff"] * 6,
+        *[""] * 6,
+    ]
+    body, layers = compared(
+        mracad, tmp_path / "ref.step", converted(mracad, tmp_path / "ref.step", tmp_path / "new.igs")
+    )
+    assert body["passed"], layers["colours"]
