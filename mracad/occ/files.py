@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
 
-from mracad.errors import FileError, UsageError
+from mracad.errors import EditError, FileError, UsageError
 from mracad.formats import FORMATS, by_content, by_ending
 from mracad.occ.document import Document, label_name, named_labels, nested_colours
 from mracad.occ.literals import known
@@ -141,6 +143,8 @@ def write(
     ------
     EditError
         For a face that a reader of that format would not find again.
+    EditError
+        When the kernel's writer fails on the document, though another format may hold it.
     FileError
         When the document cannot be expressed in that format, or the target cannot be written.
     UsageError
@@ -158,12 +162,14 @@ def write(
     if format == "step":
         from mracad.occ.step import step
 
-        data, cut = step(document, name, schema, options_text)
+        with _expressing(document.name, format):
+            data, cut = step(document, name, schema, options_text)
         lost = _opaque(document)
     elif format == "iges":
         from mracad.occ.iges import iges
 
-        data, cut = iges(document, name, options_text)
+        with _expressing(document.name, format):
+            data, cut = iges(document, name, options_text)
         lost = _unwritten(document)
     elif format in ("brep", "binbrep"):
         from mracad.occ.brep import brep
@@ -186,6 +192,20 @@ def write(
         lost += tuple(Lost(what, len(ns), count, ns) for what, (ns, count) in counts.items() if count < len(ns))
     put(data, target)
     return Written(lost, cut, torn)
+
+
+@contextlib.contextmanager
+def _expressing(name: str, format: str) -> Iterator[None]:
+    """Say of a failure of the kernel's writer that it is one: the input need not be at fault."""
+    try:
+        yield
+    except Exception as error:
+        if not type(error).__module__.startswith("OCP"):
+            raise
+        raise EditError(
+            f"the kernel cannot express '{name}' as {format.upper()}: {error}",
+            "write BREP, which holds faces as they are",
+        ) from error
 
 
 def _opaque(document: Document) -> tuple[Lost, ...]:

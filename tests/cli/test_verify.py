@@ -16,6 +16,7 @@ from OCP.TopLoc import TopLoc_Location
 import mracad as library
 from mracad.occ import step as writer
 from mracad.produce import WORSE
+from tests import zoo
 from tests.batch.runs import recipe
 from tests.occ import shapes
 
@@ -83,6 +84,16 @@ def test_an_output_that_reads_back_without_faces_is_refused(mracad, tmp_path: Pa
     result = mracad("convert", tmp_path / "in.brep", "-o", tmp_path / f"out.{ending}")
     assert result.code == 4 and result.out == "" and result.err.count("\n") == 1
     assert f"#1 cannot be read back: 'out.{ending}' holds no faces; write BREP" in result.err
+    assert [path.name for path in tmp_path.iterdir()] == ["in.brep"]
+    assert mracad("convert", tmp_path / "in.brep", "-o", tmp_path / "out.brep").code == 0
+
+
+def test_a_failure_of_the_kernels_writer_is_not_the_inputs_fault(mracad, tmp_path: Path) -> None:
+    """A ring of revolution with two holes: the kernel's IGES writer throws."""
+    library.write(shapes.document(dict(zoo.closed())["ring-holes"]()), tmp_path / "in.brep")
+    result = mracad("convert", tmp_path / "in.brep", "-o", tmp_path / "out.igs")
+    assert result.code == 4 and result.out == "" and result.err.count("\n") == 1
+    assert "cannot express 'in.brep' as IGES" in result.err and "write BREP" in result.err
     assert [path.name for path in tmp_path.iterdir()] == ["in.brep"]
     assert mracad("convert", tmp_path / "in.brep", "-o", tmp_path / "out.brep").code == 0
 
