@@ -17,9 +17,8 @@ from mracad.bspline.net import Net
 from mracad.constraint.seam import Seam
 from mracad.constraint.trimmed import TrimmedSeam
 from mracad.edit.target import Sheet
-from mracad.edit.trial import Scene, Trial, Verdict, Wish, displaced
+from mracad.edit.trial import Scene, Trial, Verdict, Watch, Wish, displaced
 from mracad.inspect.roughness import Change, Worse
-from mracad.inspect.survey import changes, surveys
 from mracad.model import Displacement, Offset
 from mracad.seam.interface import Joints
 
@@ -51,8 +50,8 @@ class Moved:
     offset : ndarray (nu, nv, 3)
     amount : float
         Share of what was wanted that could be done.
-    change : Change
-        Of its roughness.
+    changes : mapping of int to Change
+        Of the roughness of its faces, by face.
     limits : tuple of Worse
         What kept it from more.
     free : int
@@ -65,18 +64,28 @@ class Moved:
     net: Net
     offset: Array
     amount: float
-    change: Change
+    changes: Mapping[int, Change]
     limits: tuple[Worse, ...]
     free: int
     gain: float
+
+    @property
+    def deviation(self) -> float:
+        """Largest motion along the normal, mm."""
+        return max((each.deviation for each in self.changes.values()), default=0.0)
+
+    @property
+    def motion(self) -> float:
+        """Largest motion, mm."""
+        return max((each.motion for each in self.changes.values()), default=0.0)
 
     def scaled(self, amount: float) -> Moved:
         """The same with another share of it done."""
         if amount == self.amount:
             return self
-        watched = surveys([(self.net, self.sheet.faces, self.net.u, self.net.v)])
         offset = self.offset * (amount / self.amount)
-        return replace(self, offset=offset, amount=amount, change=changes(watched, [displaced(self.net, offset)])[0])
+        now = Watch.of([(self.net, self.sheet.faces)]).changes([displaced(self.net, offset)])[0]
+        return replace(self, offset=offset, amount=amount, changes=now)
 
     def displacement(self) -> Offset:
         """The displacement over the surface as it is."""

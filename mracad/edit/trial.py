@@ -8,13 +8,12 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from mracad.bspline.net import Net
-from mracad.edit.bound import bounded
+from mracad.bspline.net import Net, cross
 from mracad.edit.target import Sheet
 from mracad.inspect.cells import quadrature
 from mracad.inspect.roughness import Change, Growth, Worse, worse
 from mracad.inspect.survey import Survey, changes, surveys
-from mracad.model import Model
+from mracad.model import Face, Model
 from mracad.seam.conditions import matched
 from mracad.seam.conditions import rows as seam_rows
 from mracad.seam.contact import rows as contact_rows
@@ -23,6 +22,7 @@ from mracad.seam.interface import Joints, away, contact, rims
 from mracad.seam.metric import seen
 from mracad.seam.solve import Problem, Space
 from mracad.seam.space import refined
+from mracad.wavelet.ladder import arc_lengths
 
 Array = np.ndarray
 
@@ -114,8 +114,8 @@ class Verdict:
         What is done to each surface, mm.
     amounts : sequence of float
         How much of it may be done.
-    changes : sequence of Change
-        What that makes of its roughness.
+    changes : sequence of mapping of int to Change
+        What that makes of the roughness of its faces, by face.
     limits : sequence of tuple of Worse
         What keeps it from more.
     gain : float
@@ -124,7 +124,7 @@ class Verdict:
 
     parts: Sequence[Array]
     amounts: Sequence[float]
-    changes: Sequence[Change]
+    changes: Sequence[Mapping[int, Change]]
     limits: Sequence[tuple[Worse, ...]]
     gain: float
 
@@ -138,7 +138,7 @@ class Trial:
     """Surfaces that move together: their problem, and the judge of what is done to them."""
 
     def __init__(self, scene: Scene, wish: Wish, members: Mapping[int, Sheet], joined: Joints) -> None:
-        self.tolerances = scene.tolerances
+        self.tolerances, self.width = scene.tolerances, wish.wavelength
         movable = {face for sheet in members.values() for face in sheet.movable}
         nets = {i: _space(scene, wish, sheet, joined.moving) for i, sheet in members.items()}
         nets = matched(nets, joined.exact)
@@ -167,12 +167,12 @@ class Trial:
         if contacts:
             soft, pull = weight * self.contacts.form(tight), weight * self.contacts.pull(self.wanted, tight)
         self.problem = Problem(spaces, rows, _mended(rows, f, mended), soft, pull)
-        self.watched = surveys([(s.net, members[i].faces, s.net.u, s.net.v) for i, s in spaces.items()])
+        self.watch = Watch.of([(s.net, members[i].faces) for i, s in spaces.items()])
 
     def nothing(self) -> Verdict:
         """What the judge makes of leaving everything as it is."""
         parts = [np.zeros(space.net.poles.shape) for space in self.problem.spaces.values()]
-        still = changes(self.watched, [space.net for space in self.problem.spaces.values()])
+        still = self.watch.changes([space.net for space in self.problem.spaces.values()])
         return Verdict(parts, [0.0] * len(parts), still, [()] * len(parts), 0.0)
 
     def judged(self, delta: Array, target: Array) -> Verdict:
@@ -180,11 +180,12 @@ class Trial:
         problem = self.problem
         bound = self.tolerances.deviation
         if np.isfinite(bound) and np.linalg.norm(delta, axis=1).max(initial=0.0) > bound:
-            within = [bounded(part, bound).reshape(-1, 3) for part in problem.split(delta).values()]
+            parts = zip(problem.spaces.values(), problem.split(delta).values(), strict=True)
+            within = [bounded(space.net, part, bound, self.width).reshape(-1, 3) for space, part in parts]
             delta = problem.nearest(np.concatenate(within))
         parts = list(problem.split(delta).values())
         ceiling = self._ceilings(delta)
-        amounts, found, limits = _amounts(self.watched, list(problem.spaces.values()), parts, ceiling, self.tolerances)
+        amounts, found, limits = _amounts(self.watch, list(problem.spaces.values()), parts, ceiling, self.tolerances)
         done = min(amounts) * delta
         gain = float((done * (problem.mass @ (2 * target - done))).sum())
         return Verdict(parts, amounts, found, limits, gain)
@@ -211,33 +212,92 @@ def _space(scene: Scene, wish: Wish, sheet: Sheet, moving: frozenset[int]) -> Ne
     return refined(sheet.net, held, wish.wavelength / 4)
 
 
+def bounded(net: Net, offset: Array, bound: float, width: float) -> Array:
+    """Offsets ``(nu, nv, 3)`` that are scaled back, smoothly within a width, until none leads far along the normal.
+
+    The share a = min(1, bound / |δ · n|) at each Greville point gives way to the mean, over a window of the width, of
+    its least values over the same window: never more than a, and smooth.
+
+    Parameters
+    ----------
+    net : Net
+    offset : ndarray (nu, nv, 3)
+    bound, width : float
+        mm.
+    """
+    from scipy.ndimage import minimum_filter, uniform_filter
+
+    us, vs = net.u.greville(), net.v.greville()
+    normals = cross(net.tangents(us, vs, 0), net.tangents(us, vs, 1))
+    normals /= np.maximum(np.linalg.norm(normals, axis=-1, keepdims=True), 1e-300)
+    far = np.abs((Net(net.u, net.v, offset, net.weights).grid(us, vs) * normals).sum(axis=-1))
+    share = bound / np.maximum(far, bound)
+    spacing = (arc_lengths(net, axis).sum() / net.poles.shape[axis] for axis in (0, 1))
+    window = tuple(2 * int(min(width / 2 / step, count)) + 1 for step, count in zip(spacing, share.shape, strict=True))
+    least = minimum_filter(share, window, mode="nearest")
+    share = np.minimum(share, uniform_filter(least, window, mode="nearest"))
+    return offset * share[..., None]
+
+
 def displaced(net: Net, offset: Array) -> Net:
     """The surface with control points moved by ``(nu, nv, 3)``, mm."""
     return Net(net.u, net.v, net.poles + offset, net.weights)
 
 
+@dataclass(frozen=True, eq=False)
+class Watch:
+    """The faces of surfaces, each looked at by itself.
+
+    Attributes
+    ----------
+    surveys : sequence of Survey
+    owners : sequence of (int, int)
+        Place of the surface of each, and the face.
+    """
+
+    surveys: Sequence[Survey]
+    owners: Sequence[tuple[int, int]]
+
+    @classmethod
+    def of(cls, surfaces: Sequence[tuple[Net, Sequence[Face]]]) -> Watch:
+        """Look at faces of surfaces before an edit."""
+        every = [(place, net, face) for place, (net, faces) in enumerate(surfaces) for face in faces]
+        return cls(
+            surveys([(net, (face,), net.u, net.v) for _, net, face in every]),
+            [(place, face.index) for place, _, face in every],
+        )
+
+    def changes(self, nets: Sequence[Net]) -> list[dict[int, Change]]:
+        """What became of the faces of each surface."""
+        found: list[dict[int, Change]] = [{} for _ in nets]
+        now = changes(self.surveys, [nets[place] for place, _ in self.owners])
+        for (place, face), change in zip(self.owners, now, strict=True):
+            found[place][face] = change
+        return found
+
+
 def _amounts(
-    watched: Sequence[Survey],
+    watch: Watch,
     spaces: Sequence[Space],
     parts: Sequence[Array],
     ceiling: Array,
     tolerances: Tolerances,
-) -> tuple[list[float], list[Change], list[tuple[Worse, ...]]]:
-    """For each surface the largest amount of its displacement that makes it no rougher, by bisection."""
+) -> tuple[list[float], list[dict[int, Change]], list[tuple[Worse, ...]]]:
+    """For each surface the largest amount of its displacement that makes no face rougher, by bisection."""
     low, high, test = np.zeros(len(parts)), ceiling.copy(), ceiling.copy()
-    best: list[Change] = []
+    best: list[dict[int, Change]] = []
     why: list[tuple[Worse, ...]] = [()] * len(parts)
     for step in range(BISECTIONS + 2):
         nets = [displaced(s.net, amount * part) for s, part, amount in zip(spaces, parts, test, strict=True)]
-        found = changes(watched, nets)
+        found = watch.changes(nets)
         best = best or list(found)
-        for i, change in enumerate(found):
-            wrong = worse(change, tolerances.growth) if test[i] else ()
-            far = change.deviation > tolerances.deviation * (1 + 1e-9)
+        for i, faces in enumerate(found):
+            wrong = tuple(w for each in faces.values() for w in worse(each, tolerances.growth)) if test[i] else ()
+            far = any(each.deviation > tolerances.deviation * (1 + 1e-9) for each in faces.values())
             if wrong or far:
                 high[i], why[i] = test[i], why[i] or wrong
             else:
-                low[i], best[i] = test[i], change
+                low[i], best[i] = test[i], faces
         if (low >= high).all() or step == BISECTIONS + 1:
             break
         test = np.where(low >= high, low, (low + high) / 2) if step < BISECTIONS else low.copy()

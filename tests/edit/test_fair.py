@@ -127,12 +127,12 @@ def test_noise_goes_and_the_rim_stays():
 
 
 def test_a_bound_on_the_deviation_holds():
-    _, noisy = rough()
-    result, after = smoothed(noisy, 6.0, deviation=0.03)
+    _, noisy = rough(0.05)
+    result, after = smoothed(noisy, 6.0, deviation=0.02)
     moved = result.moved[0]
-    assert 0.01 < moved.change.deviation <= 0.03 * (1 + 1e-9) and moved.amount > 0
+    assert 0.01 < moved.deviation <= 0.02 * (1 + 1e-9) and moved.amount > 0.9
     free, _ = smoothed(noisy, 6.0)
-    assert free.moved[0].change.deviation > 0.06
+    assert free.moved[0].deviation > 0.04
     assert no_rougher(sheet(noisy), sheet(after))
 
 
@@ -175,7 +175,7 @@ def fillet(radius=5.0, length=30.0, spans=8):
 @pytest.mark.parametrize("scale", [3.0, 12.0, 40.0])
 def test_clean_faces_are_left_as_they_are(net, scale):
     result, _ = smoothed(net, scale)
-    assert max((each.change.motion for each in result.moved.values()), default=0.0) < 5e-5 * scale
+    assert max((each.motion for each in result.moved.values()), default=0.0) < 5e-5 * scale
 
 
 def test_rotation_translation_and_scaling_commute():
