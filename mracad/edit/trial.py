@@ -36,6 +36,10 @@ TIGHT = 0.3
 """Share of what a contact may be off at which its conditions aim."""
 
 
+FINER = 3
+"""Steps from one Greville point to the next in which deviations are looked for."""
+
+
 class Wish(Protocol):
     """What an edit wants."""
 
@@ -215,7 +219,7 @@ def _space(scene: Scene, wish: Wish, sheet: Sheet, moving: frozenset[int]) -> Ne
 def bounded(net: Net, offset: Array, bound: float, width: float) -> Array:
     """Offsets ``(nu, nv, 3)`` that are scaled back, smoothly within a width, until none leads far along the normal.
 
-    The share a = min(1, bound / |δ · n|) at each Greville point gives way to the mean, over a window of the width, of
+    The share a = min(1, bound / |δ · n|) beside each Greville point gives way to the mean, over a window of the width, of
     its least values over the same window: never more than a, and smooth.
 
     Parameters
@@ -225,18 +229,24 @@ def bounded(net: Net, offset: Array, bound: float, width: float) -> Array:
     bound, width : float
         mm.
     """
-    from scipy.ndimage import minimum_filter, uniform_filter
+    from scipy.ndimage import maximum_filter, minimum_filter, uniform_filter
 
-    us, vs = net.u.greville(), net.v.greville()
+    us, vs = (_between(knots.greville()) for knots in (net.u, net.v))
     normals = cross(net.tangents(us, vs, 0), net.tangents(us, vs, 1))
     normals /= np.maximum(np.linalg.norm(normals, axis=-1, keepdims=True), 1e-300)
     far = np.abs((Net(net.u, net.v, offset, net.weights).grid(us, vs) * normals).sum(axis=-1))
+    far = maximum_filter(far, 2 * FINER + 1, mode="nearest")[::FINER, ::FINER]
     share = bound / np.maximum(far, bound)
     spacing = (arc_lengths(net, axis).sum() / net.poles.shape[axis] for axis in (0, 1))
     window = tuple(2 * int(min(width / 2 / step, count)) + 1 for step, count in zip(spacing, share.shape, strict=True))
     least = minimum_filter(share, window, mode="nearest")
     share = np.minimum(share, uniform_filter(least, window, mode="nearest"))
     return offset * share[..., None]
+
+
+def _between(places: Array) -> Array:
+    """Parameters with more between each and the next."""
+    return np.interp(np.arange(FINER * (len(places) - 1) + 1) / FINER, np.arange(len(places)), places)
 
 
 def displaced(net: Net, offset: Array) -> Net:
