@@ -1,6 +1,6 @@
 """The loop of every edit: solve, judge, give something up, solve again.
 
-An edit says what it wants of surfaces that seams join (a :class:`mracad.edit.trial.Wish`); the solver finds what is
+An edit says what it wants of surfaces that seams join (a :class:`mracad.edit.target.Wish`); the solver finds what is
 nearest to it under the conditions of seams and rims; the judge says how much of that may be done.  A surface of which
 next to nothing may be done is left, and its neighbours are solved again without it: at first each surface by itself,
 then together with those that seams join to it.
@@ -16,8 +16,8 @@ import numpy as np
 from mracad.bspline.net import Net
 from mracad.constraint.seam import Seam
 from mracad.constraint.trimmed import TrimmedSeam
-from mracad.edit.target import Sheet
-from mracad.edit.trial import Scene, Trial, Verdict, Watch, Wish, displaced
+from mracad.edit.target import Sheet, Wish
+from mracad.edit.trial import Scene, Trial, Verdict, Watch, displaced
 from mracad.inspect.roughness import Change, Worse
 from mracad.model import Displacement, Offset
 from mracad.seam.interface import Joints
@@ -173,10 +173,10 @@ def groups(surfaces: Iterable[int], joined: Joints) -> list[list[int]]:
 
 def _attempt(scene: Scene, wish: Wish, members: Mapping[int, Sheet], joined: Joints) -> dict[int, Moved]:
     """The best that can be done to surfaces that move together; amounts may differ."""
-    trial = Trial(scene, wish, members, joined)
-    target = wish.target(trial.problem)
+    trial = Trial(scene, members, joined)
+    target = wish.target(trial.problem, members, joined)
     best = trial.nothing()
-    for batch in wish.ways(trial.problem, target) if trial.problem.free.any() else ():
+    for batch in wish.ways(trial.problem, target, trial.width) if trial.problem.free.any() else ():
         best = max([best, *(trial.judged(wanted, target) for wanted in batch)], key=_worth)
         if best.least > ENOUGH:
             break

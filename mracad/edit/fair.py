@@ -5,33 +5,30 @@ Every face x is the one nearest to the input f whose bending is that of what is 
     x = argmin ‖x − f‖²_M + ℓ⁸ |x − g|²,   ℓ = scale / 2π
 
 under the conditions of seams and rims (:mod:`mracad.seam.solve`), |·| the energy of the filter of gain
-1 / (1 + (2πℓ/Λ)⁸) and g the face projected on the splines of ``TREND`` scales, which is shape (or 0, where g does not
+1 / (1 + (2πℓ/Λ)⁸) and g the face projected on the splines of a few scales, which is shape (or 0, where g does not
 follow a face).  Waves of half the scale keep 0.4 %, those of three scales all but 2e-4.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
+from mracad.bspline.net import Net
 from mracad.constraint.seam import Wishes
 from mracad.edit.driver import Result, drive
-from mracad.edit.target import sheets
+from mracad.edit.target import Creases, Sheet, Wish, sheets, stiffness
 from mracad.edit.trial import Scene, Tolerances
 from mracad.model import Model
-from mracad.seam.interface import joints
+from mracad.seam.interface import Joints, joints
 from mracad.seam.solve import Problem
 
 Array = np.ndarray
 
-TREND = 2.5
-"""Waves of more scales than this are shape."""
-
 DETAIL = 1e-7, 1e-6
-"""Least displacement that counts as detail: the kernel's coincidence tolerance, mm, and as a share of the scale."""
+"""Least displacement that counts as detail: the tolerance of coincidence, mm, and a share of the wavelength."""
 
 
 @dataclass(frozen=True)
@@ -40,42 +37,34 @@ class Filter:
 
     Attributes
     ----------
-    wavelength : float
-        The scale, mm.
+    scale : float
+        mm.
     """
 
-    wavelength: float
+    scale: float
 
-    @property
-    def stiffness(self) -> float:
-        """ℓ⁴, mm⁴."""
-        return (self.wavelength / (2 * math.pi)) ** 4
+    def wavelength(self, net: Net, creases: Creases) -> float:
+        """The scale, for every surface."""
+        return self.scale
 
-    def target(self, problem: Problem) -> Array:
+    def target(self, problem: Problem, sheets: Mapping[int, Sheet], joined: Joints) -> Array:
         """What smoothing would do were no rim held, ``(points, 3)``."""
-        return problem.filtered(self.stiffness, problem.seen, trended=True)
+        return problem.filtered(stiffness(self.scale), problem.seen, trended=True)
 
-    def ways(self, problem: Problem, target: Array) -> Iterable[Iterable[Array]]:
+    def ways(self, problem: Problem, target: Array, width: float) -> Iterable[Iterable[Array]]:
         """Noisy rims are met by projection, or in a band a wavelength wide; clean ones are held as one filters."""
         if not problem.rimmed:
             yield [target]
             return
-        fade = problem.fading(self.wavelength)
-        yield (
-            problem.nearest(target),
-            problem.nearest(fade * target),
-            problem.filtered(self.stiffness, trended=True),
-        )
-        yield (
-            problem.filtered(self.stiffness),
-            problem.nearest(fade * problem.filtered(self.stiffness, problem.seen)),
-        )
+        fade, stiff = problem.fading(width), stiffness(self.scale)
+        yield problem.nearest(target), problem.nearest(fade * target), problem.filtered(stiff, trended=True)
+        yield problem.filtered(stiff), problem.nearest(fade * problem.filtered(stiff, problem.seen))
 
 
 def faired(
     model: Model,
     movable: Collection[int],
-    scale: float,
+    wish: Wish,
     wishes: Wishes,
     tolerances: Tolerances,
     *,
@@ -89,8 +78,8 @@ def faired(
     model : Model
     movable : collection of int
         Faces on NURBS surfaces; those without detail stay.
-    scale : float
-        Wavelength, mm.
+    wish : Wish
+        What to do: :class:`Filter`, for example.
     wishes : Wishes
         What seams keep.
     tolerances : Tolerances
@@ -99,9 +88,10 @@ def faired(
     progress : callable, optional
         Called with surfaces done and surfaces in all, each counted twice: by itself and together with others.
     """
-    wish = Filter(scale)
-    every = sheets(model, movable, wish.stiffness, TREND * scale)
+    every = sheets(model, movable, wish)
     mending = wishes.close_gaps or wishes.fit > 0.0
-    rough = {i: sheet for i, sheet in every.items() if mending or sheet.detail > max(DETAIL[0], DETAIL[1] * scale)}
+    rough = {
+        i: each for i, each in every.items() if mending or each.detail > max(DETAIL[0], DETAIL[1] * each.wavelength)
+    }
     joined = joints(model, {face for sheet in rough.values() for face in sheet.movable}, wishes)
     return drive(Scene(model, rough, joined, int(wishes.keep[1]), tolerances, refine), wish, progress)

@@ -1,9 +1,11 @@
-"""Surfaces as an edit looks at them before it solves anything."""
+"""What an edit wants, and surfaces as it looks at them before it solves anything."""
 
 from __future__ import annotations
 
-from collections.abc import Collection
-from dataclasses import dataclass
+import math
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 
@@ -11,15 +13,41 @@ from mracad.bspline.net import Net
 from mracad.inspect.cells import quadrature
 from mracad.model import Face, Model
 from mracad.seam.energy import forms
+from mracad.seam.interface import Joints
 from mracad.seam.metric import SMOOTHER, creases, seen, smoothed
 from mracad.seam.solve import Problem, Space
 from mracad.wavelet.ladder import arc_lengths, ladder_for_scale
 from mracad.wavelet.project import projection
 
 Array = np.ndarray
+Creases = tuple[frozenset[float], frozenset[float]]
+"""Crease lines in u and v."""
 
 DEGREE = 3
 """Least degree of a surface that moves: knots set into a lower one make facets."""
+
+TREND = 2.5
+"""Waves of more wavelengths than this are shape."""
+
+
+class Wish(Protocol):
+    """What an edit wants."""
+
+    def wavelength(self, net: Net, creases: Creases) -> float:
+        """Wavelength below which it takes waves from a surface, mm: within it, it fades beside what is held."""
+        ...
+
+    def target(self, problem: Problem, sheets: Mapping[int, Sheet], joined: Joints) -> Array:
+        """What it would do to surfaces that seams join were no rim held, ``(points, 3)``."""
+        ...
+
+    def ways(self, problem: Problem, target: Array, width: float) -> Iterable[Iterable[Array]]:
+        """Displacements ``(points, 3)`` of a problem, of which that is done that may come nearest to the target.
+
+        They come in batches: the next is looked at only where the judge takes much off the one before.  Beside what is
+        held, they fade within ``width`` (mm).
+        """
+        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +66,8 @@ class Sheet:
         What displacements are measured on.
     creases : pair of frozenset of float
         Crease lines in u and v.
+    wavelength : float
+        Below which the edit takes waves from it, mm.
     trend : Net
         The surface projected on the splines of a few wavelengths: what is in it is shape.
     detail : float
@@ -50,9 +80,10 @@ class Sheet:
     all_faces: tuple[Face, ...]
     faces: tuple[Face, ...]
     metric: Net
-    creases: tuple[frozenset[float], frozenset[float]]
+    creases: Creases
+    wavelength: float
     trend: Net
-    detail: float
+    detail: float = 0.0
 
     @property
     def movable(self) -> frozenset[int]:
@@ -60,44 +91,37 @@ class Sheet:
         return frozenset(face.index for face in self.faces)
 
 
-def sheets(model: Model, movable: Collection[int], stiffness: float, scale: float) -> dict[int, Sheet]:
-    """The surfaces with faces that may move, by index.
+def stiffness(wavelength: float) -> float:
+    """ℓ⁴, mm⁴, of a wavelength 2πℓ."""
+    return (wavelength / (2 * math.pi)) ** 4
 
-    Parameters
-    ----------
-    model : Model
-    movable : collection of int
-        Faces.
-    stiffness : float
-        With which the edit filters, mm⁴.
-    scale : float
-        Waves longer than this are shape, mm.
-    """
+
+def sheets(model: Model, movable: Collection[int], wish: Wish) -> dict[int, Sheet]:
+    """The surfaces with faces (``movable``) that an edit may move, by index."""
     found = {}
     for surface in model.surfaces:
         every = tuple(model.faces[i] for i in surface.faces)
         faces = tuple(face for face in every if face.index in movable)
         if faces:
-            found[surface.index] = _sheet(surface.index, surface.net, every, faces, stiffness, scale)
+            found[surface.index] = _sheet(surface.index, surface.net, every, faces, wish)
     return found
 
 
-def _sheet(
-    index: int, origin: Net, every: tuple[Face, ...], faces: tuple[Face, ...], stiffness: float, scale: float
-) -> Sheet:
+def _sheet(index: int, origin: Net, every: tuple[Face, ...], faces: tuple[Face, ...], wish: Wish) -> Sheet:
     net = origin.over(origin.u.elevated(DEGREE), origin.v.elevated(DEGREE))
     points = quadrature(net, faces)
-    metric = smoothed(net, points, SMOOTHER**4 * stiffness)
     sharp = creases(net, np.ones(net.poles.shape[:2], bool))
+    wavelength = wish.wavelength(origin, sharp)
+    metric = smoothed(net, points, SMOOTHER**4 * stiffness(wavelength))
     form = forms(net, metric, points, sharp)
     reach = seen(net, form)
-    trend = _trend(net, sharp, scale)
-    change = Problem({index: Space(net, form, reach, reach, trend.poles)}).filtered(stiffness, trended=True)
-    detail = float(np.linalg.norm(change, axis=1).max(initial=0.0))
-    return Sheet(index, origin, net, every, faces, metric, sharp, trend, detail)
+    sheet = Sheet(index, origin, net, every, faces, metric, sharp, wavelength, _trend(net, sharp, TREND * wavelength))
+    alone = Problem({index: Space(net, form, reach, reach, sheet.trend.poles)})
+    change = wish.target(alone, {index: sheet}, Joints())
+    return replace(sheet, detail=float(np.linalg.norm(change, axis=1).max(initial=0.0)))
 
 
-def _trend(net: Net, sharp: tuple[frozenset[float], frozenset[float]], scale: float) -> Net:
+def _trend(net: Net, sharp: Creases, scale: float) -> Net:
     """The projection of a net on the splines of a scale that keep its creases."""
     poles = net.poles
     for axis, knots in enumerate((net.u, net.v)):

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -38,26 +38,6 @@ TIGHT = 0.3
 
 FINER = 3
 """Steps from one Greville point to the next in which deviations are looked for."""
-
-
-class Wish(Protocol):
-    """What an edit wants."""
-
-    @property
-    def wavelength(self) -> float:
-        """Length within which a displacement fades beside what is held, mm."""
-        ...
-
-    def target(self, problem: Problem) -> Array:
-        """What it would do were no rim held, ``(points, 3)``."""
-        ...
-
-    def ways(self, problem: Problem, target: Array) -> Iterable[Iterable[Array]]:
-        """Displacements ``(points, 3)`` of a problem, of which that is done that may come nearest to the target.
-
-        They come in batches: the next is looked at only where the judge takes much off the one before.
-        """
-        ...
 
 
 @dataclass(frozen=True)
@@ -141,10 +121,11 @@ class Verdict:
 class Trial:
     """Surfaces that move together: their problem, and the judge of what is done to them."""
 
-    def __init__(self, scene: Scene, wish: Wish, members: Mapping[int, Sheet], joined: Joints) -> None:
-        self.tolerances, self.width = scene.tolerances, wish.wavelength
+    def __init__(self, scene: Scene, members: Mapping[int, Sheet], joined: Joints) -> None:
+        self.tolerances = scene.tolerances
+        self.width = max(sheet.wavelength for sheet in members.values())
         movable = {face for sheet in members.values() for face in sheet.movable}
-        nets = {i: _space(scene, wish, sheet, joined.moving) for i, sheet in members.items()}
+        nets = {i: _space(scene, sheet, joined.moving) for i, sheet in members.items()}
         nets = matched(nets, joined.exact)
         spaces, contacts = {}, [contact(seam) for seam in joined.loose]
         for i, net in nets.items():
@@ -157,7 +138,7 @@ class Trial:
             trend = sheet.trend.over(net.u, net.v).poles
             spaces[i] = Space(net, form, points & ~held, points, trend, far)
         t = self.tolerances
-        self.limits = t.gap, t.angle, t.bend / wish.wavelength
+        self.limits = t.gap, t.angle, t.bend / self.width
         self.contacts = contact_rows(nets, contacts)
         self.owners = [each.surfaces for each in contacts]
         f = np.concatenate([net.poles.reshape(-1, 3) for net in nets.values()])
@@ -165,7 +146,7 @@ class Trial:
         closed = closing[self.contacts.owner, self.contacts.order]
         self.wanted = _mended(self.contacts.matrix, f, closed)
         rows, mended = seam_rows(nets, joined.exact)
-        weight = max(sheet.detail for sheet in members.values()) ** 2 * wish.wavelength
+        weight = max(sheet.detail for sheet in members.values()) ** 2 * self.width
         tight = [TIGHT * limit for limit in self.limits]
         soft = pull = None
         if contacts:
@@ -208,12 +189,12 @@ def _mended(rows: Any, f: Array, which: Array) -> Array:
     return np.where(which[:, None], -(rows @ (f - f.mean(axis=0))), 0.0)
 
 
-def _space(scene: Scene, wish: Wish, sheet: Sheet, moving: frozenset[int]) -> Net:
+def _space(scene: Scene, sheet: Sheet, moving: frozenset[int]) -> Net:
     """The surface with control points enough beside its rims."""
     if not scene.refine:
         return sheet.net
     held = [(face, trim) for face in sheet.faces for trim in face.trims if trim.edge not in moving]
-    return refined(sheet.net, held, wish.wavelength / 4)
+    return refined(sheet.net, held, sheet.wavelength / 4)
 
 
 def bounded(net: Net, offset: Array, bound: float, width: float) -> Array:

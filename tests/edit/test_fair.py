@@ -10,7 +10,7 @@ from mracad.bspline.knots import KnotVector
 from mracad.bspline.net import Net
 from mracad.constraint.seam import Wishes
 from mracad.edit.driver import groups
-from mracad.edit.fair import faired
+from mracad.edit.fair import Filter, faired
 from mracad.edit.trial import Tolerances
 from mracad.inspect.roughness import Growth, worse
 from mracad.inspect.survey import changes, surveys
@@ -26,7 +26,7 @@ ALLOWED = Growth(0.02, 0.02, 0.02, 0.1, 30.0)
 def smoothed(net, scale, **tolerances):
     """A sheet with its four edges held, faired; the result, and what became of its surface."""
     model = sheet(net)
-    result = faired(model, {0}, scale, Wishes(), Tolerances(1e-3, **tolerances))
+    result = faired(model, {0}, Filter(scale), Wishes(), Tolerances(1e-3, **tolerances))
     after = result.displacement().applied(model).surfaces[0].net
     return result, after
 
@@ -56,7 +56,7 @@ def error(found, patches, clean):
 @pytest.mark.parametrize(("keep", "most"), [("g1", 1.10), ("g2", 1.05)])
 def test_patches_come_close_to_the_unsplit_surface_and_stay_joined(noisy_panel, keep, most):
     clean, patches, model, unsplit = noisy_panel
-    result = faired(model, set(range(6)), 25.0, Wishes(keep), Tolerances(1e-3))
+    result = faired(model, set(range(6)), Filter(25.0), Wishes(keep), Tolerances(1e-3))
     after = result.displacement().applied(model)
     order = sorted(patches)
     rms = panels.rms({key: after.surfaces[i].net for i, key in enumerate(order)}, patches, clean)
@@ -85,7 +85,7 @@ def mixed(noise=0.3):
 def test_patches_of_other_degrees_knots_and_senses():
     clean, patches = mixed()
     model = view(panels.document(patches))
-    result = faired(model, set(range(4)), 35.0, Wishes("g1"), Tolerances(1e-3))
+    result = faired(model, set(range(4)), Filter(35.0), Wishes("g1"), Tolerances(1e-3))
     after = result.displacement().applied(model)
     rms = panels.rms({key: after.surfaces[i].net for i, key in enumerate(sorted(patches))}, patches, clean)
     assert len(result.joints.exact) == 4 and rms < 0.9 * error(patches, patches, clean)
@@ -202,7 +202,9 @@ def test_points_are_added_only_where_that_is_allowed():
     u, v = KnotVector.clamped(np.linspace(0, 40, 7), 3), KnotVector.clamped(np.linspace(0, 30, 7), 3)
     x, y = np.meshgrid(u.greville(), v.greville(), indexing="ij")
     model = sheet(Net(u, v, np.stack([x, y, np.random.default_rng(0).standard_normal(x.shape)], axis=-1)))
-    few, more = (faired(model, {0}, 12.0, Wishes(), Tolerances(1e-3), refine=refine) for refine in (False, True))
+    few, more = (
+        faired(model, {0}, Filter(12.0), Wishes(), Tolerances(1e-3), refine=refine) for refine in (False, True)
+    )
     assert few.moved[0].net.poles.shape[:2] == (9, 9)
     assert min(more.moved[0].net.poles.shape[:2]) > 9 and more.moved[0].gain > few.moved[0].gain
 
@@ -210,7 +212,7 @@ def test_points_are_added_only_where_that_is_allowed():
 def test_halves_that_meet_along_a_trim_curve():
     clean, left, right = halves.surfaces(0.2, (30, 60))
     model = view(halves.document(left, right))
-    result = faired(model, {0, 1}, 45.0, Wishes("g1"), Tolerances(1e-3))
+    result = faired(model, {0, 1}, Filter(45.0), Wishes("g1"), Tolerances(1e-3))
     after = result.displacement().applied(model)
     assert len(result.joints.loose) == 1
     (old,), (new,) = ([seam for seam in seams(each) if len(seam.faces) == 2] for each in (model, after))
