@@ -8,17 +8,14 @@ direction n × t, the curvature jump is |κ_a − κ_b|; relative, it is divided
 
 from __future__ import annotations
 
-from collections import defaultdict
 from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
 
-from mracad.bspline.knots import Side as Limit
-from mracad.bspline.net import Net, cross, curvature
 from mracad.constraint.coincide import GAP, TORN, coinciding
-from mracad.constraint.seam import from_inside
-from mracad.model import Edge, Face, Model, Side
+from mracad.constraint.sides import between, views
+from mracad.model import Edge, Model, Side
 
 Array = np.ndarray
 _Pair = tuple[Edge, bool, tuple[Side, Side]]
@@ -122,7 +119,7 @@ def _pairs(model: Model, every: bool = False) -> list[_Pair]:
 
 
 def _measured(model: Model, pairs: list[_Pair]) -> list[SeamMeasure]:
-    jets = _evaluate(model, [(edge, side) for edge, _, sides in pairs for side in sides])
+    jets = views(model, [(edge, side) for edge, _, sides in pairs for side in sides])
     return [_measure(*pair, *jets[2 * i : 2 * i + 2]) for i, pair in enumerate(pairs)]
 
 
@@ -132,7 +129,7 @@ def _measure(edge: Edge, sewn: bool, sides: tuple[Side, Side], a: Array, b: Arra
     apart -= (apart * edge.tangents).sum(axis=1, keepdims=True) * edge.tangents
     gaps = np.linalg.norm(apart, axis=1)
     one, two = a[:, 3:6], b[:, 3:6]
-    angles = np.degrees(np.arctan2(np.linalg.norm(cross(one, two), axis=1), (one * two).sum(axis=1)))
+    angles = np.degrees(between(one, two))
     jumps = np.abs(a[:, 6] - b[:, 6])
     bent = ~np.isnan(jumps)
     size = np.maximum(np.maximum(np.abs(a[:, 6]), np.abs(b[:, 6])), FLAT)[bent]
@@ -152,39 +149,3 @@ def _measure(edge: Edge, sewn: bool, sides: tuple[Side, Side], a: Array, b: Arra
         where=tuple(float(x) for x in edge.points[worst]),  # type: ignore[arg-type]
         sewn=sewn,
     )
-
-
-def _evaluate(model: Model, uses: list[tuple[Edge, Side]]) -> list[Array]:
-    """Points, outward normals and curvatures across the edge ``(k, 7)`` of each side, seen from inside its face.
-
-    Faces are evaluated once for all their edges.
-    """
-    result: list[Array] = [np.empty((0, 7))] * len(uses)
-    groups: dict[tuple[int, tuple[Limit, Limit]], list[tuple[int, Array]]] = defaultdict(list)
-    for i, (edge, side) in enumerate(uses):
-        if side.uv is None:
-            bends = np.full(len(side.points), np.nan) if side.curvatures is None else side.curvatures  # type: ignore[arg-type]
-            result[i] = np.column_stack([side.points, side.normals, bends])  # type: ignore[list-item]
-        else:
-            face = model.faces[side.face]
-            uv, limits = from_inside(face, _net(model, face), edge.index, side.uv)
-            groups[side.face, limits].append((i, uv))
-    for (number, limits), members in groups.items():
-        face = model.faces[number]
-        net, frame, sign = _net(model, face), face.frame, -1 if face.reversed else 1
-        uv = np.concatenate([uv for _, uv in members])
-        point, su, sv, *second = net.evaluate(uv, 2, limits)
-        jets = np.stack([point, su, sv, *second, net.normals(uv, limits, (su, sv))]) @ frame[:3, :3].T
-        point, *derivatives, normal = jets
-        tangents = np.concatenate([uses[i][0].tangents for i, _ in members])
-        bends = sign * curvature(tuple(derivatives), cross(normal, tangents))
-        table = np.column_stack([point + frame[:3, 3], sign * normal, bends])
-        ends = np.cumsum([len(uv) for _, uv in members])[:-1]
-        for (i, _), part in zip(members, np.split(table, ends), strict=True):
-            result[i] = part
-    return result
-
-
-def _net(model: Model, face: Face) -> Net:
-    assert face.surface is not None
-    return model.surfaces[face.surface].net

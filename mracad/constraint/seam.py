@@ -17,10 +17,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from mracad.bspline.knots import Side as Limit
-from mracad.bspline.net import Net, cross
+from mracad.bspline.net import cross
 from mracad.constraint.coincide import apart, coinciding, length, reach, touching
 from mracad.constraint.frozen import CONTINUITY, ISO, local_span
-from mracad.model import Edge, Face, Model, Side
+from mracad.constraint.sides import between, inner_side, views
+from mracad.model import Edge, Model, Side
 
 Array = np.ndarray
 _Jet = tuple[Array, ...]
@@ -48,6 +49,9 @@ EXACT, CLOSE = 1e-8, 2e-3
 """A joint's polynomials fit when they miss the input by EXACT of |T_n|; they serve up to CLOSE: the angle of the seam
 then grows by at most CLOSE of the angle by which the normal turns."""
 
+BENT = 0.01
+"""Share of the curvature by which it may jump along a seam that counts as continuous in curvature."""
+
 _SAMPLES = 0.5 - 0.5 * np.cos(np.pi * (np.arange(33) + 0.5) / 33)
 _SHAPES = ((0, -1), (0, 0), (1, -1), (1, 1), (2, -1), (2, 2))
 
@@ -58,18 +62,39 @@ class Wishes:
 
     Attributes
     ----------
-    keep : {"g0", "g1", "g2"}
+    keep : {"g0", "g1", "g2", "as-is"}
+        As it is: as much as each of them has.
     fit : float
         Seams whose normals differ by up to this angle anywhere are made tangent.
     close_gaps : bool
     hold : frozenset of int
         Edges that must not move.
+    bend : float
+        Jump of the curvature, 1/mm, that counts for nothing beside :data:`BENT` of the curvature itself.
     """
 
     keep: str = "g1"
     fit: float = 0.0
     close_gaps: bool = False
     hold: frozenset[int] = frozenset()
+    bend: float = 1e-9
+
+    def order(self, angles: Array, one: Array, other: Array) -> int:
+        """Derivatives across an edge that are kept, from what there is along it.
+
+        Parameters
+        ----------
+        angles : ndarray (q,)
+            Between the normals of its two faces.
+        one, other : ndarray (q,)
+            Curvatures of the two across it, 1/mm; NaN where there is none.
+        """
+        if not np.nanmax(angles, initial=0.0) <= max(CREASE, self.fit):
+            return 0
+        if self.keep in CONTINUITY:
+            return CONTINUITY[self.keep]
+        allowed = self.bend + BENT * np.maximum(np.abs(one), np.abs(other))
+        return 2 if bool((np.abs(one - other) <= allowed).all()) else 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -204,12 +229,15 @@ class Seams:
         Every other edge, and why it does not move.
     twins : dict of int to int
         Free edges that coincide with another one, as a whole.
+    orders : dict of int to int
+        Derivatives that edges keep with what lies beyond them, if it stays.
     """
 
     found: list[Seam] = field(default_factory=list)
     closing: dict[int, tuple[Border, Border]] = field(default_factory=dict)
     frozen: dict[int, str] = field(default_factory=dict)
     twins: dict[int, int] = field(default_factory=dict)
+    orders: dict[int, int] = field(default_factory=dict)
 
 
 def seams(model: Model, movable: Collection[int], wishes: Wishes) -> Seams:
@@ -222,15 +250,27 @@ def seams(model: Model, movable: Collection[int], wishes: Wishes) -> Seams:
         Faces that the edit may move.
     wishes : Wishes
     """
-    result = Seams()
-    for edge in model.edges:
-        if any(side.face in movable for side in edge.sides):
-            _sort(result, edge, _still(edge, wishes) or _seam(model, movable, wishes, (edge, edge), edge.sides))
-    for edge, one, two in coinciding(model):
-        _unsewn(result, model, movable, wishes, edge, (one, two))
+    own = [edge for edge in model.edges if any(side.face in movable for side in edge.sides)]
+    sewn = [(edge, edge.sides) for edge in own if len(edge.sides) == 2 and not edge.degenerate and len(edge.points)]
+    unsewn = [(edge, (one, two)) for edge, one, two in coinciding(model) if one.face in movable or two.face in movable]
+    result = Seams(orders=_orders(model, wishes, [*sewn, *unsewn]))
+    for edge in own:
+        _sort(result, edge, _still(edge, wishes) or _seam(result, model, movable, wishes, (edge, edge), edge.sides))
+    for edge, sides in unsewn:
+        _unsewn(result, model, movable, wishes, edge, sides)
     for index in touching(model) & result.frozen.keys():
         if result.frozen[index] == FREE:
             result.frozen[index] = ELSEWHERE
+    return result
+
+
+def _orders(model: Model, wishes: Wishes, found: Sequence[tuple[Edge, Sequence[Side]]]) -> dict[int, int]:
+    """Derivatives that edges keep, from how their two faces meet there."""
+    looks = views(model, [(edge, side) for edge, sides in found for side in sides])
+    result: dict[int, int] = {}
+    for (edge, _), a, b in zip(found, looks[::2], looks[1::2], strict=True):
+        order = wishes.order(between(a[:, 3:6], b[:, 3:6]), a[:, 6], b[:, 6])
+        result[edge.index] = max(order, result.get(edge.index, 0))
     return result
 
 
@@ -262,6 +302,8 @@ def _unsewn(
 ) -> None:
     """Look at a free edge that coincides with one of another face."""
     other = _twin(model, edge, sides[1].face)
+    if other:
+        result.orders[other.index] = max(result.orders[edge.index], result.orders.get(other.index, 0))
     if edge.index not in result.frozen or (other and other.index not in result.frozen):
         return
     if other is None:
@@ -271,7 +313,7 @@ def _unsewn(
     if wishes.hold & {edge.index, other.index}:
         result.frozen.update(dict.fromkeys((edge.index, other.index), HELD))
         return
-    seam = _seam(model, movable, wishes, (edge, other), (sides[0], other.sides[0]))
+    seam = _seam(result, model, movable, wishes, (edge, other), (sides[0], other.sides[0]))
     if not isinstance(seam, tuple):
         _sort(result, edge, seam)
 
@@ -296,7 +338,12 @@ def runs_back(one: Array, other: Array) -> bool:
 
 
 def _seam(
-    model: Model, movable: Collection[int], wishes: Wishes, edges: tuple[Edge, Edge], sides: Sequence[Side]
+    known: Seams,
+    model: Model,
+    movable: Collection[int],
+    wishes: Wishes,
+    edges: tuple[Edge, Edge],
+    sides: Sequence[Side],
 ) -> Seam | str | tuple[Border, Border]:
     """The seam, why there is none, or its borders where a periodic space closes it."""
     for side in sides:
@@ -319,12 +366,20 @@ def _seam(
         if knots.periodic and abs(abs(a.at - b.at) - knots.period) <= ISO * knots.period:
             return a, b
     found = jets(model, a, _SAMPLES, 2), jets(model, b, _SAMPLES, 2)
-    joint = _joint(model, (a, b), found, wishes)
+    order = known.orders.get(edges[0].index, 0)
+    if wishes.keep not in CONTINUITY:
+        order = min(order, *(_room(model, border) for border in (a, b)))
+    joint = _joint(model, (a, b), found, order, wishes)
     if isinstance(joint, str):
         return joint
     gap, angle = _opening(model, (a, b), found)
-    wished = CONTINUITY[wishes.keep] if angle <= max(CREASE, wishes.fit) else 0
-    return Seam(edges[0].index, edges[1].index, a, b, joint, gap, angle, joint.order < wished)
+    return Seam(edges[0].index, edges[1].index, a, b, joint, gap, angle, joint.order < order)
+
+
+def _room(model: Model, border: Border) -> int:
+    """Derivatives across a border that may be kept, and on the other side of the surface, without tying all points."""
+    net = model.surfaces[border.surface].net
+    return 2 if (net.u, net.v)[border.axis].count > 6 else 1
 
 
 def border(model: Model, edge: Edge, side: Side, use: int) -> Border | None:
@@ -350,26 +405,9 @@ def border(model: Model, edge: Edge, side: Side, use: int) -> Border | None:
             return None
         limit: Limit = "right" if place <= low else "left"
         if low < place < high:
-            limit = _inner_side(face, trim.edge, axis, place)
+            limit = inner_side(face, trim.edge, axis, place)
         return Border(face.index, face.surface, axis, place, limit, start, stop)
     return None
-
-
-def from_inside(face: Face, net: Net, edge: int, uv: Array) -> tuple[Array, tuple[Limit, Limit]]:
-    """Parameters ``uv`` (k, 2) along an edge of a face, moved onto the knot line that it lies on, and the limits there.
-
-    They matter where the surface goes on beyond the edge, unseen, another way.
-    """
-    found: list[Limit] = ["right", "right"]
-    for axis, knots in enumerate((net.u, net.v)):
-        at = float(uv[:, axis].mean())
-        low, high = knots.domain
-        near = 2 * ISO * local_span(knots, at)
-        nearest = float(knots.breaks[np.argmin(np.abs(knots.breaks - at))])
-        if low < at < high and np.abs(uv[:, axis] - nearest).max() <= near:
-            found[axis] = _inner_side(face, edge, axis, nearest)
-            uv = np.where(np.arange(2) == axis, nearest, uv)
-    return uv, (found[0], found[1])
 
 
 def _pace(count: int) -> Array:
@@ -380,12 +418,6 @@ def _pace(count: int) -> Array:
 def _snapped(breaks: Array, x: float) -> float:
     nearest = float(breaks[np.argmin(np.abs(breaks - x))])
     return nearest if abs(nearest - x) <= 1e-9 * (breaks[-1] - breaks[0]) else x
-
-
-def _inner_side(face: Face, edge: int, axis: int, at: float) -> Limit:
-    """On which side of the line ``at`` the rest of the face's boundary lies."""
-    others = [trim.curve.poles[:, axis] for trim in face.trims if trim.edge != edge]
-    return "right" if others and np.concatenate(others).mean() > at else "left"
 
 
 def jets(model: Model, border: Border, share: Array, order: int) -> tuple[Array, ...]:
@@ -415,13 +447,10 @@ def _outward(model: Model, border: Border, across: Array, along: Array) -> Array
     return (-1 if turned else 1) * cross(*((across, along) if border.axis == 0 else (along, across)))
 
 
-def between(one: Array, two: Array) -> Array:
-    """Angles between vectors."""
-    return np.arctan2(np.linalg.norm(cross(one, two), axis=1), (one * two).sum(axis=1))
-
-
-def _joint(model: Model, borders: tuple[Border, Border], found: tuple[_Jet, _Jet], wishes: Wishes) -> Joint | str:
-    """The joint between two borders, as much of it as has a law; or why there is none."""
+def _joint(
+    model: Model, borders: tuple[Border, Border], found: tuple[_Jet, _Jet], order: int, wishes: Wishes
+) -> Joint | str:
+    """The joint between two borders, as much of an order as has a law; or why there is none."""
     (a, b), ((s, sn, st, snn), (t, tn, tt, tnn)) = borders, found
     length = np.linalg.norm(st, axis=1).mean()
     slip = np.abs(((s - t) * st).sum(axis=1) / np.maximum(np.linalg.norm(st, axis=1), 1e-12 * length)).max()
@@ -431,11 +460,10 @@ def _joint(model: Model, borders: tuple[Border, Border], found: tuple[_Jet, _Jet
     sizes = [np.linalg.norm(n, axis=1) for n in normals]
     if min(size.min() / max(size.max(), 1e-300) for size in sizes) < 1e-9:
         return "degenerate along the seam"
-    angle = between(*normals)
-    order, close = CONTINUITY[wishes.keep], wishes.close_gaps
-    if order == 0 or angle.max() > max(CREASE, wishes.fit):
+    close = wishes.close_gaps
+    if order == 0:
         return Joint(0, np.ones(1), np.empty(0), close=close)
-    fit = bool(angle.max() <= wishes.fit)
+    fit = bool(between(*normals).max() <= wishes.fit)
     across, along = _components(sn, st, tn)
     size = np.linalg.norm(tn, axis=1)
     for limit in (EXACT, CLOSE):

@@ -23,9 +23,10 @@ from mracad.bspline.functions import functions
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.knots import Side as Limit
 from mracad.bspline.net import Curve, Net, curvature
-from mracad.constraint.frozen import CONTINUITY, local_span
+from mracad.constraint.frozen import local_span
 from mracad.constraint.region import meeting
-from mracad.constraint.seam import CREASE, UNEVEN, Seam, Wishes, between, from_inside, runs_back
+from mracad.constraint.seam import UNEVEN, Seam, Wishes, runs_back
+from mracad.constraint.sides import between, from_inside
 from mracad.model import Edge, Face, Model, Trim
 
 Array = np.ndarray
@@ -115,6 +116,8 @@ class TrimmedSeam:
         Largest gap, angle and curvature jump of the input, as :func:`parted` measures them.
     close, fit : bool
         Whether the gap and the tilt of the input are to be pulled shut instead of carried.
+    since : {0, 1, 2}
+        The least of the derivatives that are kept to the tolerance: an exact seam keeps those below.
     """
 
     edge: int
@@ -125,6 +128,7 @@ class TrimmedSeam:
     opening: Array
     close: bool
     fit: bool
+    since: int = 0
 
     def excess(
         self, before: Model, after: Model, allowed: Sequence[float], more: Sequence[float]
@@ -198,15 +202,17 @@ def beside(model: Model, seam: Seam, wishes: Wishes) -> TrimmedSeam | str:
         Trace(x.face, x.surface, Curve(line, x.places(ends)), line=(x.axis, x.at), limits=x.limits("right"))
         for x in (seam.a, seam.b)
     )
-    return _judged(model, seam.edge, seam.twin, (a, b), wishes)
+    found = _judged(model, seam.edge, seam.twin, (a, b), wishes)
+    return replace(found, since=seam.joint.order + 1) if isinstance(found, TrimmedSeam) and seam.joint.order else found
 
 
 def _judged(model: Model, edge: int, twin: int, traces: tuple[Trace, Trace], wishes: Wishes) -> TrimmedSeam | str:
-    opening = parted(model, *traces, judged(model, traces)).max(axis=1)
+    apart, angles, bends = _opened(model, traces, judged(model, traces))
+    opening = np.array([apart.max(), angles.max(), np.abs(bends[0] - bends[1]).max()])
     angle = opening[1]
     if not np.isfinite(angle):
         return "degenerate along the seam"
-    order = CONTINUITY[wishes.keep] if angle <= max(CREASE, wishes.fit) else 0
+    order = wishes.order(angles, *bends)
     if order == 2 and not np.isfinite(opening[2]):
         return "no curvature along the seam"
     close, fit = wishes.close_gaps, order > 0 and bool(angle <= wishes.fit)
@@ -235,8 +241,14 @@ def judged(model: Model, traces: tuple[Trace, Trace]) -> Array:
 
 def parted(model: Model, a: Trace, b: Trace, share: Array) -> Array:
     """Gap (mm, what lies along the seam left out), angle between outward normals, curvature jump (1/mm): ``(3, q)``."""
+    apart, angles, bends = _opened(model, (a, b), share)
+    return np.stack([apart, angles, np.abs(bends[0] - bends[1])])
+
+
+def _opened(model: Model, traces: tuple[Trace, Trace], share: Array) -> tuple[Array, Array, list[Array]]:
+    """Gap (mm) and angle between outward normals at fractions of a seam, and the curvatures of both sides across it."""
     points, normals, bends = [], [], []
-    for trace in (a, b):
+    for trace in traces:
         face, net = model.faces[trace.face], model.surfaces[trace.surface].net
         s, *derivatives = (x @ face.frame[:3, :3].T for x in trace.on(net, share, 2))
         way = trace.way(share)
@@ -248,7 +260,7 @@ def parted(model: Model, a: Trace, b: Trace, share: Array) -> Array:
     apart = across(points[0] - points[1], along)
     angle = between(*normals)
     angle[np.minimum(*(np.linalg.norm(n, axis=1) for n in normals)) == 0.0] = np.nan
-    return np.stack([np.linalg.norm(apart, axis=1), angle, np.abs(bends[0] - bends[1])])
+    return np.linalg.norm(apart, axis=1), angle, bends
 
 
 def across(vectors: Array, along: Array) -> Array:

@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mracad.bspline.net import Net
-from mracad.constraint.seam import Seam
 from mracad.constraint.trimmed import TrimmedSeam
 from mracad.edit.target import Sheet, Wish
 from mracad.edit.trial import Scene, Trial, Verdict, Watch, displaced
@@ -113,19 +112,18 @@ def drive(scene: Scene, wish: Wish, progress: Callable[[int, int], None] | None 
     """Do as much of a wish as the judge allows."""
     tell = progress or (lambda done, total: None)
     result: dict[int, Moved] = {}
-    lone = Joints(closing=scene.joints.closing)
     for done, (i, sheet) in enumerate(scene.sheets.items()):
         tell(done, 2 * len(scene.sheets))
-        result |= _attempt(scene, wish, {i: sheet}, lone)
+        result |= _attempt(scene, wish, {i: sheet}, scene.joints.among({i}))
     rest = [i for i, moved in result.items() if moved.amount >= LEAST]
-    exact: list[Seam] = []
+    exact = [seam for seam in scene.joints.exact if seam.a.surface == seam.b.surface and seam.a.surface in result]
     loose: list[TrimmedSeam] = []
     done = len(scene.sheets)
     for group in groups(rest, scene.joints.among(rest)):
         tell(done, 2 * len(scene.sheets))
         done += len(group)
         for part, joined in _together(scene, wish, group, result):
-            exact += joined.exact
+            exact += [seam for seam in joined.exact if seam.a.surface != seam.b.surface]
             loose += joined.loose
             result |= part
     return Result(result, replace(scene.joints, exact=tuple(exact), loose=tuple(loose)))
@@ -139,7 +137,7 @@ def _together(
     while waiting:
         part, rounds = waiting.pop()
         joined = scene.joints.among(part)
-        if not (joined.exact or joined.loose) or not rounds:
+        if len(part) < 2 or not rounds:
             continue
         found = _attempt(scene, wish, {i: scene.sheets[i] for i in part}, joined)
         good = [i for i, moved in found.items() if moved.amount >= LEAST]

@@ -12,7 +12,7 @@ follow a face).  Waves of half the scale keep 0.4 %, those of three scales all b
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -93,5 +93,6 @@ def faired(
     rough = {
         i: each for i, each in every.items() if mending or each.detail > max(DETAIL[0], DETAIL[1] * each.wavelength)
     }
-    joined = joints(model, {face for sheet in rough.values() for face in sheet.movable}, wishes)
-    return drive(Scene(model, rough, joined, int(wishes.keep[1]), tolerances, refine), wish, progress)
+    bend = tolerances.bend / max((each.wavelength for each in rough.values()), default=1.0)
+    joined = joints(model, {face for each in rough.values() for face in each.movable}, replace(wishes, bend=bend))
+    return drive(Scene(model, rough, joined, tolerances, refine), wish, progress)

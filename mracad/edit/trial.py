@@ -73,8 +73,6 @@ class Scene:
     sheets : mapping of int to Sheet
         The surfaces that it may move.
     joints : Joints
-    keep : {0, 1, 2}
-        Derivatives that smooth rims keep.
     tolerances : Tolerances
     refine : bool
         Whether control points may be added beside rims.
@@ -83,7 +81,6 @@ class Scene:
     model: Model
     sheets: Mapping[int, Sheet]
     joints: Joints
-    keep: int
     tolerances: Tolerances
     refine: bool = True
 
@@ -132,7 +129,7 @@ class Trial:
             sheet = members[i]
             form = forms(net, sheet.metric, quadrature(net, sheet.faces), sheet.creases)
             points = seen(net, form)
-            held, more = rims(scene.model, net, sheet.all_faces, movable, joined.moving, scene.keep)
+            held, more = rims(scene.model, net, sheet.all_faces, movable, joined)
             contacts += more
             far = away(scene.model, net, sheet.faces, joined.moving)
             trend = sheet.trend.over(net.u, net.v).poles

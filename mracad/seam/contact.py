@@ -42,6 +42,8 @@ class Contact:
         Derivatives across the trace that are kept.
     close, fit : bool
         Whether the gap and the tilt of the input are pulled shut.
+    since : {0, 1, 2}
+        The least of the derivatives that are asked.
     """
 
     a: Trace
@@ -49,6 +51,7 @@ class Contact:
     order: int
     close: bool = False
     fit: bool = False
+    since: int = 0
 
     @property
     def surfaces(self) -> set[int]:
@@ -118,7 +121,7 @@ def rows(nets: Mapping[int, Net], contacts: Sequence[Contact]) -> Rows:
         ways = conormals(nets, contact.a, contact.b or contact.a, share)
         curve = nets[contact.a.surface].evaluate(contact.a.places(_EVENLY))
         width = np.linalg.norm(np.diff(curve, axis=0), axis=1).sum() * part
-        for order in range(contact.order + 1):
+        for order in range(contact.since, contact.order + 1):
             row = count + np.arange(len(share))
             for side, (way, bend), sign in zip(sides, ways, (1.0, -1.0), strict=False):
                 index, table = functions(nets[side.surface], side.places(share), order, side.limits)

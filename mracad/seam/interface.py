@@ -12,11 +12,11 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from mracad.bspline.net import Net, cross
+from mracad.bspline.net import Net
 from mracad.constraint.frozen import meeting, reached
-from mracad.constraint.seam import CREASE, TRIMMED, UNEVEN, Border, Seam, Wishes, seams
+from mracad.constraint.seam import TRIMMED, UNEVEN, Border, Seam, Wishes, seams
 from mracad.constraint.trimmed import TrimmedSeam, beside, trace_of, trimmed
-from mracad.model import Edge, Face, Model, Side, Trim
+from mracad.model import Face, Model, Trim
 from mracad.seam.contact import Contact
 from mracad.seam.space import line
 
@@ -42,12 +42,15 @@ class Joints:
         Closing edges that a periodic space keeps smooth by itself.
     frozen : mapping of int to str
         Edges that stay, and why.
+    orders : mapping of int to int
+        Derivatives that edges keep with what lies beyond them, where they stay; none where it is not said.
     """
 
     exact: tuple[Seam, ...] = ()
     loose: tuple[TrimmedSeam, ...] = ()
     closing: Mapping[int, tuple[Border, Border]] = field(default_factory=dict)
     frozen: Mapping[int, str] = field(default_factory=dict)
+    orders: Mapping[int, int] = field(default_factory=dict)
 
     @property
     def moving(self) -> frozenset[int]:
@@ -83,23 +86,23 @@ def joints(model: Model, movable: Collection[int], wishes: Wishes) -> Joints:
                 frozen.pop(twin.index, None)
             else:
                 frozen[index] = found
-    for seam in [seam for seam in exact if seam.loose and seam.joint.order == 0]:
+    for seam in [seam for seam in exact if seam.loose]:
         rest = beside(model, seam, wishes)
         if isinstance(rest, TrimmedSeam):
             loose.append(rest)
-        else:
+        elif not seam.joint.order:
             exact.remove(seam)
             frozen |= dict.fromkeys((seam.edge, seam.twin), rest)
-    return Joints(tuple(exact), tuple(loose), known.closing, frozen)
+    return Joints(tuple(exact), tuple(loose), known.closing, frozen, known.orders)
 
 
 def contact(seam: TrimmedSeam) -> Contact:
     """A seam kept to a tolerance, as conditions see it."""
-    return Contact(seam.a, seam.b, seam.order, seam.close, seam.fit)
+    return Contact(seam.a, seam.b, seam.order, seam.close, seam.fit, seam.since)
 
 
 def rims(
-    model: Model, net: Net, faces: Iterable[Face], movable: Collection[int], moving: Collection[int], keep: int
+    model: Model, net: Net, faces: Iterable[Face], movable: Collection[int], joined: Joints
 ) -> tuple[Array, list[Contact]]:
     """What holds a surface: control points that stay, and contacts with what stays.
 
@@ -110,17 +113,17 @@ def rims(
         The surface in the space of its displacement.
     faces : iterable of Face
         All faces on it.
-    movable, moving : collection of int
-        Faces and edges that may move.
-    keep : {0, 1, 2}
-        Derivatives that smooth rims keep.
+    movable : collection of int
+        Faces that may move.
+    joined : Joints
+        What moves with them, and what the other edges keep.
 
     Returns
     -------
     held : ndarray of bool (nu, nv)
     contacts : list of Contact
     """
-    held, contacts = np.zeros(net.poles.shape[:2], bool), []
+    held, contacts, moving = np.zeros(net.poles.shape[:2], bool), [], joined.moving
     for face in faces:
         if face.index not in movable:
             held |= reached(net, [face])[face.index]
@@ -129,7 +132,7 @@ def rims(
             edge = model.edges[trim.edge]
             if edge.index in moving:
                 continue
-            order = keep if smooth(model, edge) else 0
+            order = joined.orders.get(edge.index, 0)
             found = end(net, trim)
             if found is not None:
                 held |= _rows(net, trim, *found, order)
@@ -180,23 +183,3 @@ def _rows(net: Net, trim: Trim, axis: int, place: int, order: int) -> Array:
     along = trim.curve.poles[:, 1 - axis]
     columns = meeting((net.u, net.v)[1 - axis], float(along.min()), float(along.max()))
     return across[:, None] & columns if axis == 0 else columns[:, None] & across
-
-
-def smooth(model: Model, edge: Edge) -> bool:
-    """Whether two faces meet at an edge without a crease."""
-    if edge.degenerate or len(edge.sides) != 2 or not len(edge.points):
-        return False
-    one, other = (_normals(model, side) for side in edge.sides)
-    angle = np.arctan2(np.linalg.norm(cross(one, other), axis=1), (one * other).sum(axis=1))
-    return bool(np.nanmax(angle, initial=0.0) <= CREASE)
-
-
-def _normals(model: Model, side: Side) -> Array:
-    """Outward normals along an edge."""
-    if side.uv is None:
-        assert side.normals is not None
-        return side.normals
-    face = model.faces[side.face]
-    assert face.surface is not None
-    found = model.surfaces[face.surface].net.normals(side.uv) @ face.frame[:3, :3].T
-    return -found if face.reversed else found

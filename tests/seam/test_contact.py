@@ -159,3 +159,10 @@ def test_how_far_contacts_are_off():
     assert found.off(delta, wanted, tolerances) == pytest.approx([3.0, 2.0])
     assert found.off(delta, found.matrix @ delta, tolerances) == pytest.approx([0.0, 0.0], abs=1e-12)
     assert rows({0: net}, []).off(delta[:n], wanted[:0], tolerances).size == 0
+
+
+def test_only_what_is_asked_has_rows():
+    net = plane(3)
+    trace = Trace(0, 0, segment((0, 0), (1, 1)))
+    whole, rest = (rows({0: net}, [Contact(trace, None, 2, since=since)]) for since in (0, 2))
+    assert set(rest.order) == {2} and np.array_equal(rest.matrix.toarray(), whole.matrix.toarray()[whole.order == 2])

@@ -5,12 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from mracad.bspline.interpolate import interpolated
 from mracad.bspline.net import Net
 from mracad.constraint.seam import Wishes
 from mracad.inspect.cells import quadrature
 from mracad.model import Edge, Face, Model, Side, Surface, Trim
 from mracad.occ.view import view
-from mracad.seam.interface import away, end, joints, rims
+from mracad.seam.interface import Joints, away, contact, end, joints, rims
 from mracad.seam.metric import planar, smoothed
 from mracad.seam.space import MOST_POINTS, refined
 from mracad.wavelet.ladder import arc_lengths
@@ -26,8 +27,9 @@ def trimmed(net, curves):
     return Model("face", (Surface(0, net, (0,)),), (own,), edges, 1.0)
 
 
-def held_by(model, net, moving=(), keep=1, movable=(0,)):
-    return rims(model, net, model.faces, set(movable), set(moving), keep)
+def held_by(model, net, moving=(), orders=(), movable=(0,)):
+    joined = Joints(closing=dict.fromkeys(moving), orders=dict(orders))
+    return rims(model, net, model.faces, set(movable), joined)
 
 
 def test_a_natural_rim_holds_its_row():
@@ -40,24 +42,56 @@ def test_a_natural_rim_holds_its_row():
     assert not held[1:-1, 0].any() and held[[0, -1]].all() and held[:, -1].all()
 
 
-def beside(angle):
-    """A sheet whose first edge, y = 0, is shared with a plane at an angle that no edit moves."""
+def beside(angle, curvature=0.0):
+    """A sheet whose first edge, y = 0, is shared with a face at an angle that no edit moves."""
     net = plane(6)
     model = sheet(net)
     edge = model.edges[0]
     normals = np.tile([0.0, -np.sin(angle), np.cos(angle)], (len(edge.points), 1))
-    other = Side(1, points=edge.points, normals=normals, curvatures=np.zeros(len(normals)))
+    other = Side(1, points=edge.points, normals=normals, curvatures=np.full(len(normals), curvature))
     flat = Face(1, "plane", None, (), False, np.eye(4), model.faces[0].box)
     edges = (replace(edge, sides=(edge.sides[0], other)), *model.edges[1:])
     return replace(model, faces=(*model.faces, flat), edges=edges), net
 
 
-@pytest.mark.parametrize("keep", [0, 1, 2])
-def test_smooth_rims_hold_as_many_rows_as_they_keep_derivatives(keep):
-    for angle, rows in ((0.0, keep + 1), (0.5, 1)):
+@pytest.mark.parametrize(("keep", "bent"), [("g0", 0), ("g1", 1), ("g2", 2), ("as-is", 2)])
+def test_smooth_rims_hold_as_many_rows_as_they_keep_derivatives(keep, bent):
+    for angle, rows in ((0.0, bent + 1), (0.5, 1)):
         model, net = beside(angle)
-        held, _ = rims(model, net, model.faces[:1], {0}, set(), keep)
+        joined = joints(model, {0}, Wishes(keep))
+        held, _ = rims(model, net, model.faces[:1], {0}, joined)
         assert held[:, :rows].all() and not held[1:-1, rows:-1].any()
+
+
+def test_rims_keep_what_they_have():
+    for curvature, allowed, order in ((0.0, 0.0, 2), (1e-3, 1e-4, 1), (1e-3, 2e-3, 2), (np.nan, 1.0, 1)):
+        model, _ = beside(0.0, curvature)
+        assert joints(model, {0}, Wishes("as-is", bend=allowed)).orders == {0: order}
+    model, _ = beside(0.5)
+    assert joints(model, {0}, Wishes("as-is")).orders == {0: 0}
+
+
+@pytest.mark.parametrize("bend", [1.0, -1.0])
+def test_curvatures_may_differ_by_a_hundredth(bend):
+    wishes, straight = Wishes("as-is"), np.zeros(5)
+    one = bend * np.linspace(0.5, 2.0, 5)
+    assert wishes.order(straight, one, 0.995 * one) == 2 and wishes.order(straight, one, 0.98 * one) == 1
+    assert wishes.order(straight, one, -one) == 1
+    assert wishes.order(straight + 0.1, one, one) == 0
+
+
+def test_rims_of_faces_that_were_never_sewn_keep_what_they_have():
+    clean, _ = panels.whole(6, 0.0, patches=(1, 2))
+    model = view(panels.document(panels.cut(clean, (1, 2)), sewn=False))
+    both = joints(model, {0, 1}, Wishes("g1"))
+    assert len(both.exact) == 1
+    twins = {both.exact[0].edge, both.exact[0].twin}
+    for movable in ({0}, {1}):
+        joined = joints(model, movable, Wishes("g1"))
+        assert not joined.exact and {edge for edge, order in joined.orders.items() if order} == twins
+        net = model.surfaces[next(iter(movable))].net
+        held, _ = rims(model, net, [model.faces[next(iter(movable))]], movable, joined)
+        assert held[3].sum() == 3  # two rows at the neighbour, one at the free edge
 
 
 def test_part_of_a_side_holds_what_reaches_it():
@@ -116,7 +150,7 @@ def test_closing_edges_of_periodic_surfaces_move():
     model = tube()
     joined = joints(model, {0}, Wishes())
     assert set(joined.closing) == {1} and joined.moving == {1} and not joined.exact
-    held, contacts = held_by(model, model.surfaces[0].net, joined.moving)
+    held, contacts = rims(model, model.surfaces[0].net, model.faces, {0}, joined)
     assert not contacts and held[:, [0, -1]].all() and not held[:, 1:-1].any()
 
 
@@ -198,3 +232,30 @@ def test_a_smoothed_metric_loses_noise_and_keeps_its_plane():
     assert np.abs(smoothed(net, rule, 1e-3).poles - net.poles).max() < 1e-9
     left = smoothed(rough, rule, 0.1**4).poles - net.poles
     assert left.std() < 0.4 * 0.01
+
+
+def met(steeper, bent):
+    """What joins two sheets of the height x² / 2 that meet in x = 0, of which one has another speed or bend."""
+    flat, (u, v) = plane(8, 6), (np.moveaxis(plane(8, 6).poles[..., :2], -1, 0))
+    left = graph(lambda x, y: x**2 / 2, 8, 6)
+    x = u * (1 + steeper * v)
+    right = interpolated(flat.u, flat.v, np.stack([x, v, (1 + bent) * x**2 / 2], axis=-1))
+    model = view(panels.pair(Net(left.u, left.v, left.poles * [-1.0, 1.0, 1.0]), Net(flat.u, flat.v, right)))
+    return joints(model, {0, 1}, Wishes("as-is"))
+
+
+def test_seams_keep_what_they_have_exactly_where_it_has_a_law():
+    for bent, order in ((0.0, 2), (0.005, 2), (0.5, 1)):
+        joined = met(0.0, bent)
+        assert [seam.joint.order for seam in joined.exact] == [order] and not joined.loose
+    joined = met(0.5, 0.0)
+    (exact,), (loose,) = joined.exact, joined.loose
+    assert (exact.joint.order, loose.order, loose.since) == (1, 2, 2)
+    assert contact(loose).since == 2 and joined.moving == {exact.edge}
+
+
+def test_a_patch_of_few_rows_keeps_tangents():
+    for spans, order in ((3, 1), (4, 2)):
+        clean, _ = panels.whole(spans, 0.0, patches=(1, 2))
+        model = view(panels.document(panels.cut(clean, (1, 2))))
+        assert [seam.joint.order for seam in joints(model, {0, 1}, Wishes("as-is")).exact] == [order]
