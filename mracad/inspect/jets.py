@@ -16,7 +16,7 @@ ORDERS = ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2), (3, 0), (2, 1), (1, 2)
 """Derivatives, by how often they are taken along u and v, in the order in which they are given."""
 
 
-def jets(net: Net, u: Array, v: Array, mask: Array, centre: Array) -> Array:
+def jets(net: Net, u: Array, v: Array, mask: Array, centre: Array, most: int = 3) -> Array:
     """Points and derivatives at the products of parameters that a mask takes.
 
     Parameters
@@ -27,46 +27,50 @@ def jets(net: Net, u: Array, v: Array, mask: Array, centre: Array) -> Array:
     mask : ndarray of bool (u.size, v.size)
     centre : ndarray (3,)
         Points are given relative to it: what is close to the origin keeps more digits.
+    most : {1, 2, 3}
+        Highest order.
 
     Returns
     -------
     ndarray (10, 3, q)
-        By ``ORDERS``, coordinate and point, v slowest.
+        Or less, as the highest order asks;
+        by ``ORDERS``, coordinate and point, v slowest.
     """
     poles = net.poles - centre
     if net.weights is not None:
         poles = np.concatenate([poles * net.weights[..., None], net.weights[..., None]], axis=2)
     k = poles.shape[2]
-    rows, in_u = _local(net.u, u)
-    columns, in_v = _local(net.v, v)
+    rows, in_u = _local(net.u, u, most)
+    columns, in_v = _local(net.v, v, most)
     along = np.matmul(in_u.reshape(len(u), -1, in_u.shape[-1]), poles[rows].reshape(*rows.shape, -1))
-    along = along.reshape(u.size, 4, net.v.count, k).transpose(1, 2, 3, 0)  # order, column, coordinate, u
+    along = along.reshape(u.size, most + 1, net.v.count, k).transpose(1, 2, 3, 0)  # order, column, coordinate, u
     inside = slice(None) if mask.all() else np.flatnonzero(mask.T)
-    found = np.empty((len(ORDERS), k, np.count_nonzero(mask)))
-    for r in range(4):
+    orders = [order for order in ORDERS if sum(order) <= most]
+    found = np.empty((len(orders), k, np.count_nonzero(mask)))
+    for r in range(most + 1):
         windows = along[r][columns].reshape(*columns.shape, -1)
-        taken = in_v[:, :, : 4 - r]
+        taken = in_v[:, :, : most + 1 - r]
         grid = np.matmul(taken.reshape(len(v), -1, taken.shape[-1]), windows)
-        grid = grid.reshape(v.size, 4 - r, k, u.size).transpose(1, 2, 0, 3).reshape(4 - r, k, -1)
-        for s in range(4 - r):
-            found[ORDERS.index((r, s))] = grid[s][:, inside]
+        grid = grid.reshape(v.size, most + 1 - r, k, u.size).transpose(1, 2, 0, 3).reshape(most + 1 - r, k, -1)
+        for s in range(most + 1 - r):
+            found[orders.index((r, s))] = grid[s][:, inside]
     return found if net.weights is None else _quotient(found)
 
 
-def _local(kv: KnotVector, x: Array) -> tuple[Array, Array]:
-    """Control points ``(pieces, d + 1)`` and derivatives of their functions, ``(pieces, points, 4, d + 1)``."""
-    first, values = jet(kv, x.ravel(), range(4))
-    start, local = first.reshape(x.shape), values.reshape(*x.shape, 4, -1)
+def _local(kv: KnotVector, x: Array, most: int) -> tuple[Array, Array]:
+    """Control points ``(pieces, d + 1)`` and derivatives of their functions, ``(pieces, points, most + 1, d + 1)``."""
+    first, values = jet(kv, x.ravel(), range(most + 1))
+    start, local = first.reshape(x.shape), values.reshape(*x.shape, most + 1, -1)
     if (start[:, -1] != start[:, 0]).any():  # pieces that end on a knot
         local = local.copy()
-        local[:, -1] = jet(kv, np.ascontiguousarray(x[:, -1]), range(4), "left")[1]
+        local[:, -1] = jet(kv, np.ascontiguousarray(x[:, -1]), range(most + 1), "left")[1]
     return (start[:, :1] + np.arange(kv.degree + 1)) % kv.count, local
 
 
 def _quotient(stack: Array) -> Array:
     """Derivatives of ``A / w`` from those of ``(A, w)``, by Leibniz' rule."""
     top, w = stack[:, :-1].copy(), stack[:, -1]
-    for place, (a, b) in enumerate(ORDERS):
+    for place, (a, b) in enumerate(ORDERS[: len(stack)]):
         for i in range(a + 1):
             for j in range(b + 1):
                 if i or j:

@@ -17,12 +17,12 @@ from typing import Any
 
 import numpy as np
 
-from mracad.bspline.basis import jet
-from mracad.bspline.functions import ORDERS, functions, rational
+from mracad.bspline.functions import ORDERS, functions
 from mracad.bspline.knots import KnotVector, Side
 from mracad.bspline.net import Net
 from mracad.inspect.cells import Quadrature
 from mracad.inspect.jets import jets
+from mracad.seam.integrals import Sites, integrals, sites
 
 Array = np.ndarray
 
@@ -31,34 +31,6 @@ KINK_WEIGHT = 1e3
 
 FLATTEST = 1e-4
 """Least ratio of the metric's singular values: beyond it (poles) the shorter direction counts as so long."""
-
-_BLOCK = 1 << 21
-
-
-@dataclass(frozen=True, eq=False)
-class Sites:
-    """Gauss points of one direction, and the basis functions there.
-
-    Attributes
-    ----------
-    first : ndarray (s,) of int
-        First basis function of each piece (a part of one span).
-    at, weight : ndarray (s, g)
-        Parameters, and weights in parameter units.
-    table : ndarray (s, g, 3, d + 1)
-        Values, first and second derivatives of the functions.
-    """
-
-    first: Array
-    at: Array
-    weight: Array
-    table: Array
-
-
-def _sites(knots: KnotVector, at: Array, weight: Array) -> Sites:
-    """The Gauss points ``at`` ``(s, g)``, each row inside one span."""
-    first, table = jet(knots, at.ravel(), range(3))
-    return Sites(first.reshape(at.shape)[:, 0], at, weight, table.reshape(*at.shape, 3, knots.degree + 1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,28 +66,21 @@ def forms(net: Net, metric: Net, quadrature: Quadrature, creases: Sequence[Colle
     creases : pair of collections of float
         Knots in u and v on which the surface has a crease: there only a displacement's own kink counts.
     """
-    along = _sites(net.u, quadrature.u, quadrature.wu), _sites(net.v, quadrature.v, quadrature.wv)
+    along = sites(net.u, quadrature.u, quadrature.wu), sites(net.v, quadrature.v, quadrature.wv)
     frame, area = _frames(metric, along)
     area = np.where(quadrature.mask, area, 0.0)
-    (su, gu), (sv, gv) = along[0].at.shape, along[1].at.shape
-    p, q = net.u.degree, net.v.degree
-    shape = net.u.count, net.v.count, 2 * p + 1, 2 * q + 1
-    mass, bending = np.zeros(shape), np.zeros(shape)
-    area = area.reshape(su, gu, sv, gv).transpose(0, 2, 1, 3).reshape(su, sv, gu * gv)
-    frame = frame.reshape(3, 5, su, gu, sv, gv).transpose(2, 4, 3, 5, 0, 1).reshape(su, sv, gu * gv, 3, 5)
-    local = (p + 1) * (q + 1)
-    rows = max(1, _BLOCK // (sv * gu * gv * local * 5))
-    for begin in range(0, su, rows):
-        part = slice(begin, begin + rows)
-        root = np.sqrt(area[part])[..., None]
-        table = _tables(net, along, part)
-        values = (table[:, :, :, 0] * root).reshape(-1, gu * gv, local)
-        _scatter(mass, values, along, part, net)
-        bend = np.matmul(frame[part] * root[..., None], table[:, :, :, 1:])
-        _scatter(bending, bend.reshape(-1, gu * gv * 3, local), along, part, net)
-    periodic = net.u.periodic, net.v.periodic
+    orders, mass = ORDERS[1:], area
+    if net.weights is not None:
+        orders, mass, frame = ORDERS, *_over_weights(net, along, area, frame)
+    frame = frame * np.sqrt(area)
+    bend = {(a, b): _dot(frame[i], frame[j]) for i, a in enumerate(orders) for j, b in enumerate(orders[: i + 1])}
+    periodic, scale = (net.u.periodic, net.v.periodic), net.weights
     smooth, sharp = _kinks(net, metric, quadrature, creases)
-    return Forms(_sparse(mass, periodic), _sparse(bending, periodic) + smooth, sharp)
+    return Forms(
+        _sparse(integrals(along, {(ORDERS[0], ORDERS[0]): mass}), periodic, scale),
+        _sparse(integrals(along, bend), periodic, scale) + smooth,
+        sharp,
+    )
 
 
 def _kinks(net: Net, metric: Net, quadrature: Quadrature, creases: Sequence[Collection[float]]) -> tuple[Any, Any]:
@@ -189,48 +154,10 @@ def _sloped(net: Net, metric: Net, uv: Array, axis: int, side: Side) -> tuple[Ar
     return index, _Side((dn - (f / g)[:, None] * dt) / height[:, None], height, np.sqrt(g))
 
 
-def _tables(net: Net, along: tuple[Sites, Sites], part: slice) -> Array:
-    """Values and derivatives ``(s, sv, g, 6, local)`` of the rational basis on cells, by ``ORDERS``."""
-    u, v = along[0].table[part], along[1].table
-    shape = len(u), len(v), u.shape[1] * v.shape[1], -1
-    table = [(u[:, None, :, None, a, :, None] * v[None, :, None, :, b, None, :]).reshape(shape) for a, b in ORDERS]
-    if net.weights is not None:
-        weights = net.weights.reshape(-1)[_index(net, along, part)][:, :, None]
-        table = rational(table, np.broadcast_to(weights, table[0].shape))
-    return np.stack(table, axis=3)
-
-
-def _index(net: Net, along: tuple[Sites, Sites], part: slice) -> Array:
-    """Control points ``(s, sv, local)`` of cells, row-major."""
-    row = (along[0].first[part, None] + np.arange(net.u.degree + 1)) % net.u.count
-    column = (along[1].first[:, None] + np.arange(net.v.degree + 1)) % net.v.count
-    index = row[:, None, :, None] * net.v.count + column[None, :, None, :]
-    return index.reshape(len(row), len(column), -1)
-
-
-def _scatter(form: Array, values: Array, along: tuple[Sites, Sites], part: slice, net: Net) -> None:
-    """Add ``valuesᵀ values`` of each cell to a form."""
-    p, q = net.u.degree, net.v.degree
-    square = np.matmul(values.swapaxes(1, 2), values)
-    rows, columns = along[0].first[part], along[1].first
-    square = square.reshape(len(rows), len(columns), p + 1, q + 1, p + 1, q + 1)
-    for a in range(p + 1):
-        row = ((rows + a) % net.u.count)[:, None]
-        for b in range(q + 1):
-            column = ((columns + b) % net.v.count)[None]
-            stencil = form[:, :, p - a : 2 * p + 1 - a, q - b : 2 * q + 1 - b]
-            if len(np.unique(row)) < len(row) or len(np.unique(column)) < column.size:
-                np.add.at(stencil, (row, column), square[:, :, a, b])
-            else:
-                stencil[row, column] += square[:, :, a, b]
-
-
 def _frames(metric: Net, along: tuple[Sites, Sites]) -> tuple[Array, Array]:
-    """Coefficients ``(3, 5, qu, qv)`` of H̃_11, √2 H̃_12, H̃_22 on ∂_u, ∂_v, ∂_uu, ∂_uv, ∂_vv, and areas ``(qu, qv)``."""
-    shape = along[0].at.size, along[1].at.size
-    found = jets(metric, along[0].at, along[1].at, np.ones(shape, bool), np.zeros(3))
-    xu, xv, xuu, xuv, xvv = found[1:6].reshape(5, 3, *shape[::-1]).transpose(0, 3, 2, 1)
-    e, f, g = ((a * b).sum(axis=-1) for a, b in ((xu, xu), (xu, xv), (xv, xv)))
+    """What H̃_11, √2 H̃_12, H̃_22 take of ∂_u, ∂_v, ∂_uu, ∂_uv, ∂_vv, ``(5, 3, qu, qv)``, and areas ``(qu, qv)``."""
+    xu, xv, xuu, xuv, xvv = _jets(metric, along)[1:]
+    e, f, g = _dot(xu, xu), _dot(xu, xv), _dot(xv, xv)
     root = np.sqrt(np.maximum(e * g - f * f, 0.0))
     # floors where the metric degenerates, so that nothing is divided by zero there
     mean_u, mean_v = (np.sqrt(np.median(x)) for x in (e, g))
@@ -239,35 +166,57 @@ def _frames(metric: Net, along: tuple[Sites, Sites]) -> tuple[Array, Array]:
     det = e * g - f * f
     christoffel = []
     for second in (xuu, xuv, xvv):
-        a, b = (second * xu).sum(axis=-1), (second * xv).sum(axis=-1)
+        a, b = _dot(second, xu), _dot(second, xv)
         christoffel.append(((g * a - f * b) / det, (e * b - f * a) / det))
     p = 1 / np.sqrt(e)
     r = np.sqrt(e / det)
     q = -f / e * r
-    zero, two = np.zeros_like(p), np.sqrt(2.0)
-    rows = (
-        (p * p, zero, zero),
-        (two * p * q, two * p * r, zero),
-        (q * q, 2 * q * r, r * r),
-    )
-    frame = np.empty((3, 5, *p.shape))
+    two = np.sqrt(2.0)
+    rows = (p * p,), (two * p * q, two * p * r), (q * q, 2 * q * r, r * r)
+    frame = np.zeros((5, 3, *p.shape))
     for i, row in enumerate(rows):
-        frame[i, 2:] = row
-        for d in (0, 1):
-            frame[i, d] = -sum(c * gamma[d] for c, gamma in zip(row, christoffel, strict=True))
-    weight = along[0].weight.ravel()[:, None] * along[1].weight.ravel()
-    return frame, root * weight
+        for k, value in enumerate(row):
+            frame[2 + k, i] = value
+            for d in (0, 1):
+                frame[d, i] -= value * christoffel[k][d]
+    return frame, root * (along[0].weight.reshape(-1, 1) * along[1].weight.ravel())
 
 
-def _sparse(form: Array, periodic: tuple[bool, bool]) -> Any:
-    """A stencil as ``scipy.sparse.csr_array`` on the control points in row-major order."""
+def _over_weights(net: Net, along: tuple[Sites, Sites], area: Array, frame: Array) -> tuple[Array, Array]:
+    """Coefficients of mass and what frames take of w_i B_i and its derivatives ``(6, 3, qu, qv)``, for w_i B_i / w."""
+    w, wu, wv, wuu, wuv, wvv = _jets(Net(net.u, net.v, net.weights[..., None]), along)[:, 0]
+    fu, fv, fuu, fuv, fvv = frame / w
+    lu, lv = wu / w, wv / w
+    slope_u, slope_v = fu - 2 * fuu * lu - fuv * lv, fv - fuv * lu - 2 * fvv * lv
+    value = -(slope_u * lu + slope_v * lv) - (fuu * wuu + fuv * wuv + fvv * wvv) / w
+    return area / w**2, np.stack([value, slope_u, slope_v, fuu, fuv, fvv])
+
+
+def _jets(net: Net, along: tuple[Sites, Sites]) -> Array:
+    """Points and derivatives ``(6, k, qu, qv)`` by ``ORDERS``."""
+    shape = along[0].at.size, along[1].at.size
+    found = jets(net, along[0].at, along[1].at, np.ones(shape, bool), np.zeros(net.poles.shape[2]), 2)
+    return np.ascontiguousarray(found.reshape(*found.shape[:2], *shape[::-1]).swapaxes(2, 3))
+
+
+def _dot(a: Array, b: Array) -> Array:
+    return np.asarray(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
+
+
+def _sparse(form: Array, periodic: tuple[bool, bool], scale: Array | None) -> Any:
+    """A stencil as ``scipy.sparse.csr_array`` on the control points in row-major order, scaled from both sides."""
     from scipy.sparse import csr_array
 
     nu, nv, wu, wv = form.shape
-    i, j, down, right = np.nonzero(form)
-    row, column = i + down - wu // 2, j + right - wv // 2
-    if periodic[0]:
-        row %= nu
-    if periodic[1]:
-        column %= nv
-    return csr_array((form[i, j, down, right], (i * nv + j, row * nv + column)), shape=(nu * nv, nu * nv))
+    row, column = (
+        ((np.arange(n)[:, None] + np.arange(w) - w // 2) % n).astype(np.int32) for n, w in ((nu, wu), (nv, wv))
+    )
+    at = row[:, None, :, None] * np.int32(nv) + column[:, None]
+    if scale is not None:
+        form = form * scale[:, :, None, None] * scale.ravel()[at]
+    there = form != 0
+    ends = np.append(0, np.count_nonzero(there.reshape(nu * nv, -1), axis=1).cumsum())
+    found = csr_array((form[there], at[there], ends), shape=(nu * nv, nu * nv))
+    if any(periodic):
+        found.sum_duplicates()
+    return found

@@ -1,0 +1,123 @@
+"""Integrals of products of derivatives of tensor-product functions, one direction after the other.
+
+    F_ij = Σ_αβ ∫ c_αβ D^α B_i D^β B_j du dv,        B_i(u, v) = N_a(u) N_b(v),
+
+c_αβ = c_βα given at Gauss points.  Per knot span this takes (p + 1) (q + 1)⁴ or so multiplications where adding up the
+products of all functions takes (p + 1)³ (q + 1)³.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from mracad.bspline.basis import jet
+from mracad.bspline.knots import KnotVector
+
+Array = np.ndarray
+
+Order = tuple[int, int]
+"""How often a derivative is taken along u and v."""
+
+_BLOCK = 1 << 22
+
+
+@dataclass(frozen=True, eq=False)
+class Sites:
+    """Gauss points of one direction, and the basis functions there.
+
+    Attributes
+    ----------
+    knots : KnotVector
+    first : ndarray (s,) of int
+        First basis function of each piece (a part of one span).
+    at, weight : ndarray (s, g)
+        Parameters, and weights in parameter units.
+    table : ndarray (s, g, 3, d + 1)
+        Values, first and second derivatives of the functions.
+    """
+
+    knots: KnotVector
+    first: Array
+    at: Array
+    weight: Array
+    table: Array
+
+
+def sites(knots: KnotVector, at: Array, weight: Array) -> Sites:
+    """The Gauss points ``at`` ``(s, g)``, each row inside one span."""
+    first, table = jet(knots, at.ravel(), range(3))
+    return Sites(knots, first.reshape(at.shape)[:, 0], at, weight, table.reshape(*at.shape, 3, knots.degree + 1))
+
+
+def integrals(along: tuple[Sites, Sites], coefficients: Mapping[tuple[Order, Order], Array]) -> Array:
+    """The form of given coefficients.
+
+    Parameters
+    ----------
+    along : pair of Sites
+    coefficients : mapping of pairs of orders to ndarray (points_u, points_v)
+        c_αβ times the weights of the points, for one of (α, β) and (β, α).
+
+    Returns
+    -------
+    ndarray (nu, nv, 2p + 1, 2q + 1)
+        ``[i, j, p + k, q + l]`` belongs to the functions (i, j) and (i + k, j + l).
+    """
+    u, v = along
+    (su, gu), p, q = u.at.shape, u.knots.degree, v.knots.degree
+    pairs: dict[Order, list[tuple[int, int, Array]]] = {}
+    for (a, b), values in coefficients.items():
+        low, high = (a, b) if a[0] <= b[0] else (b, a)
+        pairs.setdefault((low[0], high[0]), []).append((low[1], high[1], values))
+    form = np.zeros((u.knots.count, 2 * p + 1, v.knots.count * (2 * q + 1)))
+    rows = max(1, _BLOCK // (len(pairs) * gu * form.shape[2] * 2))
+    for begin in range(0, su, rows):
+        part = slice(begin, begin + rows)
+        lines = slice(begin * gu, min(begin + rows, su) * gu)
+        tables, found = [], []
+        for (i, j), each in pairs.items():
+            inner = _inner(v, [(k, m, c[lines]) for k, m, c in each], mirrored=i == j)
+            low, high = u.table[part, :, i, :, None], u.table[part, :, j, None]
+            tables += [low * high] if i == j else [low * high, high.swapaxes(2, 3) * low.swapaxes(2, 3)]
+            found += [inner] if i == j else [inner, _transposed(inner)]
+        count = len(tables[0])
+        outer = np.concatenate(tables, axis=1).reshape(count, len(found) * gu, -1).swapaxes(1, 2)
+        along_v = np.concatenate([each.reshape(count, gu, -1) for each in found], axis=1)
+        _added(form, u, part, np.matmul(outer, along_v).reshape(count, p + 1, p + 1, -1))
+    return form.reshape(u.knots.count, 2 * p + 1, v.knots.count, 2 * q + 1).swapaxes(1, 2)
+
+
+def _inner(v: Sites, parts: list[tuple[int, int, Array]], mirrored: bool) -> Array:
+    """``Σ ∫ c D^k N_b D^m N_b' dv`` on lines u = const, ``(lines, nv, 2q + 1)``; with its mirror image where asked."""
+    (sv, gv), q = v.at.shape, v.knots.degree
+    tables = []
+    for k, m, _ in parts:
+        product = v.table[:, :, k, :, None] * v.table[:, :, m, None]
+        tables.append(product + product.swapaxes(2, 3) if mirrored and k != m else product)
+    table = np.concatenate(tables, axis=1).reshape(sv, len(parts) * gv, -1)
+    values = np.concatenate([c.reshape(-1, sv, gv).swapaxes(0, 1) for _, _, c in parts], axis=2)
+    cells = np.matmul(values, table).reshape(sv, len(values[0]), q + 1, q + 1)
+    found = np.zeros((v.knots.count, 2 * q + 1, cells.shape[1]))
+    _added(found, v, slice(None), cells.transpose(0, 2, 3, 1))
+    return np.ascontiguousarray(found.transpose(2, 0, 1))
+
+
+def _added(form: Array, along: Sites, part: slice, cells: Array) -> None:
+    """Add what pieces ``(s, d + 1, d + 1, …)`` give pairs of functions to a stencil ``(n, 2d + 1, …)``."""
+    n, d = along.knots.count, along.knots.degree
+    first = along.first[part]
+    new = np.flatnonzero(np.diff(first, prepend=first[0] - 1))
+    if len(new) < len(first):  # pieces of one span
+        first, cells = first[new], np.add.reduceat(cells, new, axis=0)
+    for a in range(d + 1):
+        form[(first + a) % n, d - a : 2 * d + 1 - a] += cells[:, a]
+
+
+def _transposed(stencil: Array) -> Array:
+    """A stencil ``(lines, n, 2d + 1)`` with its two functions exchanged."""
+    n, width = stencil.shape[1:]
+    place, offset = np.arange(n)[:, None], np.arange(width) - width // 2
+    return np.asarray(stencil[:, (place + offset) % n, width // 2 - offset])
