@@ -22,7 +22,7 @@ from mracad.bspline.knots import KnotVector, Side
 from mracad.bspline.net import Net
 from mracad.inspect.cells import Quadrature
 from mracad.inspect.jets import jets
-from mracad.seam.integrals import Sites, integrals, sites
+from mracad.seam.integrals import Order, Sites, integrals, sites
 
 Array = np.ndarray
 
@@ -69,9 +69,11 @@ def forms(net: Net, metric: Net, quadrature: Quadrature, creases: Sequence[Colle
     along = sites(net.u, quadrature.u, quadrature.wu), sites(net.v, quadrature.v, quadrature.wv)
     frame, area = _frames(metric, along)
     area = np.where(quadrature.mask, area, 0.0)
-    orders, mass = ORDERS[1:], area
+    orders: tuple[Order, ...] = ORDERS[1:]
+    mass = area
     if net.weights is not None:
-        orders, mass, frame = ORDERS, *_over_weights(net, along, area, frame)
+        orders = ORDERS
+        mass, frame = _over_weights(net, net.weights, along, area, frame)
     frame = frame * np.sqrt(area)
     bend = {(a, b): _dot(frame[i], frame[j]) for i, a in enumerate(orders) for j, b in enumerate(orders[: i + 1])}
     periodic, scale = (net.u.periodic, net.v.periodic), net.weights
@@ -182,9 +184,11 @@ def _frames(metric: Net, along: tuple[Sites, Sites]) -> tuple[Array, Array]:
     return frame, root * (along[0].weight.reshape(-1, 1) * along[1].weight.ravel())
 
 
-def _over_weights(net: Net, along: tuple[Sites, Sites], area: Array, frame: Array) -> tuple[Array, Array]:
+def _over_weights(
+    net: Net, weights: Array, along: tuple[Sites, Sites], area: Array, frame: Array
+) -> tuple[Array, Array]:
     """Coefficients of mass and what frames take of w_i B_i and its derivatives ``(6, 3, qu, qv)``, for w_i B_i / w."""
-    w, wu, wv, wuu, wuv, wvv = _jets(Net(net.u, net.v, net.weights[..., None]), along)[:, 0]
+    w, wu, wv, wuu, wuv, wvv = _jets(Net(net.u, net.v, weights[..., None]), along)[:, 0]
     fu, fv, fuu, fuv, fvv = frame / w
     lu, lv = wu / w, wv / w
     slope_u, slope_v = fu - 2 * fuu * lu - fuv * lv, fv - fuv * lu - 2 * fvv * lv

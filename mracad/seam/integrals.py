@@ -69,8 +69,8 @@ def integrals(along: tuple[Sites, Sites], coefficients: Mapping[tuple[Order, Ord
     u, v = along
     (su, gu), p, q = u.at.shape, u.knots.degree, v.knots.degree
     pairs: dict[Order, list[tuple[int, int, Array]]] = {}
-    for (a, b), values in coefficients.items():
-        low, high = (a, b) if a[0] <= b[0] else (b, a)
+    for both, values in coefficients.items():
+        low, high = sorted(both)
         pairs.setdefault((low[0], high[0]), []).append((low[1], high[1], values))
     form = np.zeros((u.knots.count, 2 * p + 1, v.knots.count * (2 * q + 1)))
     rows = max(1, _BLOCK // (len(pairs) * gu * form.shape[2] * 2))
@@ -80,8 +80,8 @@ def integrals(along: tuple[Sites, Sites], coefficients: Mapping[tuple[Order, Ord
         tables, found = [], []
         for (i, j), each in pairs.items():
             inner = _inner(v, [(k, m, c[lines]) for k, m, c in each], mirrored=i == j)
-            low, high = u.table[part, :, i, :, None], u.table[part, :, j, None]
-            tables += [low * high] if i == j else [low * high, high.swapaxes(2, 3) * low.swapaxes(2, 3)]
+            product = u.table[part, :, i, :, None] * u.table[part, :, j, None]
+            tables += [product] if i == j else [product, product.swapaxes(2, 3)]
             found += [inner] if i == j else [inner, _transposed(inner)]
         count = len(tables[0])
         outer = np.concatenate(tables, axis=1).reshape(count, len(found) * gu, -1).swapaxes(1, 2)

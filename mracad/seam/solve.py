@@ -21,32 +21,29 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.polynomial.chebyshev import chebinterpolate
+from numpy.polynomial.chebyshev import chebvander
 
 from mracad.bspline.net import Net
+from mracad.seam.constrained import Constrained
 from mracad.seam.energy import Forms
 
 Array = np.ndarray
 
-SLACK = 1e-9
-"""Proximal parameter of the conditions, relative: rows may depend on each other; each pass divides what is left of
-``L δ`` by about as much."""
-
-PASSES = 3
-
-TERMS = 11
+TERMS = 8
 """Degree of the Chebyshev expansion of p: an error of the gain of 1e-4."""
 
-LEAST = 1e-10
-"""Share of the largest diagonal entry that is added to the form: functions that barely reach into a face stay put."""
+KEPT = 60_000
+"""Control points of which factors are kept, beside the last one."""
 
 
-def _bent(t: Any) -> Any:
-    """p((t + 1) / 2)."""
-    return (1 - t) / (1 + t * t)
+def _expansion() -> Array:
+    """Chebyshev coefficients of p((t + 1) / 2), with the least error of (1 − c) p(c), which is the gain."""
+    t = np.cos(np.pi * (np.arange(200) + 0.5) / 200)
+    weighted = chebvander(t, TERMS) * (1 - t)[:, None]
+    return np.linalg.lstsq(weighted, (1 - t) ** 2 / (1 + t * t), rcond=None)[0]
 
 
-_EXPANSION = chebinterpolate(_bent, TERMS)
+_EXPANSION = _expansion()
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,6 +113,7 @@ class Problem:
         )
         f = np.concatenate([space.net.poles.reshape(-1, 3) for space in spaces.values()])
         self.f = f - f[self.seen].mean(axis=0)
+        self._solvers: dict[tuple[float, bytes, bool], Constrained] = {}
         self.above = np.concatenate(
             [(s.net.poles - (0.0 if s.trend is None else s.trend)).reshape(-1, 3) for s in spaces.values()]
         )
@@ -161,10 +159,14 @@ class Problem:
 
     def _solver(self, stiffness: float, free: Array) -> Constrained:
         """The solver of the form M + stiffness · K and the contacts."""
-        form = self.mass + stiffness * (self.bending + self.creases) if stiffness else self.mass
-        if self.soft is not None and free is self.free:
-            form = form + self.soft
-        return Constrained(form, self.rows, free)
+        soft = self.soft is not None and free is self.free
+        key = stiffness, free.tobytes(), soft
+        if key not in self._solvers:
+            form = self.mass + stiffness * (self.bending + self.creases) if stiffness else self.mass
+            while self._solvers and (len(self._solvers) + 1) * len(free) > KEPT:
+                del self._solvers[next(iter(self._solvers))]
+            self._solvers[key] = Constrained(form + self.soft if soft else form, self.rows, free)
+        return self._solvers[key]
 
     @property
     def rimmed(self) -> bool:
@@ -185,90 +187,9 @@ class Problem:
         return {i: part.reshape(s.net.poles.shape) for (i, s), part in zip(self.spaces.items(), parts, strict=True)}
 
 
-class Constrained:
-    """argmin ½ xᵀ A x − bᵀ x under L x = r, x = 0 off ``free``.
-
-    By one sparse factorisation of the quasi-definite [[A, Lᵀ], [L, −ε]] and proximal passes, which also bear rows of L
-    that depend on each other.
-
-    Parameters
-    ----------
-    form : scipy.sparse matrix (n, n)
-        A, positive semidefinite.
-    rows : scipy.sparse matrix (m, n)
-    free : ndarray of bool (n,)
-    """
-
-    def __init__(self, form: Any, rows: Any, free: Array) -> None:
-        from scipy.sparse import block_array, diags_array, eye_array
-        from scipy.sparse.linalg import splu
-
-        self.free, self.size = np.flatnonzero(free), len(free)
-        form = form.tocsr()[self.free][:, self.free]
-        diagonal = form.diagonal()
-        self.scale = 1.0 / np.sqrt(diagonal + LEAST * diagonal.max(initial=0.0) + 1e-300)
-        scaling = diags_array(self.scale)
-        self.form = (scaling @ form @ scaling + LEAST * eye_array(len(self.free))).tocsr()
-        rows = (rows.tocsr()[:, self.free] @ scaling).tocsr()
-        length = np.sqrt(np.asarray(rows.multiply(rows).sum(axis=1)).ravel())
-        self.there = np.flatnonzero(length > 0)
-        self.length = length[self.there]
-        self.rows = (diags_array(1.0 / self.length) @ rows[self.there]).tocsr()
-        count = self.rows.shape[0]
-        matrix = self.form
-        if count:
-            matrix = block_array([[self.form, self.rows.T], [self.rows, -SLACK * eye_array(count)]])
-        self._factor = splu(
-            matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
-        )
-
-    def __call__(
-        self, right: Array, start: Array | None = None, goal: Array | None = None, exactly: bool = True
-    ) -> Array:
-        """x − start, of which b is the right-hand side.
-
-        Parameters
-        ----------
-        right : ndarray (n, k)
-            b.
-        start : ndarray (n, k), optional
-            Zero by default.
-        goal : ndarray (m, k), optional
-            r; zero by default.
-        exactly : bool
-            Whether the conditions are met to rounding; otherwise one pass is made.
-
-        Returns
-        -------
-        ndarray (n, k)
-        """
-        b = self.scale[:, None] * right[self.free]
-        owed = np.zeros((self.rows.shape[0], right.shape[1]))
-        if goal is not None:
-            owed += goal[self.there] / self.length[:, None]
-        if start is not None:
-            owed -= self.rows @ (start[self.free] / self.scale[:, None])
-        x, y = np.zeros_like(b), np.zeros_like(owed)
-        for _ in range(PASSES if exactly and len(y) else 1):
-            residual = b - self.form @ x - self.rows.T @ y
-            step = self._factor.solve(np.concatenate([residual, owed - self.rows @ x]))
-            x += step[: len(x)]
-            y += step[len(x) :]
-        return self._whole(x)
-
-    def settled(self, x: Array) -> Array:
-        """What is nearest to x, ``(n, k)``, with L x = 0: what one pass has left of it is taken away."""
-        return x + self(np.zeros_like(x), start=x) if len(self.there) else x
-
-    def _whole(self, x: Array) -> Array:
-        out = np.zeros((self.size, x.shape[1]))
-        out[self.free] = self.scale[:, None] * x
-        return out
-
-
 def _chebyshev(power: Callable[[Array], Array], first: Array) -> Array:
     """p(C) first, by Clenshaw's recursion; ``power`` applies C."""
-    last, before = np.zeros_like(first), np.zeros_like(first)
-    for k in range(TERMS, 0, -1):
+    last, before = _EXPANSION[TERMS] * first, np.zeros_like(first)
+    for k in range(TERMS - 1, 0, -1):
         last, before = _EXPANSION[k] * first + 2 * (2 * power(last) - last) - before, last
     return _EXPANSION[0] * first + (2 * power(last) - last) - before

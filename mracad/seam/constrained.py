@@ -1,0 +1,99 @@
+"""Minima of quadratic forms under exact linear conditions."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from mracad.seam.factor import Definite, nested
+
+Array = np.ndarray
+
+SLACK = 1e-9
+"""Proximal parameter of the conditions, relative: rows may depend on each other; each pass divides what is left of
+``L δ`` by about as much."""
+
+PASSES = 3
+
+LEAST = 1e-10
+"""Share of the largest diagonal entry that is added to the form: functions that barely reach into a face stay put."""
+
+
+class Constrained:
+    """argmin ½ xᵀ A x − bᵀ x under L x = r, x = 0 off ``free``.
+
+    Where there are conditions, by one sparse factorisation of the quasi-definite [[A, Lᵀ], [L, −ε]] and proximal
+    passes, which also bear rows of L that depend on each other.
+
+    Parameters
+    ----------
+    form : scipy.sparse matrix (n, n)
+        A, positive semidefinite.
+    rows : scipy.sparse matrix (m, n)
+    free : ndarray of bool (n,)
+    """
+
+    def __init__(self, form: Any, rows: Any, free: Array) -> None:
+        from scipy.sparse import block_array, diags_array, eye_array
+
+        self.free, self.size = np.flatnonzero(free), len(free)
+        form = form.tocsr()[self.free][:, self.free]
+        diagonal = form.diagonal()
+        self.scale = 1.0 / np.sqrt(diagonal + LEAST * diagonal.max(initial=0.0) + 1e-300)
+        scaling = diags_array(self.scale)
+        self.form = (scaling @ form @ scaling + LEAST * eye_array(len(self.free))).tocsr()
+        rows = (rows.tocsr()[:, self.free] @ scaling).tocsr()
+        length = np.sqrt(np.asarray(rows.multiply(rows).sum(axis=1)).ravel())
+        self.there = np.flatnonzero(length > 0)
+        self.length = length[self.there]
+        self.rows = (diags_array(1.0 / self.length) @ rows[self.there]).tocsr()
+        count = self.rows.shape[0]
+        self._solve = (
+            nested(block_array([[self.form, self.rows.T], [self.rows, -SLACK * eye_array(count)]]))
+            if count
+            else Definite(self.form)
+        )
+
+    def __call__(
+        self, right: Array, start: Array | None = None, goal: Array | None = None, exactly: bool = True
+    ) -> Array:
+        """x − start, of which b is the right-hand side.
+
+        Parameters
+        ----------
+        right : ndarray (n, k)
+            b.
+        start : ndarray (n, k), optional
+            Zero by default.
+        goal : ndarray (m, k), optional
+            r; zero by default.
+        exactly : bool
+            Whether the conditions are met to rounding; otherwise one pass is made.
+
+        Returns
+        -------
+        ndarray (n, k)
+        """
+        b = self.scale[:, None] * right[self.free]
+        owed = np.zeros((self.rows.shape[0], right.shape[1]))
+        if goal is not None:
+            owed += goal[self.there] / self.length[:, None]
+        if start is not None:
+            owed -= self.rows @ (start[self.free] / self.scale[:, None])
+        x, y = np.zeros_like(b), np.zeros_like(owed)
+        for _ in range(PASSES if exactly and len(y) else 1):
+            residual = b - self.form @ x - self.rows.T @ y
+            step = self._solve(np.concatenate([residual, owed - self.rows @ x]))
+            x += step[: len(x)]
+            y += step[len(x) :]
+        return self._whole(x)
+
+    def settled(self, x: Array) -> Array:
+        """What is nearest to x, ``(n, k)``, with L x = 0: what one pass has left of it is taken away."""
+        return x + self(np.zeros_like(x), start=x) if len(self.there) else x
+
+    def _whole(self, x: Array) -> Array:
+        out = np.zeros((self.size, x.shape[1]))
+        out[self.free] = self.scale[:, None] * x
+        return out
