@@ -83,7 +83,7 @@ class Moved:
         if amount == self.amount:
             return self
         offset = self.offset * (amount / self.amount)
-        now = Watch.of([(self.net, self.sheet.faces)]).changes([displaced(self.net, offset)])[0]
+        now = Watch.of([(self.net, self.sheet.faces)]).changes({0: displaced(self.net, offset)})[0]
         return replace(self, offset=offset, amount=amount, changes=now)
 
     def displacement(self) -> Offset:

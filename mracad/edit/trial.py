@@ -154,8 +154,7 @@ class Trial:
     def nothing(self) -> Verdict:
         """What the judge makes of leaving everything as it is."""
         parts = [np.zeros(space.net.poles.shape) for space in self.problem.spaces.values()]
-        still = self.watch.changes([space.net for space in self.problem.spaces.values()])
-        return Verdict(parts, [0.0] * len(parts), still, [()] * len(parts), 0.0)
+        return Verdict(parts, [0.0] * len(parts), self.watch.still(), [()] * len(parts), 0.0)
 
     def judged(self, delta: Array, target: Array) -> Verdict:
         """How much of a displacement may be done to each surface."""
@@ -255,11 +254,19 @@ class Watch:
             [(place, face.index) for place, _, face in every],
         )
 
-    def changes(self, nets: Sequence[Net]) -> list[dict[int, Change]]:
-        """What became of the faces of each surface."""
-        found: list[dict[int, Change]] = [{} for _ in nets]
-        now = changes(self.surveys, [nets[place] for place, _ in self.owners])
-        for (place, face), change in zip(self.owners, now, strict=True):
+    def still(self) -> list[dict[int, Change]]:
+        """What becomes of the faces of each surface where nothing moves."""
+        found: list[dict[int, Change]] = [{} for _ in range(self.owners[-1][0] + 1)]
+        for (place, face), survey in zip(self.owners, self.surveys, strict=True):
+            found[place][face] = Change(survey.roughness, survey.roughness, survey.noise)
+        return found
+
+    def changes(self, nets: Mapping[int, Net]) -> dict[int, dict[int, Change]]:
+        """What became of the faces of some surfaces, by place."""
+        found: dict[int, dict[int, Change]] = {place: {} for place in nets}
+        looked = [(*owner, survey) for owner, survey in zip(self.owners, self.surveys, strict=True) if owner[0] in nets]
+        now = changes([survey for *_, survey in looked], [nets[place] for place, *_ in looked])
+        for (place, face, _), change in zip(looked, now, strict=True):
             found[place][face] = change
         return found
 
@@ -272,21 +279,16 @@ def _amounts(
     tolerances: Tolerances,
 ) -> tuple[list[float], list[dict[int, Change]], list[tuple[Worse, ...]]]:
     """For each surface the largest amount of its displacement that makes no face rougher, by bisection."""
-    low, high, test = np.zeros(len(parts)), ceiling.copy(), ceiling.copy()
-    best: list[dict[int, Change]] = []
+    low, high, best = np.zeros(len(parts)), ceiling.copy(), watch.still()
     why: list[tuple[Worse, ...]] = [()] * len(parts)
-    for step in range(BISECTIONS + 2):
-        nets = [displaced(s.net, amount * part) for s, part, amount in zip(spaces, parts, test, strict=True)]
-        found = watch.changes(nets)
-        best = best or list(found)
-        for i, faces in enumerate(found):
-            wrong = tuple(w for each in faces.values() for w in worse(each, tolerances.growth)) if test[i] else ()
+    for step in range(BISECTIONS + 1):
+        test = (low + high) / 2 if step else high.copy()
+        nets = {i: displaced(spaces[i].net, test[i] * parts[i]) for i in np.flatnonzero(low < high).tolist()}
+        for i, faces in watch.changes(nets).items():
+            wrong = tuple(w for each in faces.values() for w in worse(each, tolerances.growth))
             far = any(each.deviation > tolerances.deviation * (1 + 1e-9) for each in faces.values())
             if wrong or far:
                 high[i], why[i] = test[i], why[i] or wrong
             else:
                 low[i], best[i] = test[i], faces
-        if (low >= high).all() or step == BISECTIONS + 1:
-            break
-        test = np.where(low >= high, low, (low + high) / 2) if step < BISECTIONS else low.copy()
     return low.tolist(), best, why

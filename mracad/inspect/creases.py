@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -52,38 +53,49 @@ def _even(spans: Array) -> bool:
     return bool(spans.min() > 1e-2 * spans.mean())
 
 
-def turns(net: Net, faces: Sequence[Face], axis: int, at: Array, places: Array) -> tuple[Array, Array]:
-    """Angles between the normals on either side of knot lines.
+@dataclass(frozen=True, eq=False)
+class Crossing:
+    """Places on knot lines of one direction where faces lie on both sides.
 
-    Parameters
+    Attributes
     ----------
-    net : Net
-    faces : sequence of Face
-        Of the surface.
     axis : {0, 1}
         0 for lines u = const.
     at : ndarray (k, 2)
-        As :func:`lines` gives them, of this net or of one with fewer knots.
+        As :func:`lines` gives them.
     places : ndarray (q,)
         Parameters along the lines.
-
-    Returns
-    -------
-    angle : ndarray (k, q)
-        Radians; NaN where the surface is degenerate.
     seen : ndarray of bool (k, q)
-        Where one of the faces lies on both sides.
     """
+
+    axis: int
+    at: Array
+    places: Array
+    seen: Array
+
+    def angles(self, net: Net) -> Array:
+        """Angles between the normals of a surface, of which these are knot lines, on either side; radians, NaN where it
+        is degenerate."""
+        normals = []
+        for side, limit in enumerate(LIMITS):
+            at, limits = (self.at[:, side], self.places), (limit, LIMITS[1])
+            us, vs, sides = (*at, limits) if self.axis == 0 else (*at[::-1], limits[::-1])
+            tangents = [np.swapaxes(part, 0, self.axis)[self.seen] for part in net.grid(us, vs, 1, sides)[1:]]
+            uv = np.stack(np.meshgrid(*at, indexing="ij"), axis=-1)[self.seen][:, :: 1 - 2 * self.axis]
+            normals.append(net.normals(uv, sides, (tangents[0], tangents[1])))
+        return np.asarray(2 * np.arcsin(np.minimum(np.linalg.norm(normals[1] - normals[0], axis=1) / 2, 1.0)))
+
+
+def crossings(net: Net, faces: Sequence[Face], axis: int, places: Array) -> Crossing | None:
+    """Where tangents of faces may jump across knot lines u = const (axis 0) or v = const, at some places on them."""
+    at = lines(net, axis)
+    if not len(at):
+        return None
     kv = (net.u, net.v)[axis]
     seen = np.zeros((len(at), len(places)), dtype=bool)
-    normals = []
     for face in faces:
         seen |= np.logical_and(*(_present(face, net, axis, _aside(kv, at, side), places) for side in (0, 1)))
-    for side, limit in enumerate(LIMITS):
-        uv = np.stack(np.meshgrid(at[:, side], places, indexing="ij"), axis=-1).reshape(-1, 2)
-        normals.append(net.normals(uv, (limit, "right")) if axis == 0 else net.normals(uv[:, ::-1], ("right", limit)))
-    angle = 2 * np.arcsin(np.minimum(np.linalg.norm(normals[1] - normals[0], axis=1) / 2, 1.0))
-    return angle.reshape(seen.shape), seen
+    return Crossing(axis, at, places, seen) if seen.any() else None
 
 
 def _aside(kv: KnotVector, at: Array, side: int) -> Array:

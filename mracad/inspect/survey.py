@@ -10,7 +10,7 @@ import numpy as np
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.net import Net
 from mracad.inspect.cells import Quadrature, quadrature
-from mracad.inspect.creases import CLUSTER, lines, turns
+from mracad.inspect.creases import CLUSTER, Crossing, crossings
 from mracad.inspect.curvature import Forms, forms
 from mracad.inspect.jets import jets
 from mracad.inspect.roughness import Change, Roughness
@@ -47,6 +47,8 @@ class Survey:
         Where the surface is not degenerate and knots lie apart: only there curvature counts.
     rounding : ndarray (q,)
         Curvature that rounding may make, 1/mm.
+    crossed : list of (Crossing, ndarray)
+        Where tangents may jump, and the angles by which they do.
     roughness, noise : Roughness
     """
 
@@ -58,6 +60,7 @@ class Survey:
     normals: Array
     regular: Array
     rounding: Array
+    crossed: Sequence[tuple[Crossing, Array]]
     roughness: Roughness
     noise: Roughness
 
@@ -87,10 +90,11 @@ def surveys(
         sides = np.maximum(sides, least)
         areas = _areas(rule, form)
         rounding = ROUNDING * float(np.abs(net.poles).max()) * _wavenumber(sides.min(axis=0)) ** 2
-        kink = max((float(np.nanmax(a, initial=0.0)) for a in _kinks(net, net, faces, rule)), default=0.0)
+        crossed = _crossed(net, faces, rule)
+        kink = _largest(angles for _, angles in crossed)
         found.append(
             Survey(
-                net, faces, rule, centre, at, form.normal.astype(np.float32), regular, rounding,
+                net, faces, rule, centre, at, form.normal.astype(np.float32), regular, rounding, crossed,
                 _roughness(areas, form, regular, rounding, kink), _noise(areas * regular, sides, rounding),
             )
         )  # fmt: skip
@@ -112,9 +116,8 @@ def changes(surveyed: Sequence[Survey], nets: Sequence[Net]) -> list[Change]:
         motion = at - survey.points
         both = form.regular & survey.regular
         turned = np.linalg.norm(form.normal.astype(np.float32) - survey.normals, axis=0)[both]
-        old, new = (_kinks(net, each, survey.faces, survey.rule) for each in (survey.net, net))
-        opened = max((float(np.nanmax(b - a, initial=0.0)) for a, b in zip(old, new, strict=True)), default=0.0)
-        kink = max((float(np.nanmax(angle, initial=0.0)) for angle in new), default=0.0)
+        now = [(crossing.angles(net), before) for crossing, before in survey.crossed]
+        opened, kink = _largest(new - old for new, old in now), _largest(new for new, _ in now)
         found.append(
             Change(
                 survey.roughness,
@@ -164,15 +167,14 @@ def _spans(rule: Quadrature, knots: tuple[KnotVector, KnotVector]) -> Array:
     return np.stack([each[rule.mask.T] for each in grid])
 
 
-def _kinks(lined: Net, net: Net, faces: Sequence[Face], rule: Quadrature) -> list[Array]:
-    """Angles of ``net`` across the knot lines on which tangents of ``lined`` may jump, inside the faces, radians."""
-    found = []
-    for axis, places in ((0, rule.v.ravel()), (1, rule.u.ravel())):
-        at = lines(lined, axis)
-        if len(at):
-            angle, seen = turns(net, faces, axis, at, places)
-            found.append(angle[seen])
-    return found
+def _crossed(net: Net, faces: Sequence[Face], rule: Quadrature) -> list[tuple[Crossing, Array]]:
+    """Where tangents of faces may jump, and the angles by which they do."""
+    every = [crossings(net, faces, axis, at.ravel()) for axis, at in ((0, rule.v), (1, rule.u))]
+    return [(each, each.angles(net)) for each in every if each]
+
+
+def _largest(angles: Iterable[Array]) -> float:
+    return max((float(np.nanmax(each, initial=0.0)) for each in angles), default=0.0)
 
 
 def _roughness(areas: Array, form: Forms, counts: Array, rounding: Array, kink: float) -> Roughness:
