@@ -11,6 +11,7 @@ conditions on a displacement; what the input misses them by (gap, tilt) is then 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -131,6 +132,11 @@ class Border:
         """Limits in u and in v."""
         return (self.limit, along) if self.axis == 0 else (along, self.limit)
 
+    def part(self, low: float, high: float) -> Border:
+        """What lies between two fractions of it."""
+        start, stop = ((1.0 - share) * self.start + share * self.stop for share in (low, high))
+        return replace(self, start=start, stop=stop)
+
 
 @dataclass(frozen=True, eq=False)
 class Joint:
@@ -164,6 +170,12 @@ class Joint:
         """Whether a smooth T does not follow from a smooth S of the same degree."""
         return self.order > 0 and (len(self.across) > 1 or len(self.along) > 0)
 
+    def part(self, low: float, high: float) -> Joint:
+        """The same between two fractions of the edge, of which it is then the whole."""
+        size = high - low
+        across, along = (_composed(law, low, size) for law in (self.across, self.along))
+        return replace(self, across=across, along=along / size, shear=self.shear / size)
+
 
 @dataclass(frozen=True, eq=False)
 class Seam:
@@ -187,6 +199,11 @@ class Seam:
     gap: float
     angle: float
     loose: bool = False
+
+    def part(self, low: float, high: float) -> Seam:
+        """What lies between two fractions of it."""
+        a, b = (border.part(low, high) for border in (self.a, self.b))
+        return replace(self, a=a, b=b, joint=self.joint.part(low, high))
 
 
 @dataclass(frozen=True)
@@ -503,6 +520,15 @@ def _components(sn: Array, st: Array, vector: Array) -> tuple[Array, Array]:
 def _polynomial(values: Array, degree: int) -> Array:
     """Coefficients in the fraction of the edge that fit values at the samples; none for degree −1."""
     return np.polynomial.polynomial.polyfit(_SAMPLES, values, degree) if degree >= 0 else np.empty(0)
+
+
+def _composed(coefficients: Array, low: float, size: float) -> Array:
+    """Coefficients of p(low + size x) from those of p(x)."""
+    result = np.zeros(len(coefficients))
+    for k in range(len(result)):
+        result[k] = np.polynomial.polynomial.polyval(low, coefficients) * size**k / math.factorial(k)
+        coefficients = np.polynomial.polynomial.polyder(coefficients)
+    return result
 
 
 def _value(coefficients: Array) -> Array:

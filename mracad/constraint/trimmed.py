@@ -25,7 +25,7 @@ from mracad.bspline.knots import Side as Limit
 from mracad.bspline.net import Curve, Net, curvature
 from mracad.constraint.frozen import local_span
 from mracad.constraint.region import meeting
-from mracad.constraint.seam import UNEVEN, Seam, Wishes, runs_back
+from mracad.constraint.seam import UNEVEN, Border, Seam, Wishes, runs_back
 from mracad.constraint.sides import between, from_inside
 from mracad.model import Edge, Face, Model, Trim
 
@@ -82,14 +82,25 @@ class Trace:
         """A surface and its derivatives at fractions of the seam, seen from inside the face."""
         return tuple(np.asarray(x) for x in net.evaluate(self.places(share), derivatives, self.limits))
 
-    def cells(self, net: Net, share: Array) -> Array:
-        """Knot cells of a surface on which the face meets the seam at fractions of it, a mask."""
+    def inside(self, net: Net, share: Array) -> Array:
+        """Parameters ``(q, 2)`` in the knot cells in which the face meets the seam at fractions of it."""
         uv = self.places(share)
         if self.line is not None:
             axis, at = self.line
             step = 0.5 * local_span((net.u, net.v)[axis], at)
             uv[:, axis] += step if self.limits[axis] == "right" else -step
+        return uv
+
+    def cells(self, net: Net, share: Array) -> Array:
+        """Knot cells of a surface on which the face meets the seam at fractions of it, a mask."""
+        uv = self.inside(net, share)
         return meeting(net, np.stack([uv, uv], axis=1))
+
+    def part(self, low: float, high: float) -> Trace:
+        """What lies between two fractions of the seam, itself from 0 to 1."""
+        share = np.linspace(low, high, 2 if self.law is None else SAMPLES)
+        whole = share if self.law is None else np.interp(share, *self.law)
+        return replace(self, law=(np.linspace(0.0, 1.0, len(share)), whole))
 
     def way(self, share: Array) -> Array:
         """Derivative of the curve by its own fraction, in the sense of the seam, ``(q, 2)``."""
@@ -197,13 +208,14 @@ def _followed(model: Model, a: Trace, b: Trace, back: bool) -> Array:
 
 def beside(model: Model, seam: Seam, wishes: Wishes) -> TrimmedSeam | str:
     """What the joint of a seam does not keep, to the tolerance."""
-    line, ends = KnotVector.clamped([0.0, 1.0], 1), np.array([0.0, 1.0])
-    a, b = (
-        Trace(x.face, x.surface, Curve(line, x.places(ends)), line=(x.axis, x.at), limits=x.limits("right"))
-        for x in (seam.a, seam.b)
-    )
-    found = _judged(model, seam.edge, seam.twin, (a, b), wishes)
+    found = _judged(model, seam.edge, seam.twin, (along(seam.a), along(seam.b)), wishes)
     return replace(found, since=seam.joint.order + 1) if isinstance(found, TrimmedSeam) and seam.joint.order else found
+
+
+def along(border: Border) -> Trace:
+    """The trace of a border."""
+    ends = Curve(KnotVector.clamped([0.0, 1.0], 1), border.places(np.array([0.0, 1.0])))
+    return Trace(border.face, border.surface, ends, line=(border.axis, border.at), limits=border.limits("right"))
 
 
 def _judged(model: Model, edge: int, twin: int, traces: tuple[Trace, Trace], wishes: Wishes) -> TrimmedSeam | str:

@@ -16,12 +16,14 @@ from mracad.constraint.seam import Treatment, Wishes
 from mracad.edit.result import Edit, FaceOutcome
 from mracad.errors import EditError, UsageError
 from mracad.feature.character import at_scale, laid_on
-from mracad.feature.copies import NARROWEST, Copies, Laid
+from mracad.feature.copies import Laid, laid
 from mracad.feature.detail import Feature, above_surroundings, between_levels, load
+from mracad.feature.fine import NARROWEST
 from mracad.feature.ground import Ground, axes
+from mracad.feature.ideal import copies
 from mracad.feature.pattern import along, grid, listed, polar, scattered
 from mracad.feature.place import Place, face_number, place, sheet_of, standing, window
-from mracad.model import Displacement, Model
+from mracad.model import Displacement, Face, Model
 from mracad.options import Featured, Move, Repeat, Single, Transfer, band_of, length
 from mracad.select import Scope
 from mracad.select import scope as scope_of
@@ -51,8 +53,8 @@ def move(
     assert feature.origin is not None
     removed = {i: -offset for i, offset in feature.origin.offsets.items()}
     ground = _cleared(model, chosen, feature)
-    laid = _laid(ground, feature, [_target(ground, options.to, options)], options, "add", removed, scope.edges)
-    return _edit(model, laid, scope)
+    done = _laid(ground, feature, [_target(ground, options.to, options)], options, "add", removed, scope.edges)
+    return _edit(model, done, scope)
 
 
 def repeat(
@@ -67,8 +69,8 @@ def repeat(
     chosen = _movable(model, scope)
     feature = extract(model, options, chosen)
     ground = _cleared(model, chosen, feature)
-    laid = _laid(ground, feature, _places(ground, feature, options), options, options.overlap, {}, scope.edges)
-    return _edit(model, laid, scope)
+    done = _laid(ground, feature, _places(ground, feature, options), options, options.overlap, {}, scope.edges)
+    return _edit(model, done, scope)
 
 
 def transfer(
@@ -93,8 +95,8 @@ def transfer(
     if _is_window(options.from_):
         feature = extract(source, options, every, options.from_)
         feature = replace(feature, origin=None)
-        laid = _laid(ground, feature, [_target(ground, options.to, options)], options, "add", {}, scope.edges)
-        return _edit(model, laid, scope)
+        done = _laid(ground, feature, [_target(ground, options.to, options)], options, "add", {}, scope.edges)
+        return _edit(model, done, scope)
     if options.band is None:
         raise UsageError("band: the detail of a face needs one", "give --band 0mm:20mm")
     one = sheet_of(Ground(source, every), face_number(source, options.from_, "from", FACE), "from")
@@ -190,8 +192,8 @@ def _laid(
 ) -> Laid:
     _refuse_small(places, feature)
     feet = standing(ground, places, feature.reach)
-    copies = Copies(ground, feature, places, feet, overlap, options.mirror)
-    return copies.laid(Wishes(options.keep, hold=hold), options.edges == "coupled", options.clip, removed)
+    every = copies(ground, feature, places, feet, overlap, options.mirror)
+    return laid(every, Wishes(options.keep, hold=hold), options.edges == "coupled", options.clip, removed)
 
 
 def _refuse_small(places: Sequence[Place], feature: Feature) -> None:
@@ -206,28 +208,35 @@ def _refuse_small(places: Sequence[Place], feature: Feature) -> None:
 
 
 def _edit(model: Model, laid: Laid, scope: Scope) -> Edit:
-    """The edit with an outcome for every face."""
-    outcomes, chosen = [], _movable(model, scope)
-    touched = {f for copy in laid.copies for f in copy.faces}
-    for face in model.faces:
-        offset = None if face.surface is None else laid.offsets.get(face.surface)
-        points = 0 if face.surface is None else int(np.prod(model.surfaces[face.surface].net.poles.shape[:2]))
-        inserted = 0 if offset is None else len(offset.u_knots) + len(offset.v_knots)
-        moved = 0.0 if offset is None else float(np.linalg.norm(offset.poles, axis=-1).max())
-        if face.surface is None:
-            outcomes.append(FaceOutcome(face.index, "analytic", f"{face.kind}, not a NURBS face"))
-        elif face.index in scope.held:
-            outcomes.append(FaceOutcome(face.index, "held", "held"))
-        elif face.index not in chosen:
-            outcomes.append(FaceOutcome(face.index, "unselected", "not selected"))
-        elif offset is None or (
-            len(model.surfaces[face.surface].faces) > 1 and face.index not in touched and not moved
-        ):
-            outcomes.append(FaceOutcome(face.index, "unchanged", "no copy there", points=points))
-        else:
-            outcomes.append(FaceOutcome(face.index, "edited", moved=moved, points=points, inserted=inserted))
+    """The edit with an outcome for every face and every edge of those under copies."""
+    chosen, touched = _movable(model, scope), {f for copy in laid.copies for f in copy.faces}
+    outcomes = tuple(_outcome(model, face, laid, scope, chosen, touched) for face in model.faces)
+    ways = {
+        **dict.fromkeys(laid.frozen, "frozen"),
+        **dict.fromkeys(laid.loose, "to tolerance"),
+        **dict.fromkeys(laid.moving, "coupled"),
+    }
     edges = tuple(
-        Treatment(e, tuple(s.face for s in model.edges[e].sides), "coupled" if e in laid.moving else "frozen", why)
-        for e, why in sorted({**laid.frozen, **dict.fromkeys(laid.moving, "")}.items())
+        Treatment(e, tuple(s.face for s in model.edges[e].sides), how, laid.frozen[e] if how == "frozen" else "")
+        for e, how in sorted(ways.items())
     )
-    return Edit(Displacement(laid.offsets), tuple(outcomes), edges=edges, copies=laid.copies)
+    return Edit(Displacement(laid.offsets), outcomes, edges=edges, copies=laid.copies)
+
+
+def _outcome(
+    model: Model, face: Face, laid: Laid, scope: Scope, chosen: Collection[int], touched: Collection[int]
+) -> FaceOutcome:
+    """What became of a face; copies lie on those ``touched``."""
+    if face.surface is None:
+        return FaceOutcome(face.index, "analytic", f"{face.kind}, not a NURBS face")
+    if face.index in scope.held:
+        return FaceOutcome(face.index, "held", "held")
+    if face.index not in chosen:
+        return FaceOutcome(face.index, "unselected", "not selected")
+    surface, offset = model.surfaces[face.surface], laid.offsets.get(face.surface)
+    points = int(np.prod(surface.net.poles.shape[:2]))
+    moved = 0.0 if offset is None else float(np.linalg.norm(offset.poles, axis=-1).max())
+    if offset is None or (len(surface.faces) > 1 and face.index not in touched and not moved):
+        return FaceOutcome(face.index, "unchanged", "no copy there", points=points)
+    inserted = len(offset.u_knots) + len(offset.v_knots)
+    return FaceOutcome(face.index, "edited", moved=moved, points=points, inserted=inserted)

@@ -8,29 +8,20 @@ rectangles; where the target is larger, the source is mirrored at its borders.  
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from mracad.bspline.interpolate import interpolated
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.net import Net
 from mracad.constraint.frozen import separate
 from mracad.errors import EditError
-from mracad.feature.copies import (
-    MISSED,
-    NARROWEST,
-    PIECES,
-    ROUNDS,
-    SPARE,
-    Copy,
-    Laid,
-    divided,
-    refined_offset,
-    weights_over,
-)
+from mracad.feature.compared import Copy
+from mracad.feature.copies import Laid, offset, over
 from mracad.feature.detail import taper
+from mracad.feature.fine import MISSED, NARROWEST, Knots, divided, split, through, weights_over
 from mracad.feature.ground import Sheet
-from mracad.model import Model, Offset
+from mracad.model import Model
 from mracad.options import Transfer
 from mracad.wavelet.ladder import arc_lengths, ladder_for_scale
 from mracad.wavelet.project import projection
@@ -109,6 +100,30 @@ class Character:
         return np.einsum("qij,qj->qi", self.frames(uv), np.asarray(self.detail.evaluate(uv)))
 
 
+@dataclass(frozen=True, eq=False)
+class Carried:
+    """The detail of one sheet at the places of another."""
+
+    own: Character
+    other: Character
+    options: Transfer
+
+    def __call__(self, uv: Array) -> Array:
+        """The displacement ``(q, 3)`` at parameters of the target, in the part's frame."""
+        options = self.options
+        _, comes = options.share()
+        turn, flip = np.radians(options.rotate), -1.0 if options.mirror else 1.0
+        x, y = self.own.lengths(uv).T / options.size
+        places = np.stack([np.cos(turn) * x + np.sin(turn) * y, flip * (np.cos(turn) * y - np.sin(turn) * x)], axis=1)
+        t, s, n = self.other.local(self.other.parameters(places)).T
+        s = flip * s
+        moved = [
+            options.size * (np.cos(turn) * t - np.sin(turn) * s),
+            options.size * (np.sin(turn) * t + np.cos(turn) * s),
+        ]
+        return comes * np.einsum("qij,qi->qj", self.own.frames(uv), np.stack([*moved, options.height * n], axis=1))
+
+
 def laid_on(
     model: Model, target: Sheet, source: Sheet, band: tuple[float, float], options: Transfer, width: float | None
 ) -> Laid:
@@ -127,89 +142,70 @@ def laid_on(
     """
     own, other = Character(target, band), Character(source, band)
     stays, comes = options.share()
-    turn = np.radians(options.rotate)
-    flip = -1.0 if options.mirror else 1.0
-
-    def ideal(uv: Array) -> Array:
-        x, y = own.lengths(uv).T / options.size
-        places = np.stack([np.cos(turn) * x + np.sin(turn) * y, flip * (np.cos(turn) * y - np.sin(turn) * x)], axis=1)
-        t, s, n = other.local(other.parameters(places)).T
-        s = flip * s
-        moved = [
-            options.size * (np.cos(turn) * t - np.sin(turn) * s),
-            options.size * (np.sin(turn) * t + np.cos(turn) * s),
-        ]
-        return comes * np.einsum("qij,qi->qj", own.frames(uv), np.stack([*moved, options.height * n], axis=1))
-
+    ideal = Carried(own, other, options)
     height = float(np.linalg.norm(other.detail.poles, axis=-1).max()) * abs(options.height)
     if height * comes <= 1e-7 and stays == 1.0:
         raise EditError(f"from: {options.from_} has no detail in the band", "give another --band")
-    least = [float(np.median(arc_lengths(source.net, axis)[arc_lengths(source.net, axis) > 0])) for axis in (0, 1)]
-    if min(least) * options.size < NARROWEST:
+    least = _spacing(source) * options.size
+    if least < NARROWEST:
         raise EditError(f"size: {options.size:g} would need knots closer than {NARROWEST:g} mm", "give a larger --size")
-    extra, poles = _held(target, own, ideal, MISSED * height, min(least) * options.size)
+    knots = divided(target.knots, lambda knots: _more(target, ideal, knots, MISSED * height, least))
+    poles = _poles(target, ideal, knots)
     net = model.surfaces[target.index].net
-    fine = net.refined(*extra)
-    removed = refined_offset(net, fine, (stays - 1.0) * own.detail.poles)
+    fine = net.over(*knots)
     faces = [model.faces[i] for i in model.surfaces[target.index].faces]
     free = separate(fine, faces, [f.index for f in target.faces], options.keep).free
     if not free.any():
         raise EditError(f"to: {options.to} has no free control point", "use --keep g0")
     window = _window(fine, free, band[1] / 2 if width is None else width)
-    wanted = poles + removed
-    offset = wanted * window[..., None] @ target.turn
-    uv = _middles(fine.u, fine.v)
+    wanted = poles + over(net, fine, (stays - 1.0) * own.detail.poles)
+    copy = _compared(target, ideal, knots, poles, wanted * (window - 1.0)[..., None])
+    return Laid({target.index: offset(net, fine, wanted * window[..., None] @ target.turn)}, (copy,))
+
+
+def _compared(target: Sheet, ideal: Carried, knots: Knots, poles: Array, gone: Array) -> Copy:
+    """What became of the detail, of which control points ``gone`` are taken away."""
+    uv = _middles(*knots)
     uv = uv[target.covers(uv)]
-    fit = np.asarray(Net(fine.u, fine.v, poles, fine.weights).evaluate(uv)) - ideal(uv)
-    gone = np.asarray(Net(fine.u, fine.v, wanted * (window - 1.0)[..., None], fine.weights).evaluate(uv))
-    missed = np.linalg.norm(fit, axis=1)
+    weights = weights_over(target, knots)
+    missed = np.linalg.norm(np.asarray(Net(*knots, poles, weights).evaluate(uv)) - ideal(uv), axis=1)
+    lost = np.linalg.norm(np.asarray(Net(*knots, gone, weights).evaluate(uv)), axis=1)
     middle = np.asarray(target.net.evaluate(uv[len(uv) // 2][None]))[0]
-    copy = Copy(
-        f"{options.from_} on {options.to}",
+    return Copy(
+        f"{ideal.options.from_} on {ideal.options.to}",
         tuple(float(x) for x in middle),  # type: ignore[arg-type]
         tuple(f.index for f in target.faces),
         float(missed.max()),
         float(np.sqrt((missed**2).mean())),
-        float(np.linalg.norm(gone, axis=1).max()),
+        float(lost.max()),
         False,
     )
-    return Laid({target.index: Offset(offset, *extra)}, (copy,), {}, frozenset())
 
 
-def _held(
-    target: Sheet, own: Character, ideal: object, limit: float, least: float
-) -> tuple[tuple[Array, Array], Array]:
-    """Knots that the target needs, and control points (part's frame) that hold the ideal over them."""
-    assert callable(ideal)
-    extra: tuple[Array, Array] = (np.empty(0), np.empty(0))
-    for last in (*[False] * ROUNDS, True):
-        knots = target.net.u.refined(extra[0]), target.net.v.refined(extra[1])
-        at = np.stack(np.meshgrid(*(k.greville() for k in knots), indexing="ij"), axis=-1).reshape(-1, 2)
-        values = ideal(at).reshape(knots[0].count, knots[1].count, 3)
-        weights = weights_over(target, *knots)
-        if weights is not None:
-            values = values * np.asarray(Net(*knots, weights[..., None]).grid(knots[0].greville(), knots[1].greville()))
-        poles = interpolated(*knots, values)
-        poles = poles if weights is None else poles / weights[..., None]
-        if last:
-            break
-        uv = _middles(*knots)
-        uv = uv[target.covers(uv)]
-        missed = np.linalg.norm(np.asarray(Net(*knots, poles, weights).evaluate(uv)) - ideal(uv), axis=1)
-        more = []
-        for axis, kv in enumerate(knots):
-            worst, speed = np.zeros(kv.spans), np.zeros(kv.spans)
-            span = np.clip(np.searchsorted(kv.breaks, uv[:, axis], side="right") - 1, 0, kv.spans - 1)
-            np.maximum.at(worst, span, missed)
-            np.maximum.at(speed, span, np.linalg.norm(target.evaluate(uv)[1 + axis], axis=1))
-            wide = speed * np.diff(kv.breaks)
-            pieces = np.clip(np.ceil((worst / limit) ** (1 / (kv.degree + 1))), 1, PIECES)
-            pieces = np.where(wide > SPARE * least, np.minimum(pieces, np.ceil(wide / least)), 1).astype(int)
-            more.append(divided(kv, pieces))
-        if not any(map(len, more)):
-            break
-        extra = np.sort(np.r_[extra[0], more[0]]), np.sort(np.r_[extra[1], more[1]])
-    return extra, poles
+def _spacing(sheet: Sheet) -> float:
+    """Median width of the spans of a sheet in the denser direction, mm."""
+    lengths = (arc_lengths(sheet.net, axis) for axis in (0, 1))
+    return min(float(np.median(each[each > 0])) for each in lengths)
+
+
+def _poles(target: Sheet, ideal: Carried, knots: Knots) -> Array:
+    """Control points over knots of the target that hold the ideal, in the part's frame."""
+    at = np.stack(np.meshgrid(*(k.greville() for k in knots), indexing="ij"), axis=-1).reshape(-1, 2)
+    return through(target, knots, ideal(at).reshape(knots[0].count, knots[1].count, 3))
+
+
+def _more(target: Sheet, ideal: Carried, knots: Knots, limit: float, least: float) -> list[Array]:
+    """Knots that divide the spans in which the target misses the ideal by more than a limit."""
+    uv = _middles(*knots)
+    uv = uv[target.covers(uv)]
+    net = Net(*knots, _poles(target, ideal, knots), weights_over(target, knots))
+    missed = np.linalg.norm(np.asarray(net.evaluate(uv)) - ideal(uv), axis=1)
+    _, *tangents, _ = target.evaluate(uv)
+    more = []
+    for axis, kv in enumerate(knots):
+        span = np.clip(np.searchsorted(kv.breaks, uv[:, axis], side="right") - 1, 0, kv.spans - 1)
+        more.append(split(kv, span, missed / limit, np.linalg.norm(tangents[axis], axis=1), least))
+    return more
 
 
 def _middles(u: KnotVector, v: KnotVector) -> Array:

@@ -6,7 +6,8 @@ displacement δ, at the Greville points of the splines along it,
     G0   δ_b = δ_a,   G1   ∂_n δ_b = a ∂_n δ_a + b ∂_t δ_a,   G2   ∂_nn δ_b = a² ∂_nn δ_a + r ∂_n δ_a + s ∂_t δ_a
 
 (a, b, r, s of the input's joint: :class:`mracad.constraint.seam.Joint`).  As many conditions as the space has functions
-are exact where the joint's coefficients are constant, and never lock where they vary.
+are exact where the joint's coefficients are constant, and never lock where they vary.  Along double knots
+(:func:`doubled`) there is room for conditions that are exact where they vary, too.
 """
 
 from __future__ import annotations
@@ -55,6 +56,28 @@ def matched(nets: Mapping[int, Net], seams: Sequence[Seam]) -> dict[int, Net]:
     return result
 
 
+def doubled(nets: Mapping[int, Net], seams: Sequence[Seam]) -> dict[int, Net]:
+    """The nets with double knots along seams of a varying joint, so that their conditions can hold everywhere.
+
+    Both sides still have the same splines along a seam, but other seams may have to be matched again.
+    """
+    result = dict(nets)
+    for seam in seams:
+        if _lost(seam.joint):
+            for border in (seam.a, seam.b):
+                net = result[border.surface]
+                if _along(net, border).degree > 1:
+                    simple = [share for share, count in _inner(result, border).items() if count == 1]
+                    places = [_near(result, border, border.start + x * (border.stop - border.start)) for x in simple]
+                    result[border.surface] = net.refined(*(places, [])[:: 1 if border.axis else -1])
+    return result
+
+
+def _lost(joint: Joint) -> int:
+    """How many derivatives fewer a condition along a seam has than the displacement."""
+    return int(joint.varying or joint.shear != 0.0)
+
+
 def _elevated(nets: Mapping[int, Net], seams: Sequence[Seam]) -> dict[int, Net]:
     """The nets with the highest degree of those that seams join along them."""
     degrees = {(i, axis): knots.degree for i, net in nets.items() for axis, knots in enumerate((net.u, net.v))}
@@ -100,7 +123,7 @@ def _along(net: Net, border: Border) -> KnotVector:
     return (net.u, net.v)[1 - border.axis]
 
 
-def rows(nets: Mapping[int, Net], seams: Sequence[Seam]) -> tuple[Any, Array]:
+def rows(nets: Mapping[int, Net], seams: Sequence[Seam], everywhere: bool = False) -> tuple[Any, Array]:
     """The conditions of seams on displacements of surfaces.
 
     Parameters
@@ -109,6 +132,8 @@ def rows(nets: Mapping[int, Net], seams: Sequence[Seam]) -> tuple[Any, Array]:
         Spaces of the displacements by surface, with the same knots on both sides of every seam (:func:`matched`); their
         control points are laid out one after another.
     seams : sequence of Seam
+    everywhere : bool
+        Whether joints that vary are exact, too: their knots must be double.
 
     Returns
     -------
@@ -122,9 +147,9 @@ def rows(nets: Mapping[int, Net], seams: Sequence[Seam]) -> tuple[Any, Array]:
     entries: list[tuple[Array, Array, Array]] = [(np.empty(0, int), np.empty(0, int), np.empty(0))]
     count, mended = 0, [np.empty(0, bool)]
     for seam in seams:
-        share = _sites(nets, seam)
-        sides = [(_sided(nets[b.surface], b, share), first[b.surface]) for b in (seam.b, seam.a)]
         for order in range(seam.joint.order + 1):
+            share = _sites(nets, seam, order if everywhere else 0)
+            sides = [(_sided(nets[b.surface], b, share), first[b.surface]) for b in (seam.b, seam.a)]
             row = count + np.arange(len(share))
             for ((index, _), begin), value in zip(sides, _terms(seam.joint, order, share, sides), strict=True):
                 entries.append((np.repeat(row, index.shape[1]), begin + index.ravel(), value.ravel()))
@@ -149,12 +174,16 @@ def _law(coefficients: Array, share: Array) -> Array:
     return np.polynomial.polynomial.polyval(share, np.append(coefficients, 0.0))[:, None]
 
 
-def _sites(nets: Mapping[int, Net], seam: Seam) -> Array:
-    """Fractions of the seam at which conditions are asked: the Greville points of the larger space on it."""
+def _sites(nets: Mapping[int, Net], seam: Seam, order: int) -> Array:
+    """Fractions of the seam at which conditions are asked: the Greville points of the larger space on it.
+
+    For an order above 0 those of the space in which the condition of that order lies.
+    """
+    more, lost = (order * (len(seam.joint.across) - 1), _lost(seam.joint)) if order else (0, 0)
     found = []
     for border in (seam.a, seam.b):
-        degree, inner = _along(nets[border.surface], border).degree, _inner(nets, border)
-        counts = [degree + 1, *(min(n, degree) for n in inner.values()), degree + 1]
+        degree, inner = _along(nets[border.surface], border).degree + more, _inner(nets, border)
+        counts = [degree + 1, *(min(n + more + lost, degree) for n in inner.values()), degree + 1]
         found.append(KnotVector.from_multiplicities([0.0, *inner, 1.0], counts, degree).greville())
     return max(found, key=len)
 

@@ -1,0 +1,155 @@
+"""How far copies of a feature came out from the ideal."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mracad.bspline.net import Net
+from mracad.errors import EditError
+from mracad.feature.detail import LOST
+from mracad.feature.fine import between
+from mracad.feature.ground import Sheet
+from mracad.feature.ideal import Copies
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True)
+class Copy:
+    """What became of one copy.
+
+    Attributes
+    ----------
+    place : str
+    at : (float, float, float)
+        Where it stands, mm.
+    faces : tuple of int
+        Faces that it touches.
+    deviation, rms : float
+        Largest and mean square distance from the ideal copy, mm, constraints included.
+    lost : float
+        Largest part of it that constraints took away, mm.
+    exact : bool
+        Whether it is an exact shift of control points.
+    """
+
+    place: str
+    at: tuple[float, float, float]
+    faces: tuple[int, ...]
+    deviation: float
+    rms: float
+    lost: float
+    exact: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """What copies became on a sheet.
+
+    Attributes
+    ----------
+    net : Net
+        The surface undisplaced, in the space of the offsets.
+    done : ndarray (nu, nv, 3)
+        Offsets of its control points, without what is removed, in the surface's own frame, mm.
+    alone : ndarray (nu, nv, 3)
+        Those that the copies alone would be.
+    """
+
+    net: Net
+    done: Array
+    alone: Array
+
+
+class _Tally:
+    """Distances from the ideal, by copy."""
+
+    def __init__(self, count: int) -> None:
+        self.worst, self.lost, self.squares, self.samples = (np.zeros(count) for _ in range(4))
+        self.faces: list[set[int]] = [set() for _ in range(count)]
+
+    def add(self, copy: int, missed: Array, lost: Array, faces: Array) -> None:
+        """Count points of a copy."""
+        self.worst[copy] = max(self.worst[copy], missed.max())
+        self.lost[copy] = max(self.lost[copy], lost.max())
+        self.squares[copy] += (missed**2).sum()
+        self.samples[copy] += len(missed)
+        self.faces[copy].update(faces.tolist())
+
+    @property
+    def rms(self) -> Array:
+        return np.sqrt(self.squares / np.maximum(self.samples, 1))
+
+
+def compared(copies: Copies, outcomes: Mapping[int, Outcome], exact: Array) -> list[Copy]:
+    """Every copy beside its ideal.
+
+    Parameters
+    ----------
+    copies : Copies
+    outcomes : mapping of int to Outcome
+        By surface.
+    exact : ndarray of bool (copies,)
+        Which are exact shifts.
+    """
+    tally = _Tally(len(copies.places))
+    for i, outcome in outcomes.items():
+        sheet = copies.ground.sheets[i]
+        if copies.on(sheet).any():
+            for copy, *found in _missed(copies, sheet, outcome):
+                tally.add(copy, *found)
+    rms = tally.rms
+    return [
+        Copy(
+            place.label,
+            tuple(float(x) for x in copies.feet.points[k]),  # type: ignore[arg-type]
+            tuple(sorted(tally.faces[k] - {-1})),
+            float(tally.worst[k]),
+            float(rms[k]),
+            float(tally.lost[k]),
+            bool(exact[k]),
+        )
+        for k, place in enumerate(copies.places)
+    ]
+
+
+def _missed(copies: Copies, sheet: Sheet, outcome: Outcome) -> Iterator[tuple[int, Array, Array, Array]]:
+    """For copies on a sheet: distances from the ideal, what constraints took, and faces, at points of it."""
+    from scipy.spatial import cKDTree
+
+    net, some = outcome.net, copies.on(sheet)
+    both = np.concatenate([outcome.done @ sheet.turn.T, outcome.alone @ sheet.turn.T], axis=-1)
+    pair = Net(net.u, net.v, both, net.weights)
+    for uv, _ in between(copies, sheet, (net.u, net.v), some):
+        uv = uv[sheet.covers(uv)]
+        if not len(uv):
+            continue
+        points, _, _, normals = sheet.evaluate(uv)
+        wanted, _ = copies.ideal(sheet, points, normals)
+        on = np.full(len(uv), sheet.faces[0].index)
+        if len(sheet.faces) > 1:
+            on = copies.ground.faces(np.full(len(uv), sheet.index), uv)
+        values = np.asarray(pair.evaluate(uv))
+        missed = np.linalg.norm(values[:, :3] - wanted, axis=1)
+        gone = np.linalg.norm(values[:, :3] - values[:, 3:], axis=1)
+        chosen = np.flatnonzero(some)
+        hits = cKDTree(points).query_ball_point(copies.charts.origin[chosen], copies.reach[chosen])
+        for k, hit in zip(chosen.tolist(), hits, strict=True):
+            if hit:
+                yield k, missed[hit], gone[hit], on[hit]
+
+
+def refuse_clipped(copies: Copies, found: Sequence[Copy]) -> None:
+    """Raise EditError for a copy that points which stay take too much of."""
+    for copy, place in zip(found, copies.places, strict=True):
+        share = copy.lost / (copies.feature.height * abs(place.height))
+        if share > LOST:
+            numbers = " ".join(f"#{i + 1}" for i in copy.faces)
+            raise EditError(
+                f"{copy.place}: edges or holes that do not move take {100 * min(share, 1):.0f} % of the height of "
+                f"the copy there ({numbers})",
+                "move it away from them, make it smaller with --size, or let them take it with --clip",
+            )
