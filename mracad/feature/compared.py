@@ -124,7 +124,7 @@ def _missed(copies: Copies, sheet: Sheet, outcome: Outcome) -> Iterator[tuple[in
     both = np.concatenate([outcome.done @ sheet.turn.T, outcome.alone @ sheet.turn.T], axis=-1)
     pair = Net(net.u, net.v, both, net.weights)
     for uv, _ in between(copies, sheet, (net.u, net.v), some):
-        uv = uv[sheet.covers(uv)]
+        uv = uv[sheet.covers(uv, net)]
         if not len(uv):
             continue
         points, _, _, normals = sheet.evaluate(uv)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from mracad.constraint.seam import Seam, Wishes, opening
 from mracad.constraint.trimmed import TrimmedSeam
 from mracad.feature.compared import Copy, Outcome, compared, refuse_clipped
 from mracad.feature.crossing import Crossing, crossing, reached, refined
-from mracad.feature.fine import MOST, Fit
+from mracad.feature.fine import MISSED, Fit
 from mracad.feature.ideal import Copies
 from mracad.feature.joined import Softness, Wanted, held
 from mracad.feature.shift import Shifts, shifted
@@ -35,13 +35,13 @@ GAP, TURNED, BENT = 1e-4, math.radians(0.008), 1e-3
 """A seam along trim curves may end up with so wide a gap (mm), so much more of an angle, and, over the reach of a copy,
 so much more of a curvature jump; otherwise it stays."""
 
-TIGHT = 0.1
+TIGHT = 0.3
 """Share of these at which the solver aims."""
 
-HALVINGS = 3
-"""Most times that the spans under a trimmed seam are halved."""
+HALVINGS, LARGEST = 3, 100_000
+"""Most times that the spans under a trimmed seam are halved, and most control points of a net for which they are."""
 
-OPEN, BROKEN = "trimmed: not within the tolerance under a copy", "would not hold"
+OPEN, BROKEN, UNSEWN = "trimmed: not within the tolerance", "would not hold", "trimmed and not sewn"
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,7 +138,7 @@ def laid(copies: Copies, wishes: Wishes, coupled: bool, clip: bool, removed: Map
             if _finer(each, attempt.nets, halvings):
                 halvings[each.seam.edge] += 1
             else:
-                crossings = [other for other in crossings if other is not each]
+                crossings = [other for other in crossings if not other.edges & each.edges]
                 frozen |= dict.fromkeys(each.edges, BROKEN if isinstance(each.seam, Seam) else OPEN)
     taken = {i: over(task.model.surfaces[i].net, attempt.nets[i], each) for i, each in removed.items()}
     outcomes = {i: Outcome(attempt.nets[i], d - taken.get(i, 0.0), attempt.alone[i]) for i, d in attempt.done.items()}
@@ -158,11 +158,20 @@ def _task(copies: Copies, wishes: Wishes, removed: Mapping[int, Array]) -> _Task
     fit = Fit(copies, ~shifts.matched)
     sheets = [sheet for i, sheet in ground.sheets.items() if i in removed or copies.on(sheet).any()]
     nets = {sheet.index: ground.model.surfaces[sheet.index].net.over(*fit.knots(sheet)) for sheet in sheets}
-    joined = joints(ground.model, {face.index for sheet in sheets for face in sheet.faces}, wishes)
+    joined = _sewn(joints(ground.model, {face.index for sheet in sheets for face in sheet.faces}, wishes))
     reach = float(copies.reach.max())
     tolerances = TIGHT * GAP, TIGHT * TURNED, TIGHT * BENT / reach
-    softness = Softness(tolerances, copies.height**2 * reach)
+    softness = Softness(tolerances, (MISSED * copies.height) ** 2 * reach)
     return _Task(copies, fit, shifts, removed, wishes.keep, nets, joined, softness)
+
+
+def _sewn(joined: Joints) -> Joints:
+    """Joints without the trimmed seams between edges that only coincide: which of their points belong together is not
+    known to the tolerance of a copy."""
+    loose = tuple(seam for seam in joined.loose if seam.edge == seam.twin)
+    apart = {edge: UNSEWN for seam in joined.loose if seam not in loose for edge in (seam.edge, seam.twin)}
+    exact = tuple(seam for seam in joined.exact if seam.edge not in apart)
+    return replace(joined, exact=exact, loose=loose, frozen={**joined.frozen, **apart})
 
 
 def _crossings(task: _Task) -> list[Crossing]:
@@ -195,7 +204,7 @@ def _attempt(task: _Task, crossings: Sequence[Crossing], halvings: Mapping[int, 
         on_it = [task.model.faces[f] for f in task.model.surfaces[i].faces]
         faces = task.copies.ground.sheets[i].faces
         free = separate(net, on_it, [face.index for face in faces], task.keep, moving).free
-        wanted[i] = Wanted(net, every, free, faces)
+        wanted[i] = Wanted(net, every, free, faces[0])
     return _Attempt(nets, held(wanted, crossings, task.softness), alone)
 
 
@@ -215,7 +224,7 @@ def _holds(task: _Task, each: Crossing, after: Model) -> bool:
 
 def _finer(each: Crossing, nets: Mapping[int, Net], halvings: Mapping[int, int]) -> bool:
     """Whether the spans under a seam can be halved, and that can be of use."""
-    small = all(4 * nets[i].u.count * nets[i].v.count <= MOST for i in each.surfaces)
+    small = all(nets[i].u.count * nets[i].v.count <= LARGEST for i in each.surfaces)
     return small and isinstance(each.seam, TrimmedSeam) and halvings[each.seam.edge] < HALVINGS
 
 

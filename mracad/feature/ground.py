@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -72,17 +72,18 @@ class Sheet:
     @cached_property
     def cells(self) -> Array:
         """Knot cells that the faces touch."""
-        return np.asarray(np.logical_or.reduce([face_region(self.net, face).inside for face in self.faces]))
+        return touched(self.net, self.faces)
 
-    def covers(self, uv: Array) -> Array:
-        """Whether parameters ``(q, 2)`` lie in cells that the faces touch."""
+    def covers(self, uv: Array, net: Net | None = None) -> Array:
+        """Whether parameters ``(q, 2)`` lie in cells, those of a finer net if there is one, that the faces touch."""
         low, high = self.domain
         inside = ((uv >= low) & (uv <= high)) | self.periodic
+        fine, cells = (self.net, self.cells) if net is None else (net, touched(net, self.faces))
         cell = [
             np.clip(np.searchsorted(k.breaks, k.wrap(uv[:, i]), side="right") - 1, 0, k.spans - 1)
-            for i, k in enumerate(self.knots)
+            for i, k in enumerate((fine.u, fine.v))
         ]
-        return np.asarray(inside.all(axis=1) & self.cells[cell[0], cell[1]])
+        return np.asarray(inside.all(axis=1) & cells[cell[0], cell[1]])
 
     @property
     def domain(self) -> tuple[Array, Array]:
@@ -192,6 +193,11 @@ class Sheet:
         near = self.covers(grid).reshape(shape)
         near &= np.linalg.norm(points - centre[:, None], axis=2) <= 1.1 * reach[:, None]
         return points, normals, near
+
+
+def touched(net: Net, faces: Iterable[Face]) -> Array:
+    """Knot cells of a net that faces touch, a mask."""
+    return np.asarray(np.logical_or.reduce([face_region(net, face).inside for face in faces]))
 
 
 @dataclass(frozen=True, eq=False)

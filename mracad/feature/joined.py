@@ -7,7 +7,7 @@ have the displacement that the copies are.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -42,14 +42,14 @@ class Wanted:
         Of its control points, mm.
     free : ndarray of bool (nu, nv)
         Control points that may move.
-    faces : sequence of Face
-        Those of its faces that may move.
+    face : Face
+        One of those on it.
     """
 
     net: Net
     offset: Array
     free: Array
-    faces: Sequence[Face]
+    face: Face
 
 
 @dataclass(frozen=True)
@@ -122,9 +122,8 @@ def _problem(
     nets = {i: window.net for i, window in windows.items()}
     spaces = {}
     for i, window in windows.items():
-        sides = {side.face for each in crossings for side in each.sides() if side.surface == i}
-        faces = [face for face in wanted[i].faces if face.index in sides]
-        masses = forms(window.net, window.net, quadrature(window.net, faces))
+        # copies go on beyond trim curves: what barely reaches into a face stays near them
+        masses = forms(window.net, window.net, quadrature(window.net, [replace(wanted[i].face, trims=())]))
         spaces[i] = Space(window.net, masses, window.local, np.ones_like(window.local))
     laid = np.concatenate([each.reshape(-1, 3) for each in offsets.values()])
     rows, _ = seam_rows(nets, exact_parts(crossings), everywhere=True)

@@ -1,0 +1,127 @@
+"""Copies over a seam along a trim curve, whose two sides have no spline space in common."""
+
+import io
+
+import numpy as np
+import pytest
+
+from mracad import job
+from mracad.audit.continuity import seams
+from mracad.edit.features import extract, move, repeat
+from mracad.errors import EditError
+from mracad.feature.detail import save
+from mracad.occ.step import read_step, write_step
+from mracad.occ.view import view
+from mracad.options import Move, Repeat
+from tests.edit import halves
+from tests.edit.models import sheet
+from tests.feature import grounds
+from tests.feature.grounds import HEIGHT, bump
+
+
+@pytest.fixture(scope="module")
+def feature(tmp_path_factory):
+    path = tmp_path_factory.mktemp("feature") / "bump.feature"
+    path.write_bytes(
+        save(extract(sheet(grounds.plane()), Repeat(feature="near:50,50,0,radius:20", at=("0,0,0",)), {0}))
+    )
+    return str(path)
+
+
+def document(sewn=True):
+    """Two halves of one smooth surface that meet along a wavy trim curve, the nets askew to each other."""
+    return halves.document(*halves.quiet(0.0, (9, 17)), sewn)
+
+
+def height(x, y):
+    p, q = x / halves.SIZE, y / halves.SIZE
+    return 40 * (p**3 - 2 * p * q * q + q * q - p * p)
+
+
+def on_seam(y, beside=0.0):
+    x = float(halves.waist(y)) + beside
+    return np.array([x, y, height(x, y)])
+
+
+def word(point):
+    return ",".join(repr(float(x)) for x in point)
+
+
+def read_back(document):
+    stream = io.BytesIO()
+    write_step(document, stream)
+    return view(read_step(io.BytesIO(stream.getvalue())))
+
+
+def how(report):
+    return next((t.how, t.reason) for t in report.edit.edges if len(t.faces) == 2)
+
+
+def visible(count=400):
+    """Parameters of points of each half, up to the seam."""
+    x, y = (z.ravel() for z in np.meshgrid(np.linspace(60, 150, count), np.linspace(20, 180, count)))
+    left = x < halves.waist(y)
+    return np.stack([x, y], axis=1)[left], np.stack([x - halves.SHEAR * y, y], axis=1)[~left]
+
+
+@pytest.mark.parametrize(
+    "place", [on_seam(100.0), on_seam(60.0, -8.0), on_seam(120.0, 5.0)], ids=["on", "left", "right"]
+)
+def test_a_copy_lies_over_a_trimmed_seam(feature, place):
+    paper = document()
+    before = view(paper)
+    report = job.run(paper, repeat, Repeat(feature=feature, at=(word(place),)))
+    after = read_back(paper)
+    assert report.valid_after.valid and how(report) == ("to tolerance", "")
+    (copy,) = report.edit.copies
+    (old,), (new,) = seams(before), seams(after)
+    print(f"gap {new.gap:.1e} mm, angle {new.angle:.1e}°, off by {copy.deviation:.1e} mm, lost {copy.lost:.1e} mm")
+    assert new.gap <= 1e-4 and new.angle <= old.angle + 0.008
+    assert len(copy.faces) == 2 and copy.deviation <= 1e-3 * HEIGHT
+    for one, two, uv in zip(before.surfaces, after.surfaces, visible(), strict=True):
+        points, su, sv = one.net.evaluate(uv, 1)
+        normal = np.cross(su, sv)
+        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+        # chords for geodesics: the ground's radius is above 500 mm
+        wanted = bump(np.linalg.norm(points - place, axis=1))[:, None] * normal
+        assert np.abs(two.net.evaluate(uv) - points - wanted).max() <= 2e-3 * HEIGHT
+
+
+def test_a_feature_is_moved_off_a_trimmed_seam(feature):
+    """What it leaves is the ground that was there before it."""
+    paper = document()
+    before = view(paper)
+    job.run(paper, repeat, Repeat(feature=feature, at=(word(on_seam(100.0)),)))
+    top = on_seam(100.0) + [0, 0, HEIGHT]
+    report = job.run(paper, move, Move(feature=f"near:{word(top)},radius:20", to=word(on_seam(100.0, -45.0))))
+    after = read_back(paper)
+    (new,) = seams(after)
+    assert how(report) == ("to tolerance", "") and new.gap <= 1e-4 and new.angle <= 0.012
+    for one, two, uv in zip(before.surfaces, after.surfaces, visible(), strict=True):
+        points = one.net.evaluate(uv)
+        near = np.linalg.norm(points - on_seam(100.0), axis=1) < 16
+        left = np.abs(two.net.evaluate(uv) - points)[near].max()
+        print(f"left {left:.1e} mm of {HEIGHT} mm")
+        assert left <= 5e-3 * HEIGHT
+
+
+@pytest.mark.parametrize("options", [{"edges": "frozen"}, {"hold": ("edge#2",)}], ids=["frozen", "held"])
+def test_a_seam_that_may_not_move_takes_its_part(feature, options):
+    place = word(on_seam(100.0, 10.0))
+    with pytest.raises(EditError, match="do not move take"):
+        job.run(document(), repeat, Repeat(feature=feature, at=(place,), **options))
+    paper = document()
+    line = next(edge for edge in view(paper).edges if len(edge.sides) == 2)
+    assert line.index == 1
+    report = job.run(paper, repeat, Repeat(feature=feature, at=(place,), clip=True, **options))
+    again = next(edge for edge in read_back(paper).edges if len(edge.sides) == 2)
+    assert report.edit.copies[0].lost > 0.1 * HEIGHT
+    assert np.abs(again.points - line.points).max() < 1e-9
+
+
+def test_a_trimmed_seam_that_is_not_sewn_takes_its_part_and_says_so(feature):
+    place = word(on_seam(100.0, 10.0))
+    with pytest.raises(EditError, match="do not move take"):
+        job.run(document(sewn=False), repeat, Repeat(feature=feature, at=(place,)))
+    report = job.run(document(sewn=False), repeat, Repeat(feature=feature, at=(place,), clip=True))
+    assert {t.reason for t in report.edit.edges} == {"free edge", "trimmed and not sewn"}
