@@ -139,7 +139,7 @@ def _problem(
 def _contacts(crossings: Sequence[Crossing]) -> list[Contact]:
     """Those parts of seams that are kept to a tolerance."""
     return [
-        Contact(each.seam.a.part(*stretch), each.seam.b.part(*stretch), each.seam.order)
+        Contact(each.seam.a.part(*stretch), each.seam.b.part(*stretch), each.seam.order, since=each.seam.since)
         for each in crossings
         if isinstance(each.seam, TrimmedSeam)
         for stretch in each.stretches

@@ -92,7 +92,7 @@ def test_a_feature_is_moved_off_a_trimmed_seam(feature):
     paper = document()
     before = view(paper)
     job.run(paper, repeat, Repeat(feature=feature, at=(word(on_seam(100.0)),)))
-    top = on_seam(100.0) + [0, 0, HEIGHT]
+    top = on_seam(100.0) + np.array([0, 0, HEIGHT])
     report = job.run(paper, move, Move(feature=f"near:{word(top)},radius:20", to=word(on_seam(100.0, -45.0))))
     after = read_back(paper)
     (new,) = seams(after)
