@@ -16,7 +16,7 @@ import numpy as np
 from mracad.bspline.net import Net
 from mracad.constraint.trimmed import TrimmedSeam
 from mracad.edit.target import Sheet, Wish
-from mracad.edit.trial import Scene, Trial, Verdict, Watch, displaced
+from mracad.edit.trial import ENOUGH, Scene, Trial, Verdict, Watch, displaced
 from mracad.inspect.roughness import Change, Worse
 from mracad.model import Displacement, Offset
 from mracad.seam.interface import Joints
@@ -29,12 +29,8 @@ ROUNDS = 4
 LEAST = 0.25
 """A surface of which less may be done is left, so that the others can do more."""
 
-ENOUGH = 0.9
-"""Where more than this of a displacement may be done, no other is tried."""
-
-WHOLE = 1.25
-"""What may be done in whole is preferred to a part of what comes nearer to the target by less than this factor: a part
-leaves something of every wave everywhere."""
+BLENDS, PROMISE = 2, 1.05
+"""Most times that what is best for each of joined surfaces is put together, and by how much it has to come nearer."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,10 +170,18 @@ def _attempt(scene: Scene, wish: Wish, members: Mapping[int, Sheet], joined: Joi
     trial = Trial(scene, members, joined)
     target = wish.target(trial.problem, members, joined)
     best = trial.nothing()
+    found = [best]
     for batch in wish.ways(trial.problem, target, trial.width) if trial.problem.free.any() else ():
-        best = max([best, *(trial.judged(wanted, target) for wanted in batch)], key=_worth)
+        found += [trial.judged(wanted, target) for wanted in batch]
+        best = max(found, key=_worth)
         if best.least > ENOUGH:
             break
+    for _ in range(BLENDS if len(members) > 1 else 0):
+        chosen = [(max(found, key=lambda each: each.gains[i]), i) for i in range(len(members))]
+        if sum(each.gains[i] for each, i in chosen) <= PROMISE * best.gain:
+            break
+        found.append(trial.blended(chosen, target))
+        best = max(found, key=_worth)
     return {
         i: Moved(members[i], space.net, amount * part, amount, change, limits, int(space.free.sum()), best.gain)
         for (i, space), part, amount, change, limits in zip(
@@ -187,4 +191,4 @@ def _attempt(scene: Scene, wish: Wish, members: Mapping[int, Sheet], joined: Joi
 
 
 def _worth(verdict: Verdict) -> float:
-    return verdict.gain * (WHOLE if verdict.least > ENOUGH else 1.0)
+    return verdict.worth

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from mracad.bspline.net import Net, cross
-from mracad.edit.target import Sheet
+from mracad.edit.target import Sheet, stiffness
 from mracad.inspect.cells import quadrature
 from mracad.inspect.roughness import Change, Growth, Worse, worse
 from mracad.inspect.survey import Survey, changes, surveys
@@ -35,6 +35,13 @@ GROWTH = Growth(0.005, 0.005, 0.005, 0.02, 30.0)
 TIGHT = 0.3
 """Share of what a contact may be off at which its conditions aim."""
 
+
+ENOUGH = 0.9
+"""Where more than this of a displacement may be done, no other is tried."""
+
+WHOLE = 1.25
+"""What may be done in whole is preferred to a part of what comes nearer to the target by less than this factor: a part
+leaves something of every wave everywhere."""
 
 FINER = 3
 """Steps from one Greville point to the next in which deviations are looked for."""
@@ -99,20 +106,28 @@ class Verdict:
         What that makes of the roughness of its faces, by face.
     limits : sequence of tuple of Worse
         What keeps it from more.
+    gains : sequence of float
+        By how much each comes nearer to the target, as a squared norm.
     gain : float
-        By how much the least of the amounts comes nearer to the target, as a squared norm.
+        The same of all, the least of the amounts of each.
     """
 
     parts: Sequence[Array]
     amounts: Sequence[float]
     changes: Sequence[Mapping[int, Change]]
     limits: Sequence[tuple[Worse, ...]]
+    gains: Sequence[float]
     gain: float
 
     @property
     def least(self) -> float:
         """What may be done to all of them."""
         return min(self.amounts)
+
+    @property
+    def worth(self) -> float:
+        """What it counts for among others."""
+        return self.gain * (WHOLE if self.least > ENOUGH else 1.0)
 
 
 class Trial:
@@ -154,7 +169,7 @@ class Trial:
     def nothing(self) -> Verdict:
         """What the judge makes of leaving everything as it is."""
         parts = [np.zeros(space.net.poles.shape) for space in self.problem.spaces.values()]
-        return Verdict(parts, [0.0] * len(parts), self.watch.still(), [()] * len(parts), 0.0)
+        return Verdict(parts, [0.0] * len(parts), self.watch.still(), [()] * len(parts), [0.0] * len(parts), 0.0)
 
     def judged(self, delta: Array, target: Array) -> Verdict:
         """How much of a displacement may be done to each surface."""
@@ -167,9 +182,14 @@ class Trial:
         parts = list(problem.split(delta).values())
         ceiling = self._ceilings(delta)
         amounts, found, limits = _amounts(self.watch, list(problem.spaces.values()), parts, ceiling, self.tolerances)
-        done = min(amounts) * delta
-        gain = float((done * (problem.mass @ (2 * target - done))).sum())
-        return Verdict(parts, amounts, found, limits, gain)
+        gains = problem.gains(delta, target, amounts)
+        gain = sum(problem.gains(delta, target, [min(amounts)] * len(parts)))
+        return Verdict(parts, amounts, found, limits, gains, gain)
+
+    def blended(self, chosen: Sequence[tuple[Verdict, int]], target: Array) -> Verdict:
+        """For each surface another verdict on it, by place, made to meet as smoothly as can be."""
+        wanted = np.concatenate([each.amounts[i] * each.parts[i].reshape(-1, 3) for each, i in chosen])
+        return self.judged(self.problem.nearest(wanted, stiffness(self.width)), target)
 
     def _ceilings(self, delta: Array) -> Array:
         """How much of a displacement contacts allow each surface."""

@@ -16,7 +16,7 @@ gives half the displacement.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -147,26 +147,32 @@ class Problem:
         """δ of the filter of gain 1 / (1 + x), ``(points, 3)``; stiffness in mm⁴."""
         return self._solver(stiffness, self.free)(-stiffness * (self.bending @ self.f))
 
-    def nearest(self, wanted: Array) -> Array:
-        """The admissible δ nearest to ``wanted``, both ``(points, 3)``, over the faces."""
+    def nearest(self, wanted: Array, stiffness: float = 0.0) -> Array:
+        """The admissible δ nearest to ``wanted``, both ``(points, 3)``, over the faces.
+
+        Its distance is ‖δ − w‖²_M + a |δ − w|²_K, with ``stiffness`` a (mm⁴): what is added is then smooth.
+        """
         kept = np.where(self.free[:, None], wanted, 0.0)
-        pull = self.mass @ (wanted - kept)
+        pull = self._form(stiffness) @ (wanted - kept)
         if self.soft is not None:
             pull = pull - self.soft @ kept
         if self.pull is not None:
             pull = pull + self.pull
-        return kept + self._solver(0.0, self.free)(pull, start=kept, goal=self.goal)
+        return kept + self._solver(stiffness, self.free)(pull, start=kept, goal=self.goal)
 
     def _solver(self, stiffness: float, free: Array) -> Constrained:
         """The solver of the form M + stiffness · K and the contacts."""
         soft = self.soft is not None and free is self.free
         key = stiffness, free.tobytes(), soft
         if key not in self._solvers:
-            form = self.mass + stiffness * (self.bending + self.creases) if stiffness else self.mass
+            form = self._form(stiffness)
             while self._solvers and (len(self._solvers) + 1) * len(free) > KEPT:
                 del self._solvers[next(iter(self._solvers))]
             self._solvers[key] = Constrained(form + self.soft if soft else form, self.rows, free)
         return self._solvers[key]
+
+    def _form(self, stiffness: float) -> Any:
+        return self.mass + stiffness * (self.bending + self.creases) if stiffness else self.mass
 
     @property
     def rimmed(self) -> bool:
@@ -179,6 +185,12 @@ class Problem:
         away = np.concatenate([each.ravel() for each in every])
         share = np.minimum(away / width, 1.0)[:, None]
         return share**3 * (10 - 15 * share + 6 * share**2)
+
+    def gains(self, delta: Array, target: Array, amounts: Sequence[float]) -> list[float]:
+        """By how much amounts of a displacement bring each surface nearer to a target, as a squared norm."""
+        size = np.repeat(amounts, [space.free.size for space in self.spaces.values()])[:, None]
+        done = size * delta
+        return [float(part.sum()) for part in self.split(done * (self.mass @ (2 * target - done))).values()]
 
     def split(self, values: Array) -> dict[int, Array]:
         """Values of all points by surface, ``(nu, nv, 3)`` each."""

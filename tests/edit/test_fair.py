@@ -221,6 +221,15 @@ def test_halves_that_meet_along_a_trim_curve():
     assert beside(after, clean) < 0.8 * beside(model, clean)
 
 
+def test_what_suits_one_surface_and_another_is_put_together():
+    """No way suits both halves: each by itself comes nearer to what is wanted than both do by any one."""
+    _, left, right = halves.surfaces(0.2, (30, 60))
+    model = view(halves.document(left, right))
+    result = faired(model, {0, 1}, Filter(30.0), Wishes("g1"), Tolerances(1e-3))
+    assert len(result.joints.loose) == 1 and all(moved.amount == 1.0 for moved in result.moved.values())
+    assert no_rougher(model, result.displacement().applied(model))
+
+
 def beside(model, clean):
     """Root mean square of height over the truth within 25 mm of the seam of two halves."""
     found = []

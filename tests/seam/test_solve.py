@@ -183,3 +183,27 @@ def test_displacements_fade_beside_what_is_held():
     first = fade[0].reshape(away.shape)[:, 0]
     assert first[0] == 0.0 and (first[away[:, 0] >= 0.5] == 1.0).all() and (np.diff(first) >= 0).all()
     assert p.split(np.ones((2 * away.size, 3)))[1].shape == net.poles.shape
+
+
+@pytest.mark.parametrize("rows", [False, True])
+def test_what_is_added_to_a_wanted_displacement_is_as_smooth_as_asked(rows):
+    p = problem(rough(), rows=rows)
+    wanted = np.random.default_rng(4).standard_normal(p.f.shape)
+    basis = admissible(p)
+    for stiffness in (0.0, STIFFNESS):
+        form = (p.mass + stiffness * (p.bending + p.creases)).toarray()
+        nearest = basis @ np.linalg.solve(basis.T @ form @ basis, basis.T @ form @ wanted)
+        assert np.abs(p.nearest(wanted, stiffness) - nearest).max() < 1e-7 * np.abs(nearest).max()
+
+
+def test_gains_are_what_comes_nearer():
+    spaces = dict(enumerate(problem(rough(seed), rows=False).spaces[0] for seed in (0, 1)))
+    p = Problem(spaces)
+    rng = np.random.default_rng(2)
+    delta, target = (rng.standard_normal(p.f.shape) for _ in range(2))
+    amounts, half = (0.3, 0.8), len(p.f) // 2
+    for k, gain in enumerate(p.gains(delta, target, amounts)):
+        part = slice(k * half, (k + 1) * half)
+        mass = spaces[k].forms.mass
+        left, before = target[part] - amounts[k] * delta[part], target[part]
+        assert gain == pytest.approx((before * (mass @ before)).sum() - (left * (mass @ left)).sum())
