@@ -176,8 +176,8 @@ class Trial:
         problem = self.problem
         bound = self.tolerances.deviation
         if np.isfinite(bound) and np.linalg.norm(delta, axis=1).max(initial=0.0) > bound:
-            parts = zip(problem.spaces.values(), problem.split(delta).values(), strict=True)
-            within = [bounded(space.net, part, bound, self.width).reshape(-1, 3) for space, part in parts]
+            both = zip(problem.spaces.values(), problem.split(delta).values(), strict=True)
+            within = [bounded(space.net, part, bound, self.width).reshape(-1, 3) for space, part in both]
             delta = problem.nearest(np.concatenate(within))
         parts = list(problem.split(delta).values())
         ceiling = self._ceilings(delta)
@@ -216,8 +216,8 @@ def _space(scene: Scene, sheet: Sheet, moving: frozenset[int]) -> Net:
 def bounded(net: Net, offset: Array, bound: float, width: float) -> Array:
     """Offsets ``(nu, nv, 3)`` that are scaled back, smoothly within a width, until none leads far along the normal.
 
-    The share a = min(1, bound / |δ · n|) beside each Greville point gives way to the mean, over a window of the width, of
-    its least values over the same window: never more than a, and smooth.
+    The share a = min(1, bound / |δ · n|) beside each Greville point gives way to the mean, over a window of the width,
+    of its least values over the same window: never more than a, and smooth.
 
     Parameters
     ----------
@@ -231,7 +231,7 @@ def bounded(net: Net, offset: Array, bound: float, width: float) -> Array:
     us, vs = (_between(knots.greville()) for knots in (net.u, net.v))
     normals = cross(net.tangents(us, vs, 0), net.tangents(us, vs, 1))
     normals /= np.maximum(np.linalg.norm(normals, axis=-1, keepdims=True), 1e-300)
-    far = np.abs((Net(net.u, net.v, offset, net.weights).grid(us, vs) * normals).sum(axis=-1))
+    far = np.abs((np.asarray(Net(net.u, net.v, offset, net.weights).grid(us, vs)) * normals).sum(axis=-1))
     far = maximum_filter(far, 2 * FINER + 1, mode="nearest")[::FINER, ::FINER]
     share = bound / np.maximum(far, bound)
     spacing = (arc_lengths(net, axis).sum() / net.poles.shape[axis] for axis in (0, 1))
