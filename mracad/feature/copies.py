@@ -8,7 +8,7 @@ and takes its part of the copies.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -20,6 +20,7 @@ from mracad.constraint.trimmed import TrimmedSeam
 from mracad.feature.compared import Copy, Outcome, compared, refuse_clipped
 from mracad.feature.crossing import Crossing, crossing, reached, refined
 from mracad.feature.fine import MISSED, Fit
+from mracad.feature.ground import Ground
 from mracad.feature.ideal import Copies
 from mracad.feature.joined import Softness, Wanted, held
 from mracad.feature.shift import Shifts, shifted
@@ -158,7 +159,8 @@ def _task(copies: Copies, wishes: Wishes, removed: Mapping[int, Array]) -> _Task
     fit = Fit(copies, ~shifts.matched)
     sheets = [sheet for i, sheet in ground.sheets.items() if i in removed or copies.on(sheet).any()]
     nets = {sheet.index: ground.model.surfaces[sheet.index].net.over(*fit.knots(sheet)) for sheet in sheets}
-    joined = _sewn(joints(ground.model, {face.index for sheet in sheets for face in sheet.faces}, wishes))
+    under = {face.index for sheet in sheets for face in sheet.faces}
+    joined = _told(ground, under, _sewn(joints(ground.model, under, wishes)))
     reach = float(copies.reach.max())
     tolerances = TIGHT * GAP, TIGHT * TURNED, TIGHT * BENT / reach
     softness = Softness(tolerances, (MISSED * copies.height) ** 2 * reach)
@@ -172,6 +174,15 @@ def _sewn(joined: Joints) -> Joints:
     apart = {edge: UNSEWN for seam in joined.loose if seam not in loose for edge in (seam.edge, seam.twin)}
     exact = tuple(seam for seam in joined.exact if seam.edge not in apart)
     return replace(joined, exact=exact, loose=loose, frozen={**joined.frozen, **apart})
+
+
+def _told(ground: Ground, under: Collection[int], joined: Joints) -> Joints:
+    """Joints that say nothing of edges beyond which a face could move if a copy lay there, too."""
+    edges = ground.model.edges
+    needless = {
+        e for e in joined.frozen if any(s.face in ground.chosen and s.face not in under for s in edges[e].sides)
+    }
+    return replace(joined, frozen={e: why for e, why in joined.frozen.items() if e not in needless})
 
 
 def _crossings(task: _Task) -> list[Crossing]:

@@ -22,8 +22,11 @@ from mracad.wavelet.ladder import arc_lengths
 Array = np.ndarray
 Knots = tuple[KnotVector, KnotVector]
 
-MISSED, FACETTED = 3e-4, 1e-2
-"""Share of its height by which a copy may miss the ideal before knots are inserted; for nets of degree 1."""
+MISSED = 3e-4
+"""Share of its height by which a copy may miss the ideal before knots are inserted."""
+
+SMOOTH = 3
+"""Degree to which degree 1 is raised under copies."""
 
 FIRST = 4.0
 """Spans under a copy are at first no longer than its reach over this."""
@@ -83,19 +86,17 @@ class Fit:
         return np.where(near[..., None], poles, 0.0)
 
     def knots(self, sheet: Sheet) -> Knots:
-        """The sheet's knots with such as divide spans too wide to hold the copies."""
+        """Knots of the sheet's surface that hold the copies: its own, and such as divide spans too wide for them."""
         some = self.on(sheet)
         if not some.any():
             return sheet.knots
+        u, v = (kv.elevated(SMOOTH) if kv.degree == 1 else kv for kv in sheet.knots)
         widest = [float(arc_lengths(sheet.net, axis).max()) for axis in (0, 1)]
-        if all(UNEVEN * x <= SPARE * self._least(kv) for x, kv in zip(widest, sheet.knots, strict=True)):
-            return sheet.knots
+        if all(UNEVEN * x <= SPARE * self._least(kv) for x, kv in zip(widest, (u, v), strict=True)):
+            return u, v
         first = _first(self.copies, sheet, some, max(widest))
-        return divided(self._refined(sheet.knots, first), lambda knots: self._more(sheet, knots, some))
-
-    @staticmethod
-    def _refined(knots: Knots, more: Sequence[Array]) -> Knots:
-        return knots[0].refined(more[0]), knots[1].refined(more[1])
+        knots = u.refined(first[0]), v.refined(first[1])
+        return divided(knots, lambda knots: self._more(sheet, knots, some))
 
     def _more(self, sheet: Sheet, knots: Knots, some: Array) -> list[Array]:
         """Knots that divide the spans in which the interpolant misses the ideal."""
@@ -111,7 +112,7 @@ class Fit:
             points, *tangents, normals = sheet.evaluate(uv)
             wanted, _ = self.copies.ideal(sheet, points, normals, self.some)
             missed = np.linalg.norm(np.asarray(delta.evaluate(uv)) - wanted, axis=1)
-            limit = (FACETTED if kv.degree == 1 else MISSED) * self.copies.height
+            limit = MISSED * self.copies.height
             more.append(split(kv, span, missed / limit, np.linalg.norm(tangents[axis], axis=1), self._least(kv)))
         return more
 

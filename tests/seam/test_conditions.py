@@ -8,7 +8,7 @@ from mracad.bspline.interpolate import interpolated
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.net import Net
 from mracad.constraint.seam import Border, Joint, Seam
-from mracad.seam.conditions import laid_out, matched, rows
+from mracad.seam.conditions import doubled, laid_out, matched, rows
 from mracad.seam.solve import Constrained
 
 NONE = np.empty(0)
@@ -207,6 +207,50 @@ def test_what_obeys_is_smooth_all_along_the_seam(order):
         assert np.abs(jets[1][k] - 2.0**k * jets[0][k]).max() < 1e-10
     if order < 2:
         assert np.abs(jets[1][order + 1] - 2.0 ** (order + 1) * jets[0][order + 1]).max() > 1e-3
+
+
+LAWS = {"skew": ([0.8], [0.3]), "linear": ([0.8, 0.3], [0.1]), "quadratic": ([0.9, 0.2, -0.3], [0.1, -0.2, 0.4])}
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_what_obeys_a_varying_joint_along_double_knots_is_smooth_everywhere(law):
+    across, along = map(np.array, LAWS[law])
+    seam = joined(border(0, False), border(1, True), Joint(1, across, along))
+    left, right = (chart(lambda u, v, i=i: (u + i - 1, v), (3, 3), (3, 6 + i)) for i in (0, 1))
+    nets = matched({0: left, 1: right}, [seam])
+    wide = doubled(nets, [seam])
+    assert wide[0].v == wide[1].v and set(wide[0].v.multiplicities[1:-1]) == {2} and wide[0].u == left.u
+    share, worst = np.linspace(0, 1, 301), {}
+    for name, spaces, everywhere in (("simple", nets, False), ("double", wide, True)):
+        form, _ = rows(spaces, [seam], everywhere)
+        solver = Constrained(eye_array(form.shape[1], format="csr"), form, np.ones(form.shape[1], bool))
+        delta = solver.settled(np.random.default_rng(0).standard_normal((form.shape[1], 1)))
+        parts = np.split(delta, [spaces[0].poles.shape[0] * spaces[0].poles.shape[1]])
+        jets = []
+        for net, own, side in zip(spaces.values(), parts, (seam.a, seam.b), strict=True):
+            own = own.reshape(net.u.count, net.v.count, 1)
+            jets.append(Net(net.u, net.v, own).evaluate(side.places(share), 1, side.limits("right")))
+        (s, n, t), (z, m, _) = jets
+        laws = [np.polynomial.polynomial.polyval(share, c)[:, None] for c in (across, along)]
+        worst[name] = np.abs(m - laws[0] * n - laws[1] * t).max()
+        assert np.abs(z - s).max() < 1e-9 and np.abs(s).max() > 0.1 and np.abs(n).max() > 0.1
+    print(law, worst)
+    # conditions with a varying ratio all but depend on each other
+    assert worst["double"] < (1e-9 if len(across) == 1 else 1e-3 * worst["simple"]) and worst["simple"] > 1e-2
+
+
+def test_a_part_of_a_seam_asks_the_same_as_the_whole():
+    """On displacements of the whole that obey, and only on those; its fractions are its own."""
+    across, along = np.array([0.9, 0.2, -0.3]), np.array([0.1, -0.2, 0.4])
+    seam = joined(border(0, False), border(1, True), Joint(1, across, along))
+    part = seam.part(0.25, 0.75)
+    share = np.linspace(0, 1, 9)
+    assert np.abs(part.a.places(share) - seam.a.places(0.25 + share / 2)).max() < 1e-15
+    for own, whole, pace in ((part.joint.across, across, 1.0), (part.joint.along, along, 2.0)):
+        value = np.polynomial.polynomial.polyval
+        assert np.abs(value(share, own) - pace * value(0.25 + share / 2, whole)).max() < 1e-14
+    bent = Joint(2, np.array([2.0]), NONE, 0.6, -0.4).part(0.25, 0.75)
+    assert (bent.across, bent.bend, bent.shear) == (np.array([2.0]), 0.6, -0.8)
 
 
 @pytest.mark.parametrize("pair", PAIRS)

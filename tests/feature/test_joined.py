@@ -1,0 +1,115 @@
+"""Copies over seams: what takes part, where knots go, and what is left as it was."""
+
+import numpy as np
+import pytest
+from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
+
+from mracad.bspline.knots import KnotVector
+from mracad.bspline.net import Net
+from mracad.constraint.seam import Border, Joint, Seam
+from mracad.edit.features import extract, repeat
+from mracad.errors import EditError
+from mracad.feature.crossing import crossing
+from mracad.feature.detail import save
+from mracad.occ.view import view
+from mracad.options import Repeat
+from tests import zoo
+from tests.edit import panels
+from tests.edit.models import sheet
+from tests.feature import grounds
+from tests.feature.grounds import HEIGHT, SIGMA, bump
+from tests.occ import shapes
+
+
+@pytest.fixture(scope="module")
+def feature(tmp_path_factory):
+    path = tmp_path_factory.mktemp("feature") / "bump.feature"
+    window = Repeat(feature="near:50,50,0,radius:20", at=("0,0,0",))
+    path.write_bytes(save(extract(sheet(grounds.plane()), window, {0})))
+    return str(path)
+
+
+def panel(more=()):
+    """Two sewn patches of 1 mm spans, the second with more knots along their seam x = 100."""
+    clean, _ = panels.whole(100, 0.0, patches=(2, 1))
+    patches = panels.cut(clean, (2, 1))
+    patches[1, 0] = panels.refined(patches[1, 0], v_knots=more)
+    return view(panels.document(patches))
+
+
+def at(*places):
+    return tuple(f"{x},{y},{float(panels.truth(x, y))!r}" for x, y in places)
+
+
+def test_only_control_points_beside_the_seam_differ_from_the_ideal(feature):
+    """Those of a copy beyond them are the same as if it lay there alone, bit for bit."""
+    model = panel()
+    coupled, frozen = (
+        repeat(model, Repeat(feature=feature, at=at((95, 40.3)), edges=edges, clip=True))
+        for edges in ("coupled", "frozen")
+    )
+    assert [t.how for t in coupled.edges if len(t.faces) == 2] == ["coupled"]
+    for index, rows in ((0, slice(-8, None)), (1, slice(0, 8))):
+        one, two = (each.displacement.offsets[index].poles for each in (coupled, frozen))
+        assert one.shape == two.shape == model.surfaces[index].net.poles.shape
+        differ = np.flatnonzero((one != two).any(axis=(1, 2)))
+        assert len(differ) and set(differ) <= set(np.arange(len(one))[rows])
+        assert (one != 0).any(axis=(1, 2)).sum() > 12
+
+
+def test_knots_are_matched_only_under_copies(feature):
+    """One side has twice the knots along the seam; the other gets them under each of two copies, not between them."""
+    twice = np.arange(100) + 0.5
+    model = panel(twice)
+    edit = repeat(model, Repeat(feature=feature, at=at((100, 22), (100, 79)), size=0.4))
+    matched = np.intersect1d(edit.displacement.offsets[0].v_knots, twice)
+    # ten spans and a half of a copy, seven of functions that reach beyond it
+    assert set(twice[(np.abs(twice[:, None] - [22, 79]) < 10).any(axis=1)]) <= set(matched)
+    assert (np.abs(matched[:, None] - [22, 79]).min(axis=1) < 18).all()
+    assert max(copy.deviation for copy in edit.copies) <= 1e-3 * HEIGHT
+
+
+def test_stretches_hold_the_supports_of_what_moves():
+    k = KnotVector.clamped(np.linspace(0, 1, 31), 3)
+    x, y = np.meshgrid(k.greville(), k.greville(), indexing="ij")
+    nets = {i: Net(k, k, np.stack([x + i, y, 0 * x], axis=-1)) for i in (0, 1)}
+    sides = Border(0, 0, 0, 1.0, "left", 0.0, 1.0), Border(1, 1, 0, 0.0, "right", 1.0, 0.0)
+    seam = Seam(0, 0, *sides, Joint(1, np.ones(1), np.empty(0)), 0.0, 0.0)
+    moved = {i: np.zeros((33, 33), bool) for i in (0, 1)}
+    moved[0][-1, 16] = True
+    found = crossing(seam, nets, moved)
+    # its support is between knots 13 and 17, that of the functions up to three away between 10 and 20
+    assert np.allclose(found.stretches, [(10 / 30, 20 / 30)])
+    assert np.allclose(list(found.rests()), [(0, 10 / 30), (20 / 30, 1)])
+    moved[1][0, 0] = True
+    assert np.allclose(crossing(seam, nets, moved).stretches, [(10 / 30, 20 / 30), (26 / 30, 1)])
+    moved[0][:, 16] = False
+    moved[0][3, 16] = True
+    assert np.allclose(crossing(seam, nets, moved).stretches, [(26 / 30, 1)])
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_a_copy_on_a_ruled_face_is_smooth(feature, axis):
+    """Of degree 1 in one direction; the closed form, and no kinks."""
+    line, curve = KnotVector.clamped([0.0, 1.0], 1), KnotVector.clamped(np.linspace(0, 1, 5), 3)
+    u, v = (line, curve)[:: 1 - 2 * axis]
+    x, y = np.meshgrid(120 * u.greville(), 120 * v.greville(), indexing="ij")
+    flat = sheet(Net(u, v, np.stack([x, y, 0 * x], axis=-1)))
+    edit = repeat(flat, Repeat(feature=feature, at=("61.3,58.8,0",)))
+    assert edit.copies[0].deviation <= 1e-3 * HEIGHT
+    net = edit.displacement.applied(flat).surfaces[0].net
+    places = np.stack(np.meshgrid(np.linspace(0.2, 0.8, 400), np.linspace(0.2, 0.8, 400), indexing="ij"), -1)
+    points, su, sv = net.evaluate(places.reshape(-1, 2), 1)
+    wanted = bump(np.hypot(points[:, 0] - 61.3, points[:, 1] - 58.8))
+    assert np.abs(points[:, 2] - wanted).max() <= 1e-3 * HEIGHT
+    slopes = np.stack([points[:, 0] - 61.3, points[:, 1] - 58.8], axis=1) * (-wanted / SIGMA**2)[:, None]
+    found = np.stack([su[:, 2] / su[:, 0], sv[:, 2] / sv[:, 1]], axis=1)
+    print(f"slopes off by {np.abs(found - slopes).max():.1e} of {np.abs(slopes).max():.2f}")
+    assert np.abs(found - slopes).max() <= 5e-3 * np.abs(slopes).max()
+
+
+def test_a_copy_over_a_sharp_edge_is_refused(feature):
+    """What lies beyond it is another side of the body, on which there is nothing of the copy."""
+    document = shapes.document(zoo.nurbs(BRepPrimAPI_MakeBox(100.0, 100.0, 100.0).Shape()))
+    with pytest.raises(EditError, match="do not move take"):
+        repeat(view(document), Repeat(feature=feature, at=("95,50,100",)))
