@@ -25,6 +25,7 @@ from numpy.polynomial.chebyshev import chebvander
 
 from mracad.bspline.net import Net
 from mracad.seam.constrained import Constrained
+from mracad.seam.divided import Divided, Layout, joints, strips
 from mracad.seam.energy import Forms
 
 Array = np.ndarray
@@ -34,6 +35,18 @@ TERMS = 8
 
 KEPT = 60_000
 """Control points of which factors are kept, beside the last one."""
+
+DIRECT = 12_000
+"""Most control points of joined surfaces that are solved in one go."""
+
+OVERLAP = 2.0
+"""Most control points in strips, over those that there are, where surfaces are solved in turn with strips."""
+
+WIDTH = 9.0
+"""Width of strips in lengths within which what joints do fades."""
+
+MASS = 0.37
+"""Length within which masses alone make it fade, in chords of the control net and degrees."""
 
 
 def _expansion() -> Array:
@@ -73,6 +86,27 @@ class Space:
     away: Array | None = None
 
 
+class Blocks:
+    """A matrix with blocks on its diagonal, one a surface, ``scipy.sparse.csr_array`` each."""
+
+    def __init__(self, parts: Sequence[Any]) -> None:
+        self.parts = parts
+
+    def __matmul__(self, x: Array) -> Array:
+        ends = np.cumsum([part.shape[0] for part in self.parts])
+        return np.concatenate([part @ own for part, own in zip(self.parts, np.split(x, ends[:-1]), strict=True)])
+
+    def diagonal(self) -> Array:
+        """Its diagonal."""
+        return np.concatenate([part.diagonal() for part in self.parts])
+
+    def tocsr(self) -> Any:
+        """The whole matrix."""
+        from scipy.sparse import block_diag
+
+        return block_diag(self.parts, format="csr")
+
+
 class Problem:
     """Surfaces with the conditions that join them.
 
@@ -98,22 +132,21 @@ class Problem:
         soft: Any = None,
         pull: Array | None = None,
     ) -> None:
-        from scipy.sparse import block_diag, csr_array
+        from scipy.sparse import csr_array
 
         self.spaces, self.soft = spaces, soft
         self.rows = csr_array((0, sum(s.free.size for s in spaces.values()))) if rows is None else rows
         self.goal = goal if goal is not None and goal.any() else None
         self.pull = pull if pull is not None and pull.any() else None
         self.mass, self.bending, self.creases = (
-            block_diag([getattr(space.forms, name) for space in spaces.values()], format="csr")
-            for name in ("mass", "bending", "creases")
+            Blocks([getattr(space.forms, name) for space in spaces.values()]) for name in ("mass", "bending", "creases")
         )
         self.free, self.seen = (
             np.concatenate([getattr(space, name).ravel() for space in spaces.values()]) for name in ("free", "seen")
         )
         f = np.concatenate([space.net.poles.reshape(-1, 3) for space in spaces.values()])
         self.f = f - f[self.seen].mean(axis=0)
-        self._solvers: dict[tuple[float, bytes, bool], Constrained] = {}
+        self._solvers: dict[tuple[float, bytes, bool], Constrained | Divided] = {}
         self.above = np.concatenate(
             [(s.net.poles - (0.0 if s.trend is None else s.trend)).reshape(-1, 3) for s in spaces.values()]
         )
@@ -153,26 +186,47 @@ class Problem:
         Its distance is ‖δ − w‖²_M + a |δ − w|²_K, with ``stiffness`` a (mm⁴): what is added is then smooth.
         """
         kept = np.where(self.free[:, None], wanted, 0.0)
-        pull = self._form(stiffness) @ (wanted - kept)
+        held = wanted - kept
+        pull = self.mass @ held
+        if stiffness:
+            pull = pull + stiffness * (self.bending @ held + self.creases @ held)
         if self.soft is not None:
             pull = pull - self.soft @ kept
         if self.pull is not None:
             pull = pull + self.pull
         return kept + self._solver(stiffness, self.free)(pull, start=kept, goal=self.goal)
 
-    def _solver(self, stiffness: float, free: Array) -> Constrained:
+    def _solver(self, stiffness: float, free: Array) -> Constrained | Divided:
         """The solver of the form M + stiffness · K and the contacts."""
         soft = self.soft is not None and free is self.free
         key = stiffness, free.tobytes(), soft
         if key not in self._solvers:
-            form = self._form(stiffness)
             while self._solvers and (len(self._solvers) + 1) * len(free) > KEPT:
                 del self._solvers[next(iter(self._solvers))]
-            self._solvers[key] = Constrained(form + self.soft if soft else form, self.rows, free)
+            self._solvers[key] = self._factored(stiffness, free, self.soft if soft else None)
         return self._solvers[key]
 
-    def _form(self, stiffness: float) -> Any:
-        return self.mass + stiffness * (self.bending + self.creases) if stiffness else self.mass
+    def _factored(self, stiffness: float, free: Array, soft: Any) -> Constrained | Divided:
+        parts = (_sum(space.forms, stiffness) for space in self.spaces.values())
+        if len(self.spaces) > 1 and free.sum() > DIRECT:
+            layout = self._layout(stiffness)
+            joined = joints(layout, self.rows, soft, free)
+            along = strips(layout, joined, free)
+            if sum(map(len, along)) <= OVERLAP * free.sum():
+                diagonals = [each.diagonal() for each in (self.mass, self.bending, self.creases)]
+                diagonal = diagonals[0] + stiffness * (diagonals[1] + diagonals[2])
+                return Divided(parts, diagonal, soft, self.rows, free, layout, joined, along)
+        form = Blocks(list(parts)).tocsr()
+        return Constrained(form if soft is None else form + soft, self.rows, free)
+
+    def _layout(self, stiffness: float) -> Layout:
+        """Control points, and how far what a joint does reaches among them."""
+        reach = []
+        for net in (space.net for space in self.spaces.values()):
+            chord = max(float(np.linalg.norm(np.diff(net.poles, axis=k), axis=2).mean()) for k in (0, 1))
+            reach.append(WIDTH * max(stiffness**0.25, MASS * max(net.u.degree, net.v.degree) * chord))
+        ends = np.cumsum([0, *(space.free.size for space in self.spaces.values())])
+        return Layout(ends, np.concatenate([s.net.poles.reshape(-1, 3) for s in self.spaces.values()]), np.array(reach))
 
     @property
     def rimmed(self) -> bool:
@@ -197,6 +251,12 @@ class Problem:
         sizes = [space.free.size for space in self.spaces.values()]
         parts = np.split(values, np.cumsum(sizes)[:-1])
         return {i: part.reshape(s.net.poles.shape) for (i, s), part in zip(self.spaces.items(), parts, strict=True)}
+
+
+def _sum(forms: Forms, stiffness: float) -> Any:
+    """M + stiffness · K."""
+    found = forms.mass + stiffness * forms.bending if stiffness else forms.mass
+    return found + stiffness * forms.creases if stiffness and forms.creases.nnz else found
 
 
 def _chebyshev(power: Callable[[Array], Array], first: Array) -> Array:

@@ -1,0 +1,340 @@
+"""Minima over many joined surfaces, by subspaces: the insides of surfaces in turn with strips along what joins them.
+
+What a joint does to a surface fades within the length ℓ of the filter, or within a few knot spans.  So one takes the
+minimum over the control points that nothing joins, surface by surface, then over a strip along every joint and under
+its conditions, and then what the strips leave to the insides, until nothing is left: a multiplicative Schwarz method,
+whose error falls by e^(−√2 w / ℓ) or so in every sweep, w the width of the strips.  Every step lowers the objective.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from mracad.seam.constrained import LEAST, PASSES
+from mracad.seam.factor import Definite
+
+Array = np.ndarray
+
+LEFT = 1e-6
+"""Share of what the first strips had to make good that may be left to them."""
+
+SWEEPS = 20
+
+PENALTY = 1e7
+"""Weight of conditions against a form whose diagonal is one; each pass divides what they lack by about as much."""
+
+
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """Control points of surfaces, laid out one after another.
+
+    Attributes
+    ----------
+    ends : ndarray (surfaces + 1,) of int
+        Where each begins.
+    places : ndarray (points, 3)
+    reach : ndarray (surfaces,)
+        Width of strips on each, mm.
+    """
+
+    ends: Array
+    places: Array
+    reach: Array
+
+    @property
+    def owner(self) -> Array:
+        """Number of the surface of each point, ``(points,)``."""
+        return np.repeat(np.arange(len(self.reach)), np.diff(self.ends))
+
+
+def joints(layout: Layout, rows: Any, soft: Any, free: Array) -> dict[tuple[int, int], Array]:
+    """The free points of two surfaces (or of one) that conditions or contacts join, by the pair of surfaces."""
+    owner, rows = layout.owner, rows.tocsr()
+    row = np.repeat(np.arange(rows.shape[0]), np.diff(rows.indptr))
+    low, high = np.full(rows.shape[0], len(layout.reach)), np.zeros(rows.shape[0], int)
+    np.minimum.at(low, row, owner[rows.indices])
+    np.maximum.at(high, row, owner[rows.indices])
+    pairs, points = [(low * len(layout.reach) + high)[row]], [rows.indices]
+    if soft is not None:
+        both = soft.tocoo()
+        a, b = owner[both.row], owner[both.col]
+        apart = a != b
+        pairs.append((np.minimum(a, b) * len(layout.reach) + np.maximum(a, b))[apart])
+        points.append(both.row[apart])
+    pair, point = np.concatenate(pairs), np.concatenate(points)
+    pair, point = pair[free[point]], point[free[point]]
+    return {divmod(int(key), len(layout.reach)): np.unique(point[pair == key]) for key in np.unique(pair)}
+
+
+def strips(layout: Layout, joined: dict[tuple[int, int], Array], free: Array) -> list[Array]:
+    """The free points near the points of each joint, of its surfaces and of those that others join to them."""
+    from scipy.spatial import cKDTree
+
+    beside: dict[int, set[int]] = {}
+    for a, b in joined:
+        beside.setdefault(a, {a}).add(b)
+        beside.setdefault(b, {b}).add(a)
+    found = []
+    for (a, b), points in joined.items():
+        near = []
+        for surface in sorted(beside[a] | beside[b]):
+            own = slice(layout.ends[surface], layout.ends[surface + 1])
+            reach, places = layout.reach[surface], layout.places[own]
+            low, high = (each(layout.places[points], axis=0) for each in (np.min, np.max))
+            close = np.flatnonzero(free[own] & ((places >= low - reach) & (places <= high + reach)).all(axis=1))
+            near.append((own.start + close, np.full(len(close), reach)))
+        point, reach = (np.concatenate(each) for each in zip(*near, strict=True))
+        away = cKDTree(layout.places[points]).query(layout.places[point])[0]
+        found.append(_along(layout.places, point[away <= reach]))
+    return found
+
+
+def _along(places: Array, points: Array) -> Array:
+    """Points in their order along the direction in which they extend most: a narrow band in a strip."""
+    off = places[points] - places[points].mean(axis=0)
+    return points[np.argsort(off @ np.linalg.eigh(off.T @ off)[1][:, -1], kind="stable")]
+
+
+@dataclass(frozen=True, eq=False)
+class _Colour:
+    """Strips that have nothing in common.
+
+    Attributes
+    ----------
+    points : ndarray (q,) of int
+        One strip after another, in the points about strips.
+    form : csr_array (q, points about strips)
+        With the penalties of conditions.
+    rows : csr_array (conditions, q)
+    ends : ndarray of int
+        Where strips begin.
+    factors : list of Definite
+        Of each strip.
+    """
+
+    points: Array
+    form: Any
+    rows: Any
+    ends: Array
+    factors: Sequence[Definite]
+
+    def __call__(self, right: Array) -> Array:
+        """The displacements of a right-hand side, both ``(q, k)``."""
+        parts = np.split(right, self.ends[1:-1])
+        return np.concatenate([factor(part) for factor, part in zip(self.factors, parts, strict=True)])
+
+
+class Divided:
+    """As :class:`mracad.seam.constrained.Constrained`, of many surfaces.
+
+    Parameters
+    ----------
+    forms : iterable of scipy.sparse.csr_array (n, n)
+        A, of each surface; what follows is of all of their points.
+    diagonal : ndarray (points,)
+        Its diagonal.
+    soft : scipy.sparse matrix (points, points), optional
+        More of A.
+    rows : scipy.sparse matrix (conditions, points)
+    free : ndarray of bool (points,)
+    layout : Layout
+    joined : mapping
+        See :func:`joints`.
+    strips : sequence of ndarray of int
+        See :func:`strips`.
+    """
+
+    def __init__(
+        self,
+        forms: Iterable[Any],
+        diagonal: Array,
+        soft: Any,
+        rows: Any,
+        free: Array,
+        layout: Layout,
+        joined: dict[tuple[int, int], Array],
+        strips: Sequence[Array],
+    ) -> None:
+        from scipy.sparse import diags_array
+
+        self.size = len(free)
+        diagonal = diagonal if soft is None else diagonal + soft.diagonal()
+        self.scale = free / np.sqrt(diagonal + LEAST * diagonal[free].max(initial=0.0) + 1e-300)
+        rows = (rows @ diags_array(self.scale)).tocsr()
+        length = np.sqrt(np.asarray(rows.multiply(rows).sum(axis=1)).ravel())
+        self.there = np.flatnonzero(length > 0)
+        self.length = length[self.there]
+        self.rows = (diags_array(1.0 / self.length) @ rows[self.there]).tocsr()
+        self.rows.eliminate_zeros()
+        tied, near = np.zeros(self.size, bool), np.zeros(self.size, bool)
+        for marked, sets in ((tied, joined.values()), (near, strips)):
+            for points in sets:
+                marked[points] = True
+        self.tied, near_by = np.flatnonzero(tied), []
+        self.insides: list[tuple[Array, Definite]] = []
+        for form, begin, end in zip(forms, layout.ends[:-1], layout.ends[1:], strict=True):
+            own = slice(begin, end)
+            scale = self.scale[own]
+            form = (form if soft is None else form + soft[own, own]).tocsr()
+            form.data = form.data * np.repeat(scale, np.diff(form.indptr)) * scale[form.indices]
+            form.setdiag(form.diagonal() + LEAST)
+            inside = np.flatnonzero(free[own] & ~tied[own])
+            self.insides.append((begin + inside, Definite(_part(form, inside))))
+            near_by.append(_widened(form[np.flatnonzero(near[own])], own, self.size))
+        apart = None if soft is None else diags_array(self.scale) @ _apart(soft, layout) @ diags_array(self.scale)
+        self._divide(np.flatnonzero(near), near_by, apart, strips)
+
+    def _divide(self, near: Array, parts: list[Any], apart: Any, strips: Sequence[Array]) -> None:
+        """Factors of strips, of the rows of the form in them."""
+        from scipy.sparse import csr_array, vstack
+
+        form = vstack(parts, format="csr")
+        if apart is not None:
+            form = (form + apart.tocsr()[near]).tocsr()
+        reached = np.zeros(self.size, bool)
+        reached[form.indices] = True
+        self.about = np.flatnonzero(reached)
+        place, row = np.empty(self.size, np.int32), np.empty(self.size, int)
+        place[self.about], row[near] = np.arange(len(self.about)), np.arange(len(near))
+        self.at = place[self.tied]
+        self.inner = np.flatnonzero(~np.isin(self.about, self.tied))
+        self.tied_form = form[row[self.tied]]
+        form = csr_array((form.data, place[form.indices], form.indptr), shape=(len(near), len(self.about)))
+        columns = self.rows.tocsc()
+        self.conditions = columns[:, self.about].tocsr()
+        conditions = [np.unique(columns[:, points].indices) for points in strips]
+        self.colours = []
+        for members in _coloured(strips, conditions, self.size):
+            points = np.concatenate([strips[i] for i in members])
+            own = columns[:, points].tocsr()
+            part = (form[row[points]] + PENALTY * (own.T @ self.conditions)).tocsr()
+            ends = np.cumsum([0, *(len(strips[i]) for i in members)])
+            factors = [
+                Definite(_part(part[begin:end], place[strips[i]], slice(None)))
+                for i, begin, end in zip(members, ends[:-1], ends[1:], strict=True)
+            ]
+            self.colours.append(_Colour(place[points], part, own, ends, factors))
+
+    def __call__(
+        self, right: Array, start: Array | None = None, goal: Array | None = None, exactly: bool = True
+    ) -> Array:
+        """x − start, of which b is the right-hand side; see :class:`mracad.seam.constrained.Constrained`."""
+        b, owed = self.scale[:, None] * right, np.zeros((len(self.there), right.shape[1]))
+        if goal is not None:
+            owed += goal[self.there] / self.length[:, None]
+        if start is not None:
+            owed -= self.rows @ self._scaled(start)
+        found = np.zeros_like(b)
+        if owed.any():
+            found, taken = self._met(owed)
+            b = b - taken
+        found += self._within(b)
+        if exactly and len(owed):
+            found += self._met(owed - self.rows @ found)[0]
+        return self.scale[:, None] * found
+
+    def settled(self, x: Array) -> Array:
+        """What is near to x, ``(n, k)``, with L x = 0."""
+        if not len(self.there):
+            return x
+        return x + self.scale[:, None] * self._met(-(self.rows @ self._scaled(x)))[0]
+
+    def _scaled(self, x: Array) -> Array:
+        return x / np.where(self.scale > 0, self.scale, np.inf)[:, None]
+
+    def _within(self, right: Array) -> Array:
+        """The minimum under L x = 0, but for what one pass leaves of it."""
+        found = self._inside(right)
+        left = np.zeros((len(self.about), right.shape[1]))
+        left[self.at] = right[self.tied] - self.tied_form @ found
+        first = np.linalg.norm(left)
+        for _ in range(SWEEPS):
+            step = np.zeros_like(left)
+            for colour in (*self.colours, *self.colours[-2::-1]):
+                moved = colour(left[colour.points])
+                left -= colour.form.T @ moved
+                step[colour.points] += moved
+            found[self.about] += step
+            rest = np.zeros_like(found)
+            rest[self.about[self.inner]] = left[self.inner]
+            rest = self._inside(rest)
+            found += rest
+            left[self.inner] = 0.0
+            left[self.at] -= self.tied_form @ rest
+            if np.linalg.norm(left) <= LEFT * first:
+                break
+        return found
+
+    def _inside(self, right: Array) -> Array:
+        """The minimum over the points that nothing joins."""
+        found = np.zeros_like(right)
+        for points, factor in self.insides:
+            found[points] = factor(right[points])
+        return found
+
+    def _met(self, owed: Array) -> tuple[Array, Array]:
+        """A displacement that meets conditions, and what the form makes of it."""
+        found, taken = np.zeros((2, len(self.about), owed.shape[1]))
+        for _ in range(PASSES):
+            for colour in self.colours:
+                moved = colour(PENALTY * (colour.rows.T @ owed))
+                met = colour.rows @ moved
+                owed = owed - met
+                found[colour.points] += moved
+                taken += colour.form.T @ moved - PENALTY * (self.conditions.T @ met)
+        return self._over_all(found), self._over_all(taken)
+
+    def _over_all(self, values: Array) -> Array:
+        found = np.zeros((self.size, values.shape[1]))
+        found[self.about] = values
+        return found
+
+
+def _part(form: Any, columns: Array, rows: Array | slice | None = None) -> Any:
+    """Some rows and columns of a matrix, the same by default."""
+    from scipy.sparse import csr_array
+
+    form = form[columns if rows is None else rows]
+    place = np.full(form.shape[1], -1, np.int32)
+    place[columns] = np.arange(len(columns))
+    at = place[form.indices]
+    taken = at >= 0
+    ends = np.append(0, np.cumsum(taken))[form.indptr]
+    return csr_array((form.data[taken], at[taken], ends), shape=(form.shape[0], len(columns)))
+
+
+def _widened(form: Any, own: slice, size: int) -> Any:
+    """Rows over the points of one surface as rows over those of all."""
+    from scipy.sparse import csr_array
+
+    return csr_array((form.data, form.indices + own.start, form.indptr), shape=(form.shape[0], size))
+
+
+def _apart(form: Any, layout: Layout) -> Any:
+    """What of a form joins points of different surfaces."""
+    from scipy.sparse import csr_array
+
+    form, owner = form.tocoo(), layout.owner
+    apart = owner[form.row] != owner[form.col]
+    return csr_array((form.data[apart], (form.row[apart], form.col[apart])), shape=form.shape)
+
+
+def _coloured(strips: Sequence[Array], conditions: Sequence[Array], size: int) -> list[list[int]]:
+    """Strips in sets of such as share neither points nor conditions."""
+    from scipy.sparse import csr_array
+
+    if not strips:
+        return []
+    every = [np.concatenate([points, size + own]) for points, own in zip(strips, conditions, strict=True)]
+    ends = np.cumsum([0, *map(len, every)])
+    of = csr_array((np.ones(ends[-1]), np.concatenate(every), ends))
+    shared = (of @ of.T).tocsr()
+    colour = np.full(len(strips), -1)
+    for i in range(len(strips)):
+        taken = set(colour[shared.indices[shared.indptr[i] : shared.indptr[i + 1]]].tolist())
+        colour[i] = next(c for c in range(len(strips) + 1) if c not in taken)
+    return [np.flatnonzero(colour == c).tolist() for c in range(colour.max(initial=-1) + 1)]

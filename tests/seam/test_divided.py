@@ -1,0 +1,142 @@
+"""Large groups, solved by subspaces, against the same groups in one go."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scipy.sparse import csr_array
+
+from mracad.bspline.knots import KnotVector
+from mracad.bspline.net import Net
+from mracad.inspect.cells import quadrature
+from mracad.seam.divided import Divided
+from mracad.seam.energy import forms
+from mracad.seam.solve import Problem, Space
+from tests.edit.models import rotation
+from tests.inspect.shapes import face
+
+SIDE, SPANS, SIZE = 3, 24, 10.0
+STIFFNESS = 0.35**4
+KNOTS = KnotVector.clamped(np.linspace(0.0, 1.0, SPANS + 1), 3)
+
+
+def patches(turn=None, noise=0.02, seed=0):
+    """A square of patches of one rough sheet, with gaps of the size of the roughness, and their flat metrics."""
+    rng, found = np.random.default_rng(seed), []
+    x, y = np.meshgrid(KNOTS.greville(), KNOTS.greville(), indexing="ij")
+    for i, j in np.ndindex(SIDE, SIDE):
+        flat = SIZE * np.stack([x + i, y + j, 0 * x], axis=-1)
+        rough = flat + noise * rng.standard_normal(flat.shape)
+        found.append([Net(KNOTS, KNOTS, poles if turn is None else poles @ turn.T) for poles in (rough, flat)])
+    return found
+
+
+def seams():
+    """Position and slope across all seams, as rows on the points of all patches."""
+    n, rows = KNOTS.count, []
+    at = np.arange(SIDE * SIDE * n * n).reshape(SIDE, SIDE, n, n)
+    for axis in (0, 1):
+        for a, b in pairwise(np.moveaxis(at, axis, 0)):
+            for left, right in zip(a, b, strict=True):
+                left, right = (np.moveaxis(side, axis, 0) for side in (left, right))
+                for k in range(n):
+                    rows.append({left[-1, k]: 1.0, right[0, k]: -1.0})
+                    rows.append({left[-1, k]: 1.0, left[-2, k]: -1.0, right[1, k]: -1.0, right[0, k]: 1.0})
+    entries = [(i, j, value) for i, row in enumerate(rows) for j, value in row.items()]
+    i, j, value = zip(*entries, strict=True)
+    return csr_array((value, (i, j)), shape=(len(rows), at.size))
+
+
+def problem(monkeypatch, most, nets=None, held=True, **more):
+    """The patches as a problem; groups of more points than ``most`` are divided."""
+    monkeypatch.setattr("mracad.seam.solve.DIRECT", most)
+    spaces = {}
+    for i, (net, metric) in enumerate(nets or patches()):
+        free = np.ones(net.poles.shape[:2], bool)
+        if held and i == 4:
+            free[10:13, 11] = False
+        if held and i < SIDE:
+            free[:, :2] = False
+        spaces[i] = Space(net, forms(net, metric, quadrature(net, [face()])), free, np.ones_like(free))
+    return Problem(spaces, seams(), **more)
+
+
+@pytest.fixture
+def both(monkeypatch):
+    """Displacements of a call on the divided problem and on the same in one go."""
+
+    def run(call, **more):
+        divided, whole = (problem(monkeypatch, most, **more) for most in (0, 10**9))
+        monkeypatch.setattr("mracad.seam.solve.DIRECT", 0)
+        found = call(divided)
+        assert any(isinstance(each, Divided) for each in divided._solvers.values())
+        monkeypatch.setattr("mracad.seam.solve.DIRECT", 10**9)
+        wanted = call(whole)
+        assert not any(isinstance(each, Divided) for each in whole._solvers.values())
+        return divided, found, wanted
+
+    return run
+
+
+def size(x):
+    return float(np.abs(x).max())
+
+
+@pytest.mark.parametrize("held", [False, True])
+def test_filtered_is_that_of_the_whole_system(both, held):
+    p, found, wanted = both(lambda p: p.filtered(STIFFNESS), held=held)
+    assert size(wanted) > 1e-3
+    assert size(found - wanted) < 1e-6 * size(wanted)
+    assert size(p.rows @ found) < 1e-12 * size(found) and not found[~p.free].any()
+    x = p.f + found
+    assert np.trace(x.T @ (p.bending @ x)) < np.trace(p.f.T @ (p.bending @ p.f))
+
+
+def test_nearest_is_that_of_the_whole_system(both):
+    wanted = 0.1 * np.random.default_rng(3).standard_normal((SIDE**2 * KNOTS.count**2, 3))
+    p, found, direct = both(lambda p: p.nearest(wanted))
+    assert size(found - direct) < 1e-6 * size(direct)
+    assert size(p.rows @ found) < 1e-12 * size(found) and not found[~p.free].any()
+
+
+def test_conditions_are_mended_by_what_is_asked(both):
+    goal = seams() @ (0.01 * np.random.default_rng(2).standard_normal((SIDE**2 * KNOTS.count**2, 3)))
+    p, found, direct = both(lambda p: p.filtered(STIFFNESS), goal=goal, held=False)
+    assert size(found - direct) < 1e-5 * size(direct)
+    assert size(p.rows @ found - goal) < 1e-12 * size(found)
+
+
+def test_contacts_pull_surfaces_that_they_join(both):
+    """Springs between points of two patches that no seam joins, and one between those of a patch."""
+    n, rng = KNOTS.count**2, np.random.default_rng(4)
+    ends = [(k * 30 + 200, 4 * n + k * 25 + 100) for k in range(8)] + [(50, 60)]
+    springs = np.zeros((len(ends), SIDE**2 * n))
+    for row, (a, b) in enumerate(ends):
+        springs[row, [a, b]] = 1.0, -1.0
+    soft, pull = csr_array(springs.T @ springs), springs.T @ rng.standard_normal((len(ends), 3))
+    _, found, direct = both(lambda p: p.filtered(STIFFNESS), soft=soft, pull=pull)
+    assert size(found - direct) < 1e-5 * size(direct)
+    assert size(found - both(lambda p: p.filtered(STIFFNESS))[1]) > 0.1 * size(found)
+
+
+def test_the_filter_is_linear_and_commutes_with_rotation(monkeypatch):
+    turn = rotation([1, 2, -0.5], 0.7)
+    plain, turned = (problem(monkeypatch, 0, patches(how)).filtered(STIFFNESS) for how in (None, turn))
+    assert size(turned - plain @ turn.T) < 1e-9
+    again = problem(monkeypatch, 0).filtered(STIFFNESS)
+    assert again.tobytes() == plain.tobytes()
+
+
+def test_strips_that_would_be_everything_are_solved_in_one_go(monkeypatch):
+    p = problem(monkeypatch, 0)
+    p.filtered(10.0**4)
+    assert not any(isinstance(each, Divided) for each in p._solvers.values())
+
+
+def test_surfaces_that_nothing_joins_are_solved_by_themselves(monkeypatch):
+    apart = problem(monkeypatch, 0)
+    apart.rows = apart.rows[:0]
+    found = apart.split(apart.filtered(STIFFNESS))
+    assert isinstance(next(iter(apart._solvers.values())), Divided)
+    alone = Problem({0: apart.spaces[0]}).filtered(STIFFNESS)
+    assert size(found[0].reshape(-1, 3) - alone) < 1e-9 * size(alone)
