@@ -27,6 +27,9 @@ RIPPLE = 1e-7
 ROUNDING = 16 * float(np.finfo(float).eps)
 """Error of a point of a surface, relative to its largest coordinate: a ripple as long as the span where it lies."""
 
+STEEP = 20.0
+"""Normals that turn by more, degrees, are compared with those around, too."""
+
 _BLOCK = 50_000
 
 
@@ -115,7 +118,7 @@ def changes(surveyed: Sequence[Survey], nets: Sequence[Net]) -> list[Change]:
     for survey, net, (at, form) in zip(surveyed, nets, seen, strict=True):
         motion = at - survey.points
         both = form.regular & survey.regular
-        turned = np.linalg.norm(form.normal.astype(np.float32) - survey.normals, axis=0)[both]
+        turned = _turned(survey, form.normal.astype(np.float32), both)
         now = [(crossing.angles(net), before) for crossing, before in survey.crossed]
         opened, kink = _largest(new - old for new, old in now), _largest(new for new, _ in now)
         found.append(
@@ -130,6 +133,28 @@ def changes(surveyed: Sequence[Survey], nets: Sequence[Net]) -> list[Change]:
             )
         )
     return found
+
+
+def _turned(survey: Survey, normals: Array, counted: Array) -> Array:
+    """How far normals ``(3, q)`` are from those before, as chords, ``(q,)``.
+
+    Where that is far, from the nearest of those within as many points as a span has.
+    """
+    off = np.where(counted, np.linalg.norm(normals - survey.normals, axis=0), 0.0)
+    rule, most = survey.rule, 2 * np.sin(np.radians(STEEP / 2))
+    if (off > most).any():
+        reach, mask = (rule.v.shape[1], rule.u.shape[1]), rule.mask.T
+        place = np.full(mask.shape, -1)
+        place[mask] = np.where(survey.regular, np.arange(len(off)), -1)
+        place = np.pad(place, [(r, r) for r in reach], constant_values=-1)
+        row, column = np.nonzero(mask)
+        steps = np.ndindex(2 * reach[0] + 1, 2 * reach[1] + 1)
+        for down, right in sorted(steps, key=lambda step: float(np.abs(np.subtract(step, reach)).sum())):
+            those = np.flatnonzero(off > most)
+            beside = place[row[those] + down, column[those] + right]
+            near = np.linalg.norm(normals[:, those] - survey.normals[:, beside], axis=0)
+            off[those] = np.where(beside < 0, off[those], np.minimum(off[those], near))
+    return off
 
 
 def _rule(faces: Sequence[Face], u: KnotVector, v: KnotVector, points: int) -> Quadrature:

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.net import Net
 from mracad.inspect.roughness import Change, Growth, Rougher, Roughness, worse
-from mracad.inspect.survey import POINTS, RIPPLE, changes, surveys
+from mracad.inspect.survey import POINTS, RIPPLE, STEEP, changes, surveys
 from tests.inspect.shapes import circle, cylinder, face, graph, plane, rectangle, roof, sphere, torus
 
 
@@ -187,6 +187,17 @@ def test_a_face_that_folds():
     steep[..., 2] = np.tan(np.radians(31)) * steep[..., 0]
     assert kinds(net, moved(net, steep)) == {Rougher.FOLD}
     assert kinds(net, moved(net, steep), allowed=Growth(fold=35)) == set()
+
+
+def test_ripples_that_go_fold_nothing_and_those_that_come_do():
+    """Slopes of 45°, which turn into what lies between them within a span; the other way they come from nowhere."""
+    net = plane(12)
+    poles = net.poles.copy()
+    poles[..., 2] = 0.15 * (-1.0) ** np.arange(poles.shape[0])[:, None]
+    rippled = moved(net, poles)
+    assert change(net, rippled).turn > 40
+    assert change(rippled, net).turn <= STEEP
+    assert Rougher.FOLD in kinds(net, rippled) and kinds(rippled, net) == set()
 
 
 def test_motion_and_deviation_along_the_normal():
