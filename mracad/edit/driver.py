@@ -51,8 +51,8 @@ class Moved:
         What kept it from more.
     free : int
         Free control points.
-    gain : float
-        By how much the surfaces that move with it came nearer to what was wanted, as a squared norm.
+    gain, wanted : float
+        By how much the surfaces that move with it came nearer to what was wanted, and all of that, as squared norms.
     """
 
     sheet: Sheet
@@ -63,6 +63,7 @@ class Moved:
     limits: tuple[Worse, ...]
     free: int
     gain: float
+    wanted: float
 
     @property
     def deviation(self) -> float:
@@ -140,7 +141,9 @@ def _together(
         if len(good) < len(part):
             waiting += [(each, rounds - 1) for each in groups(good, scene.joints.among(good))]
             continue
-        if found[part[0]].gain < sum(alone[i].gain for i in part):
+        # shares, for together something else may be wanted of them than of each
+        gain, wanted = (sum(getattr(alone[i], name) for i in part) for name in ("gain", "wanted"))
+        if found[part[0]].gain * wanted < gain * found[part[0]].wanted:
             continue
         least = min(moved.amount for moved in found.values())
         yield {i: moved.scaled(least) for i, moved in found.items()}, joined
@@ -182,8 +185,9 @@ def _attempt(scene: Scene, wish: Wish, members: Mapping[int, Sheet], joined: Joi
             break
         found.append(trial.blended(chosen, target))
         best = max(found, key=_worth)
+    wished = float((target * (trial.problem.mass @ target)).sum())
     return {
-        i: Moved(members[i], space.net, amount * part, amount, change, limits, int(space.free.sum()), best.gain)
+        i: Moved(members[i], space.net, amount * part, amount, change, limits, int(space.free.sum()), best.gain, wished)
         for (i, space), part, amount, change, limits in zip(
             trial.problem.spaces.items(), best.parts, best.amounts, best.changes, best.limits, strict=True
         )

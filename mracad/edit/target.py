@@ -14,14 +14,13 @@ from mracad.inspect.cells import quadrature
 from mracad.model import Face, Model
 from mracad.seam.energy import forms
 from mracad.seam.interface import Joints
+from mracad.seam.ladders import Creases
 from mracad.seam.metric import SMOOTHER, creases, seen, smoothed
 from mracad.seam.solve import Problem, Space
 from mracad.wavelet.ladder import arc_lengths, ladder_for_scale
 from mracad.wavelet.project import projection
 
 Array = np.ndarray
-Creases = tuple[frozenset[float], frozenset[float]]
-"""Crease lines in u and v."""
 
 DEGREE = 3
 """Least degree of a surface that moves: knots set into a lower one make facets."""
@@ -118,7 +117,7 @@ def _sheet(index: int, origin: Net, every: tuple[Face, ...], faces: tuple[Face, 
     sheet = Sheet(index, origin, net, every, faces, metric, sharp, wavelength, _trend(net, sharp, TREND * wavelength))
     alone = Problem({index: Space(net, form, reach, reach, sheet.trend.poles)})
     change = wish.target(alone, {index: sheet}, Joints())
-    return replace(sheet, detail=float(np.linalg.norm(change, axis=1).max(initial=0.0)))
+    return replace(sheet, detail=float(np.linalg.norm(change[alone.seen], axis=1).max(initial=0.0)))
 
 
 def _trend(net: Net, sharp: Creases, scale: float) -> Net:

@@ -43,7 +43,7 @@ def matched(nets: Mapping[int, Net], seams: Sequence[Seam]) -> dict[int, Net]:
     for _ in nets:  # what one needs is handed on from seam to seam
         wanted: dict[int, tuple[list[float], list[float]]] = {i: ([], []) for i in result}
         for seam in seams:
-            a, b = (_inner(result, border) for border in (seam.a, seam.b))
+            a, b = (_inner(_along(result[border.surface], border), border) for border in (seam.a, seam.b))
             for border, own, other in ((seam.a, a, b), (seam.b, b, a)):
                 for share, count in other.items():
                     have = max((n for x, n in own.items() if abs(x - share) <= SAME), default=0)
@@ -67,7 +67,7 @@ def doubled(nets: Mapping[int, Net], seams: Sequence[Seam]) -> dict[int, Net]:
             for border in (seam.a, seam.b):
                 net = result[border.surface]
                 if _along(net, border).degree > 1:
-                    simple = [share for share, count in _inner(result, border).items() if count == 1]
+                    simple = [share for share, count in _inner(_along(net, border), border).items() if count == 1]
                     places = [_near(result, border, border.start + x * (border.stop - border.start)) for x in simple]
                     result[border.surface] = net.refined(*(places, [])[:: 1 if border.axis else -1])
     return result
@@ -88,9 +88,8 @@ def _elevated(nets: Mapping[int, Net], seams: Sequence[Seam]) -> dict[int, Net]:
     return {i: net.over(net.u.elevated(degrees[i, 0]), net.v.elevated(degrees[i, 1])) for i, net in nets.items()}
 
 
-def _inner(nets: Mapping[int, Net], border: Border) -> dict[float, int]:
-    """Fractions of a seam at which a border has knots, and their multiplicities."""
-    knots = _along(nets[border.surface], border)
+def _inner(knots: KnotVector, border: Border) -> dict[float, int]:
+    """Fractions of a seam at which knots along it lie, and their multiplicities."""
     breaks, counts = knots.breaks, knots.multiplicities
     if knots.periodic:
         turns = knots.period * np.arange(-2, 3)
@@ -123,7 +122,12 @@ def _along(net: Net, border: Border) -> KnotVector:
     return (net.u, net.v)[1 - border.axis]
 
 
-def rows(nets: Mapping[int, Net], seams: Sequence[Seam], everywhere: bool = False) -> tuple[Any, Array]:
+def rows(
+    nets: Mapping[int, Net],
+    seams: Sequence[Seam],
+    everywhere: bool = False,
+    coarse: Mapping[int, tuple[KnotVector, KnotVector]] | None = None,
+) -> tuple[Any, Array]:
     """The conditions of seams on displacements of surfaces.
 
     Parameters
@@ -134,6 +138,8 @@ def rows(nets: Mapping[int, Net], seams: Sequence[Seam], everywhere: bool = Fals
     seams : sequence of Seam
     everywhere : bool
         Whether joints that vary are exact, too: their knots must be double.
+    coarse : mapping of int to pair of KnotVector, optional
+        Knots in u and v by surface, of spaces in which displacements lie: no more is asked than decides for these.
 
     Returns
     -------
@@ -144,11 +150,12 @@ def rows(nets: Mapping[int, Net], seams: Sequence[Seam], everywhere: bool = Fals
     from scipy.sparse import csr_array
 
     first, total = laid_out(nets)
+    spaces = coarse or {i: (net.u, net.v) for i, net in nets.items()}
     entries: list[tuple[Array, Array, Array]] = [(np.empty(0, int), np.empty(0, int), np.empty(0))]
     count, mended = 0, [np.empty(0, bool)]
     for seam in seams:
         for order in range(seam.joint.order + 1):
-            share = _sites(nets, seam, order if everywhere else 0)
+            share = _sites(spaces, seam, order if everywhere else 0)
             sides = [(_sided(nets[b.surface], b, share), first[b.surface]) for b in (seam.b, seam.a)]
             row = count + np.arange(len(share))
             for ((index, _), begin), value in zip(sides, _terms(seam.joint, order, share, sides), strict=True):
@@ -174,7 +181,7 @@ def _law(coefficients: Array, share: Array) -> Array:
     return np.polynomial.polynomial.polyval(share, np.append(coefficients, 0.0))[:, None]
 
 
-def _sites(nets: Mapping[int, Net], seam: Seam, order: int) -> Array:
+def _sites(spaces: Mapping[int, tuple[KnotVector, KnotVector]], seam: Seam, order: int) -> Array:
     """Fractions of the seam at which conditions are asked: the Greville points of the larger space on it.
 
     For an order above 0 those of the space in which the condition of that order lies.
@@ -182,7 +189,8 @@ def _sites(nets: Mapping[int, Net], seam: Seam, order: int) -> Array:
     more, lost = (order * (len(seam.joint.across) - 1), _lost(seam.joint)) if order else (0, 0)
     found = []
     for border in (seam.a, seam.b):
-        degree, inner = _along(nets[border.surface], border).degree + more, _inner(nets, border)
+        knots = spaces[border.surface][1 - border.axis]
+        degree, inner = knots.degree + more, _inner(knots, border)
         counts = [degree + 1, *(min(n + more + lost, degree) for n in inner.values()), degree + 1]
         found.append(KnotVector.from_multiplicities([0.0, *inner, 1.0], counts, degree).greville())
     return max(found, key=len)

@@ -1,0 +1,122 @@
+"""Levels: take away what lies between rungs of the knot ladders of NURBS faces.
+
+On one surface, level j is the L2 projection on the splines over the knots that j rungs leave, as in the wavelet
+transform.  A level of patches that seams join is a level of the surface that they make: with P the refinement from
+coarse spaces whose ladders the patches share (:mod:`mracad.seam.ladders`) and L the conditions of their seams,
+
+    y = argmin ‖P y − f‖_G   subject to   L (P y − f) = r,      δ = P y − f,
+
+the conditions asked at as many places as the coarse splines along a seam have functions: exact where the joint has
+constant coefficients, and never more than the coarse spaces have room for where they vary.  G is the Gram matrix of
+the transform on each surface, by its area.  What the conditions ask beyond that, and rims, the solver sees to.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from mracad.bspline.gram import gram
+from mracad.bspline.knots import KnotVector
+from mracad.bspline.net import Net
+from mracad.bspline.refine import refinement
+from mracad.constraint.seam import Seam
+from mracad.edit.target import Sheet, stiffness
+from mracad.seam.conditions import rows
+from mracad.seam.constrained import Constrained
+from mracad.seam.interface import Joints
+from mracad.seam.ladders import Creases, ladders
+from mracad.seam.solve import Problem
+from mracad.wavelet.ladder import arc_lengths
+from mracad.wavelet.project import projection
+
+Array = np.ndarray
+Coarse = Mapping[int, tuple[KnotVector, KnotVector]]
+"""Coarse knots in u and v, by surface."""
+
+
+@dataclass(frozen=True)
+class Level:
+    """The wish of a smoothing by levels.
+
+    Attributes
+    ----------
+    level : float
+        How many rungs to go down; a fraction blends two of them linearly.
+    """
+
+    level: float
+
+    def wavelength(self, net: Net, creases: Creases) -> float:
+        """√2 spacings of the coarse knots, in the direction that gets coarser where they are closest."""
+        own, found = (net.u, net.v), ladders({0: net}, {0: creases}, ())
+        lengths = [float(arc_lengths(net, axis).sum()) for axis in (0, 1)]
+        total = 0.0
+        for weight, level in self._steps():
+            coarse = [found[0, axis].coarse((0, axis), level, own[axis]) for axis in (0, 1)]
+            spacing = [length / each.spans for length, each in zip(lengths, coarse, strict=True)]
+            changed = [s for s, each, knots in zip(spacing, coarse, own, strict=True) if each != knots]
+            total += weight * math.sqrt(2) * min(changed or spacing)
+        return total
+
+    def target(self, problem: Problem, sheets: Mapping[int, Sheet], joined: Joints) -> Array:
+        """The level of the surface that the sheets make, less that surface, ``(points, 3)``."""
+        found = ladders(
+            {i: sheet.origin for i, sheet in sheets.items()},
+            {i: sheet.creases for i, sheet in sheets.items()},
+            joined.exact,
+        )
+        total = np.zeros_like(problem.f)
+        for weight, level in self._steps():
+            if level:
+                coarse = {
+                    i: (found[i, 0].coarse((i, 0), level, s.net.u), found[i, 1].coarse((i, 1), level, s.net.v))
+                    for i, s in problem.spaces.items()
+                }
+                total += weight * projected(problem, coarse, joined.exact)
+        return total
+
+    def ways(self, problem: Problem, target: Array, width: float) -> Iterable[Iterable[Array]]:
+        """What is nearest to the target, and smoother ways from it to what is held."""
+        yield [problem.nearest(target)]
+        if problem.rimmed:
+            yield [problem.nearest(target, stiffness(width / 4))]
+            yield problem.nearest(target, stiffness(width / 2)), problem.nearest(problem.fading(width) * target)
+
+    def _steps(self) -> list[tuple[float, int]]:
+        """Weights and levels to blend."""
+        whole, part = int(self.level), self.level % 1.0
+        return [(1.0 - part, whole), (part, whole + 1)] if part else [(1.0, whole)]
+
+
+def projected(problem: Problem, coarse: Coarse, seams: Sequence[Seam]) -> Array:
+    """δ to the coarse splines nearest to the surfaces of a problem that seams join, ``(points, 3)``."""
+    from scipy.sparse import block_diag, kron
+
+    f = problem.split(problem.f)
+    refinements, grams, alone = [], [], []
+    for i, space in problem.spaces.items():
+        net = space.net
+        pairs = list(zip(coarse[i], (net.u, net.v), strict=True))
+        refinements.append(kron(*(refinement(*pair).tocsr() for pair in pairs)))
+        area = math.prod(float(arc_lengths(net, axis).sum()) / fine.period for axis, (_, fine) in enumerate(pairs))
+        grams.append(area * kron(*(gram(each).tocsr() for each, _ in pairs)))
+        along_u = projection(*pairs[0]).coarse(f[i], axis=0)
+        alone.append(projection(*pairs[1]).coarse(along_u, axis=1).reshape(-1, 3))
+    p, y = block_diag(refinements, format="csr"), np.concatenate(alone)
+    if seams:
+        y = y + _joined(problem, coarse, seams, (p, block_diag(grams, format="csr"), y))
+    return np.asarray(p @ y) - problem.f
+
+
+def _joined(problem: Problem, coarse: Coarse, seams: Sequence[Seam], system: tuple[Any, Any, Array]) -> Array:
+    """What to add to coarse control points so that seams hold: the least of the Gram matrix."""
+    p, form, y = system
+    nets = {i: space.net for i, space in problem.spaces.items()}
+    conditions, mended = rows(nets, seams, coarse=coarse)
+    delta = np.where(mended[:, None], conditions @ (p @ y), conditions @ (p @ y - problem.f))
+    return Constrained(form, conditions @ p, np.ones(len(y), dtype=bool))(np.zeros_like(y), goal=-delta)

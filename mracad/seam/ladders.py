@@ -1,0 +1,212 @@
+"""Knot ladders that surfaces share along their seams.
+
+A level of joined patches is a level of the surface that they make, so that a coarse knot on one side of a seam must be
+one on the other side, too, whatever the knots, degrees and orientations.  The directions of surfaces that run along a
+seam side by side are therefore mapped affinely onto one common parameter, seam by seam across all patches; the ladder
+is walked on the union of their knots there, and each surface takes what lies within its own domain, as simple knots of
+the highest of their degrees.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mracad.bspline.knots import KnotVector
+from mracad.bspline.net import Net
+from mracad.constraint.seam import Seam
+from mracad.wavelet.ladder import arc_lengths, rungs_by_level
+
+Array = np.ndarray
+Direction = tuple[int, int]
+"""A surface and one of its directions: 0 for u, 1 for v."""
+Map = tuple[float, float]
+"""(slope, shift): common parameter = slope · own parameter + shift."""
+Creases = tuple[frozenset[float], frozenset[float]]
+"""Crease lines of a surface in u and v."""
+
+SAME = 1e-9
+"""Fraction of the common domain within which knots are the same."""
+
+
+@dataclass(frozen=True, eq=False)
+class Ladder:
+    """The levels of directions that seams link.
+
+    Attributes
+    ----------
+    members : mapping of Direction to Map
+        Onto the common parameter.
+    levels : sequence of KnotVector
+        Over the common parameter, all knots first.
+    degrees : (int, int)
+        Of the coarse splines: on the first level and on the others.
+    creases : mapping of Direction to mapping of float to int
+        Knots that a surface keeps on every level, and by how much their multiplicity exceeds the degree.
+    """
+
+    members: Mapping[Direction, Map]
+    levels: Sequence[KnotVector]
+    degrees: tuple[int, int]
+    creases: Mapping[Direction, Mapping[float, int]]
+
+    def coarse(self, direction: Direction, level: int, fine: KnotVector) -> KnotVector:
+        """The knots of one direction that a level leaves; beyond the last level, those of the last.
+
+        Parameters
+        ----------
+        direction : Direction
+        level : int
+            0 for all knots.
+        fine : KnotVector
+            Of the direction, with its own knots and those of its neighbours; perhaps more, or of higher degree.
+        """
+        rung = self.levels[min(level, len(self.levels) - 1)]
+        whole = rung is self.levels[0]
+        degree = self.degrees[not whole]
+        slope, shift = self.members[direction]
+        at = (rung.breaks - shift) / slope
+        near = np.abs(at[:, None] - fine.breaks).argmin(axis=1)
+        near = near[np.abs(fine.breaks[near] - at) <= SAME * rung.period / abs(slope)]
+        most = np.maximum(fine.multiplicities - (fine.degree - degree), 0)
+        counts = np.zeros(len(fine.breaks), dtype=int)
+        counts[near] = most[near] if whole else 1
+        for knot, excess in self.creases[direction].items():
+            counts[fine.breaks == knot] = degree + excess
+        counts = np.minimum(counts, most)
+        if degree == fine.degree:
+            return fine.with_multiplicities(counts)
+        if not fine.periodic:
+            counts[[0, -1]] = degree + 1
+        kept = counts > 0
+        return KnotVector.from_multiplicities(fine.breaks[kept], counts[kept], degree, fine.periodic)
+
+
+def ladders(nets: Mapping[int, Net], creases: Mapping[int, Creases], seams: Sequence[Seam]) -> dict[Direction, Ladder]:
+    """The ladder of every direction of some surfaces.
+
+    Parameters
+    ----------
+    nets : mapping of int to Net
+        By surface.
+    creases : mapping of int to Creases
+    seams : sequence of Seam
+        Between these surfaces.
+    """
+    found: dict[Direction, Ladder] = {}
+    for members in _linked(nets, seams):
+        each = _ladder(nets, creases, members)
+        found |= dict.fromkeys(members, each)
+    return found
+
+
+def _linked(nets: Mapping[int, Net], seams: Sequence[Seam]) -> list[dict[Direction, Map]]:
+    """Directions that seams link, directly or through others, by surface; a seam that contradicts others links none."""
+    of: dict[Direction, dict[Direction, Map]] = {(i, axis): {(i, axis): (1.0, 0.0)} for i in nets for axis in (0, 1)}
+    for seam in seams:
+        one, two = (seam.a.surface, 1 - seam.a.axis), (seam.b.surface, 1 - seam.b.axis)
+        slope = (seam.a.stop - seam.a.start) / (seam.b.stop - seam.b.start)
+        shift = seam.a.start - slope * seam.b.start
+        if of[one] is of[two] or not _alike(_knots(nets, one), _knots(nets, two), slope, shift):
+            continue
+        # own parameter -> parameter of two -> parameter of one -> common parameter
+        a, b = of[one][one]
+        c, d = of[two][two]
+        ratio = a * slope / c
+        move = a * shift + b - ratio * d
+        of[one] |= {member: (ratio * p, ratio * q + move) for member, (p, q) in of[two].items()}
+        of |= dict.fromkeys(of[two], of[one])
+    return list({id(members): members for members in of.values()}.values())
+
+
+def _knots(nets: Mapping[int, Net], direction: Direction) -> KnotVector:
+    net = nets[direction[0]]
+    return (net.u, net.v)[direction[1]]
+
+
+def _alike(one: KnotVector, two: KnotVector, slope: float, shift: float) -> bool:
+    """Whether two vectors can share knots: both periodic, beginning at the same place, or neither."""
+    if not (one.periodic and two.periodic):
+        return one.periodic == two.periodic
+    ends = sorted(slope * x + shift for x in two.domain)
+    return bool(np.allclose(ends, one.domain, rtol=0.0, atol=SAME * one.period))
+
+
+@dataclass(frozen=True, eq=False)
+class _Placed:
+    """A direction on the common parameter, which ascends: its knots in some degree, what it keeps, lengths of spans."""
+
+    knots: KnotVector
+    kept: Array
+    lengths: Array
+
+
+def _pieces(knots: KnotVector) -> int:
+    """Spans, where a knot of multiplicity r counts as r knots."""
+    return int(knots.multiplicities[1:-1].sum()) + 1
+
+
+def _ladder(nets: Mapping[int, Net], creases: Mapping[int, Creases], members: Mapping[Direction, Map]) -> Ladder:
+    """The ladder on the union of the members' knots.
+
+    A level has as many pieces as the members have on theirs, on average.  It has the lowest degree whose splines all
+    members hold.
+    """
+    own = {m: _knots(nets, m) for m in members}
+    degrees = [knots.degree for knots in own.values()]
+    placed = [_placed(nets, creases, m, way, min(degrees)) for m, way in members.items()]
+    union, copies = _union(placed, [max(degrees) - degree for degree in degrees])
+    rungs = rungs_by_level(union.knots, keep=union.kept, lengths=union.lengths)
+    have = np.log([_pieces(rung) / float(union.lengths.sum()) for rung in rungs])
+    each = [rungs_by_level(one.knots, keep=one.kept, lengths=one.lengths) for one in placed]
+    levels = [rungs[0]]
+    for level in range(1, max(map(len, each))):
+        wanted = [
+            np.log(_pieces(those[min(level, len(those) - 1)]) / float(one.lengths.sum()))
+            for those, one in zip(each, placed, strict=True)
+        ]
+        levels.append(rungs[int(np.abs(have - np.mean(wanted)).argmin())])
+    sharp = {
+        m: {float(x): int(knots.multiplicities[knots.breaks == x][0]) - knots.degree for x in creases[m[0]][m[1]]}
+        for m, knots in own.items()
+    }
+    return Ladder(members, levels, (max(degrees), max(min(degrees), max(degrees) + 1 - copies)), sharp)
+
+
+def _placed(nets: Mapping[int, Net], creases: Mapping[int, Creases], m: Direction, way: Map, degree: int) -> _Placed:
+    """A direction on the common parameter, its knots as smooth as they are but of a lower degree."""
+    knots, lengths = _knots(nets, m), arc_lengths(nets[m[0]], m[1])
+    order = slice(None, None, 1 if way[0] > 0 else -1)
+    counts = np.clip(knots.multiplicities + degree - knots.degree, 1, degree)
+    if not knots.periodic:
+        counts[[0, -1]] = degree + 1
+    breaks = way[0] * knots.breaks + way[1]
+    kept = np.isin(knots.breaks, list(creases[m[0]][m[1]]))
+    vector = KnotVector.from_multiplicities(breaks[order], counts[order], degree, knots.periodic)
+    return _Placed(vector, kept[order], lengths[order])
+
+
+def _union(placed: Sequence[_Placed], elevations: Sequence[int]) -> tuple[_Placed, int]:
+    """All knots, where they begin and end among what stays, and mean lengths; the least multiplicity once elevated."""
+    every = np.sort(np.concatenate([one.knots.breaks for one in placed]))
+    breaks = every[np.append(True, np.diff(every) > SAME * (every[-1] - every[0]))]
+    middle = (breaks[:-1] + breaks[1:]) / 2
+    counts, kept = np.ones(len(breaks), dtype=int), np.zeros(len(breaks), dtype=bool)
+    total, shares = np.zeros(len(middle)), np.zeros(len(middle))
+    copies = np.ones(len(breaks), dtype=int)
+    for one, more in zip(placed, elevations, strict=True):
+        at = np.abs(one.knots.breaks[:, None] - breaks).argmin(axis=1)
+        inner = slice(None) if one.knots.periodic else slice(1, -1)
+        np.maximum.at(counts, at[inner], one.knots.multiplicities[inner])
+        np.maximum.at(copies, at[inner], one.knots.multiplicities[inner] + more)
+        kept[at[one.kept]] = True
+        kept[at[[0, -1]]] |= not one.knots.periodic
+        total += np.diff(np.interp(breaks, one.knots.breaks, np.append(0.0, np.cumsum(one.lengths))))
+        shares += (middle > one.knots.breaks[0]) & (middle < one.knots.breaks[-1])
+    first = placed[0].knots
+    if not first.periodic:
+        counts[[0, -1]] = first.degree + 1
+    vector = KnotVector.from_multiplicities(breaks, counts, first.degree, first.periodic)
+    return _Placed(vector, kept, total / np.maximum(shares, 1)), int(copies[1:-1].min(initial=1 << 30))

@@ -1,0 +1,172 @@
+"""Levels: the projection on a rung of the ladder, under what rims and seams hold."""
+
+import numpy as np
+import pytest
+
+from mracad.audit.continuity import seams
+from mracad.bspline.net import Net
+from mracad.constraint.seam import Wishes
+from mracad.edit.fair import faired
+from mracad.edit.level import Level
+from mracad.edit.target import sheets
+from mracad.edit.trial import Tolerances
+from mracad.inspect.cells import quadrature
+from mracad.occ.view import view
+from mracad.seam.energy import forms
+from mracad.seam.interface import Joints
+from mracad.seam.solve import Problem, Space
+from mracad.wavelet.ladder import arc_lengths, rungs_by_level
+from mracad.wavelet.project import projection
+from tests.edit import panels
+from tests.edit.models import sheet
+from tests.edit.test_fair import rough
+from tests.edit.test_seams import other_degrees, other_senses, skewed
+
+SPANS, NOISE = 16, 0.3
+
+
+def rung(net, level):
+    """The net projected on a whole level of its own ladders."""
+    coarse = [rungs_by_level(k, lengths=arc_lengths(net, axis)) for axis, k in enumerate((net.u, net.v))]
+    u, v = (rungs[min(level, len(rungs) - 1)] for rungs in coarse)
+    return projection(v, net.v).apply(projection(u, net.u).apply(net.poles, 0), 1)
+
+
+def wanted(net, level):
+    """What a level wants of a surface of which nothing is held, and the surface in the space of that."""
+    model = sheet(net)
+    one = sheets(model, {0}, Level(level))[0]
+    every = np.ones(one.net.poles.shape[:2], bool)
+    problem = Problem({0: Space(one.net, forms(one.net, one.net, quadrature(one.net, model.faces)), every, every)})
+    return Level(level).target(problem, {0: one}, Joints()).reshape(one.net.poles.shape), one
+
+
+def nets():
+    _, cubic = rough(spans=(24, 18))
+    _, quintic = rough(spans=(12, 14))
+    weights = 1 + 0.2 * np.random.default_rng(1).random(cubic.poles.shape[:2])
+    squares = cubic.over(cubic.u.refined(cubic.u.breaks[[4, 9]]), cubic.v)
+    return {
+        "cubic": cubic,
+        "rational": Net(cubic.u, cubic.v, cubic.poles, weights),
+        "double knots": squares,
+        "of degree 5": panels.elevated(panels.elevated(quintic, 0, 2), 1, 2),
+    }
+
+
+@pytest.mark.parametrize("name", nets())
+@pytest.mark.parametrize("level", [1, 2])
+def test_a_level_of_one_surface_is_the_projection_on_its_ladder(name, level):
+    net = nets()[name]
+    delta, _ = wanted(net, level)
+    assert np.abs(delta).max() > 0.01
+    np.testing.assert_allclose(net.poles + delta, rung(net, level), atol=1e-10)
+
+
+def test_a_level_of_a_quadratic_surface_is_quadratic():
+    _, cubic = rough(spans=(24, 18))
+    u, v = (type(k)(k.knots[1:-1], 2) for k in (cubic.u, cubic.v))
+    net = Net(u, v, cubic.poles[: u.count, : v.count])
+    delta, one = wanted(net, 1)
+    direct = Net(u, v, rung(net, 1)).over(one.net.u, one.net.v)
+    assert one.net.u.degree == 3
+    np.testing.assert_allclose(one.net.poles + delta, direct.poles, atol=1e-10)
+
+
+def test_levels_are_projections():
+    """A second time there is nothing left, and a coarse spline is what it was."""
+    _, net = rough(spans=(24, 18))
+    delta, _ = wanted(net, 2)
+    model = sheet(Net(net.u, net.v, net.poles + delta))
+    one = sheets(model, {0}, Level(2))[0]
+    # ladders go by lengths only where knots cluster, so that both have the same
+    assert sheets(sheet(net), {0}, Level(2))[0].detail > 0.1 and one.detail < 1e-10
+
+
+def test_a_fraction_of_a_level_blends_two_of_them():
+    _, net = rough(spans=(24, 18))
+    low, high, between = (wanted(net, level)[0] for level in (1, 2, 1.25))
+    assert np.abs(high - low).max() > 0.01
+    np.testing.assert_allclose(between, 0.75 * low + 0.25 * high, atol=1e-10)
+    np.testing.assert_allclose(wanted(net, 0.5)[0], 0.5 * low, atol=1e-10)
+    assert not wanted(net, 0)[0].any()
+
+
+def test_the_wavelength_of_a_level_is_that_of_its_coarse_knots():
+    _, net = rough(spans=(24, 20))
+    u, v = (float(arc_lengths(net, axis).sum()) for axis in (0, 1))
+    found = [sheets(sheet(net), {0}, Level(level))[0].wavelength for level in (1, 2, 1.5)]
+    assert found[0] == pytest.approx(np.sqrt(2) * min(u / 12, v / 10)) and found[2] == pytest.approx(sum(found[:2]) / 2)
+    assert found[1] == pytest.approx(np.sqrt(2) * min(u / 6, v / 5))
+
+
+def test_held_rims_make_it_the_nearest_surface_that_keeps_them():
+    """Noise two wavelengths away from the rim: then no smoother way to the rim is needed."""
+    middle = np.zeros((43, 35))
+    middle[10:-10, 10:-10] = 1.0
+    _, net = rough(spans=(40, 32), where=middle)
+    model = sheet(net)
+    result = faired(model, {0}, Level(1), Wishes(), Tolerances(1e-3), refine=False)
+    moved = result.moved[0]
+    assert moved.amount == 1.0
+    one = sheets(model, {0}, Level(1))[0]
+    mass = forms(net, one.metric, quadrature(net, model.faces)).mass.toarray()
+    free = np.zeros(net.poles.shape[:2], bool)
+    free[1:-1, 1:-1] = True
+    free = np.flatnonzero(free)
+    target = (rung(net, 1) - net.poles).reshape(-1, 3)
+    dense = np.zeros_like(target)
+    dense[free] = np.linalg.solve(mass[np.ix_(free, free)], (mass @ target)[free])
+    assert np.abs(dense).max() > 0.05
+    np.testing.assert_allclose(moved.offset.reshape(-1, 3), dense, atol=1e-6)
+
+
+def figures(shape, keep, change=lambda patches: patches):
+    """Error of the panel in patches over that of the unsplit one, level 2 of each: four coarse spans a patch."""
+    clean, noisy = panels.whole(SPANS, NOISE, patches=shape)
+    patches = panels.cut(noisy, shape)
+    model = sheet(noisy)
+    whole = faired(model, {0}, Level(2), Wishes(keep), Tolerances(1e-3)).displacement().applied(model).surfaces[0].net
+    unsplit = panels.rms({k: p.net for k, p in panels.cut(whole, shape).items()}, patches, clean)
+    patches = change(patches)
+    model = view(panels.document(patches))
+    result = faired(model, set(range(len(patches))), Level(2), Wishes(keep), Tolerances(1e-3))
+    after = result.displacement().applied(model)
+    coupled = panels.rms({k: after.surfaces[i].net for i, k in enumerate(sorted(patches))}, patches, clean)
+    found = seams(after)
+    assert len(result.joints.exact) == len(found) == 2 * shape[0] * shape[1] - sum(shape)
+    assert max(each.gap for each in found) <= 1e-9 and max(each.angle for each in found) <= 1e-5
+    if keep == "g2":
+        assert max(each.bend for each in found) <= 1e-9
+    print(f"{shape} patches, {keep}: unsplit {unsplit:.4f} mm, in patches {coupled / unsplit:.3f} of it")
+    return coupled / unsplit
+
+
+@pytest.mark.parametrize(
+    ("shape", "keep", "most"), [((2, 3), "g1", 1.14), ((2, 3), "g2", 1.02), ((4, 4), "g1", 1.14), ((4, 4), "g2", 1.02)]
+)
+def test_a_level_of_patches_is_a_level_of_the_surface_they_make(shape, keep, most):
+    assert figures(shape, keep) <= most
+
+
+@pytest.mark.parametrize("change", [other_senses, other_degrees])
+@pytest.mark.parametrize(("keep", "most"), [("g1", 1.14), ("g2", 1.02)])
+def test_patches_that_differ_come_as_close(change, keep, most):
+    assert figures((2, 3), keep, change) <= most
+
+
+def test_a_joint_of_varying_ratio_does_not_lock():
+    """T_u = −(1 + v / 2) S_u: patches come as close to the truth as where the ratio is constant."""
+    grid = np.stack(np.meshgrid(np.linspace(0, 1, 60), np.linspace(0, 1, 60), indexing="ij"), -1).reshape(-1, 2)
+    errors = []
+    for skew in (0.5, 0.0):
+        clean, noisy = skewed(0.0, skew), skewed(NOISE, skew)
+        model = view(panels.pair(*noisy))
+        result = faired(model, {0, 1}, Level(2), Wishes("g1"), Tolerances(1e-3))
+        after = result.displacement().applied(model)
+        (found,) = seams(after)
+        assert len(result.joints.exact) == 1 and found.gap <= 1e-9
+        off = [s.net.evaluate(grid) - c.evaluate(grid) for s, c in zip(after.surfaces, clean, strict=True)]
+        errors.append(np.sqrt(np.mean(np.concatenate(off) ** 2)))
+    print(f"ratio that varies {errors[0]:.4f} mm, constant {errors[1]:.4f} mm")
+    assert errors[0] <= 1.14 * errors[1]
