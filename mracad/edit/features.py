@@ -1,6 +1,6 @@
 """Detail features: move one, repeat it, carry it from another model (METHOD: a feature is a displacement).
 
-A feature is told from what it stands above (:mod:`mracad.feature.detail`), tabulated in geodesic coordinates of its
+A feature is told from what it stands above (:mod:`mracad.feature.extract`), tabulated in geodesic coordinates of its
 place, and laid on other places (:mod:`mracad.feature.copies`); seams between edited faces hold.
 """
 
@@ -17,7 +17,8 @@ from mracad.edit.result import Edit, FaceOutcome
 from mracad.errors import EditError, UsageError
 from mracad.feature.character import at_scale, laid_on
 from mracad.feature.copies import Laid, laid
-from mracad.feature.detail import Feature, above_surroundings, between_levels, load
+from mracad.feature.detail import Feature, load
+from mracad.feature.extract import above_surroundings, between_levels
 from mracad.feature.fine import NARROWEST
 from mracad.feature.ground import Ground, axes
 from mracad.feature.ideal import copies

@@ -20,7 +20,7 @@ from mracad.feature.compared import Copy
 from mracad.feature.copies import Laid, offset, over
 from mracad.feature.detail import taper
 from mracad.feature.fine import MISSED, NARROWEST, Knots, divided, split, through, weights_over
-from mracad.feature.ground import Sheet
+from mracad.feature.sheet import Sheet
 from mracad.model import Model
 from mracad.options import Transfer
 from mracad.wavelet.ladder import arc_lengths, ladder_for_scale

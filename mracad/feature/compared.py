@@ -11,8 +11,8 @@ from mracad.bspline.net import Net
 from mracad.errors import EditError
 from mracad.feature.detail import LOST
 from mracad.feature.fine import between
-from mracad.feature.ground import Sheet
 from mracad.feature.ideal import Copies
+from mracad.feature.sheet import Sheet
 
 Array = np.ndarray
 

@@ -15,8 +15,8 @@ from mracad.bspline.interpolate import interpolated
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.net import Net
 from mracad.errors import EditError
-from mracad.feature.ground import Sheet
 from mracad.feature.ideal import Copies
+from mracad.feature.sheet import Sheet
 from mracad.wavelet.ladder import arc_lengths
 
 Array = np.ndarray

@@ -14,8 +14,9 @@ import numpy as np
 
 from mracad.feature.chart import Charts
 from mracad.feature.detail import Feature
-from mracad.feature.ground import STEEP, Feet, Ground, Sheet
+from mracad.feature.ground import STEEP, Feet, Ground
 from mracad.feature.place import Place
+from mracad.feature.sheet import Sheet
 
 Array = np.ndarray
 

@@ -10,7 +10,8 @@ import numpy as np
 
 from mracad.bspline.net import Net
 from mracad.errors import EditError, FileError, UsageError
-from mracad.feature.ground import Feet, Ground, Sheet, inside
+from mracad.feature.ground import Feet, Ground
+from mracad.feature.sheet import Sheet, inside
 from mracad.model import Model
 
 Array = np.ndarray

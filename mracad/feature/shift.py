@@ -9,8 +9,8 @@ import numpy as np
 
 from mracad.bspline.knots import KnotVector
 from mracad.feature.detail import Origin
-from mracad.feature.ground import Sheet
 from mracad.feature.ideal import Copies
+from mracad.feature.sheet import Sheet
 
 Array = np.ndarray
 _Box = tuple[tuple[int, int], tuple[int, int]]

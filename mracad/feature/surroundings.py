@@ -1,0 +1,120 @@
+"""What a feature stands above: a thin plate through its surroundings."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mracad.errors import EditError
+from mracad.feature.chart import DEGREE, charts, monomials
+from mracad.feature.ground import Ground, axes
+from mracad.feature.place import Window
+
+Array = np.ndarray
+
+RING = 1.5
+"""What lies between the rim of a feature and so many times its radius tells what it stands above."""
+
+WORTH, BETTER = 3e-3, 3.0
+"""A ground is bridged by more than a plane where that changes the ring by more than this share of the feature's height,
+and by degree 6 instead of 4 where that fits so many times better."""
+
+SECTORS = 16
+"""The ring must be there in three quarters of so many directions."""
+
+PLATE, CLOSE, CELLS = 600, 1.2, 64
+"""Points of the ring that the thin plate passes through, first those up to so many times the reach; and the cells, up
+to there, over which it is tabulated."""
+
+NORMALS = 6
+"""Steps to the foot of a point on the plate."""
+
+SPREAD = 48
+"""Samples of a sheet in each direction around a feature."""
+
+
+class Surroundings:
+    """What a thin plate through the surroundings of a window makes of the place.
+
+    Attributes
+    ----------
+    chart : Charts
+        Of one place: that of the window, brought to the plate.
+    """
+
+    def __init__(self, ground: Ground, window: Window, reach: float, label: str) -> None:
+        from scipy.interpolate import RBFInterpolator, RectBivariateSpline
+
+        feet, centre = window.feet, window.point
+        points, near = (x[0] for x in ground.samples(feet, np.array([RING * reach]), SPREAD)[:2])
+        normal = feet.normals[0]
+        for _ in range(3):
+            frame = axes(normal[None], feet.along)[0]
+            local = (points - centre) @ frame.T
+            radius = np.linalg.norm(local[:, :2], axis=1)
+            ring = near & (radius > reach) & (radius <= RING * reach)
+            angle = np.arctan2(local[ring, 1], local[ring, 0])
+            if len(np.unique(np.floor((angle / (2 * np.pi) + 0.5) * SECTORS))) < 0.75 * SECTORS:
+                raise EditError(
+                    f"{label}: the feature, {2 * reach:.4g} mm across with its taper, is larger than its face",
+                    "use a smaller window or a shorter --taper, or select its neighbours, too",
+                )
+            rows = np.c_[local[ring, :2], np.ones(ring.sum())]
+            a, b, _ = np.linalg.lstsq(rows, local[ring, 2], rcond=None)[0]
+            normal = frame.T @ (np.array([-a, -b, 1.0]) / np.sqrt(1 + a**2 + b**2))
+        frame = axes(normal[None], feet.along)[0]
+        local = (points - centre) @ frame.T / reach
+        degree = _bridging(local, ring, near & ~ring)
+        own = local[ring]
+        rows = monomials(own[:, 0], own[:, 1], degree)
+        graph = np.linalg.lstsq(rows, own[:, 2], rcond=None)[0]
+        order = np.random.default_rng(0).permutation(len(own))
+        far = np.linalg.norm(own[order, :2], axis=1) > CLOSE
+        rim = order[np.argsort(far, kind="stable")][:PLATE]
+        rest = own[rim, 2] - rows[rim] @ graph
+        plate = RBFInterpolator(own[rim, :2], rest, kernel="thin_plate_spline", degree=1)
+        side = np.linspace(-CLOSE, CLOSE, CELLS + 1)
+        ab = np.stack(np.meshgrid(side, side, indexing="ij"), axis=-1).reshape(-1, 2)
+        heights = monomials(ab[:, 0], ab[:, 1], degree) @ graph + plate(ab)
+        level = float(heights[len(heights) // 2])
+        # the chart's origin is the place on the plate, not on the feature
+        self._spline = RectBivariateSpline(side, side, (heights - level).reshape(CELLS + 1, -1))
+        self._reach = reach
+        origin = centre + reach * level * frame[2]
+        within = np.flatnonzero(np.linalg.norm(ab, axis=1) <= CLOSE)[::8]
+        graph_points = origin + reach * np.c_[ab, heights - level][within] @ frame
+        self.chart = charts(
+            origin[None], frame[None], np.array([CLOSE * reach]), graph_points[None], np.ones((1, len(within)), bool)
+        )
+
+    def feet(self, local: Array) -> Array:
+        """The points of the plate on whose normals points ``(q, 3)`` stand, both in the chart's axes, mm."""
+        at = local / self._reach
+        height = np.zeros(len(at))
+        foot = at
+        for _ in range(NORMALS):
+            a, b = foot[:, 0], foot[:, 1]
+            slopes = [self._spline.ev(a, b, dx=dx, dy=1 - dx) for dx in (1, 0)]
+            normal = np.stack([-slopes[0], -slopes[1], np.ones(len(at))], axis=1)
+            normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+            foot = at - height[:, None] * normal
+            height = height + (foot[:, 2] - self._spline.ev(foot[:, 0], foot[:, 1])) * normal[:, 2]
+            foot = at - height[:, None] * normal
+        return np.asarray(self._reach * foot)
+
+
+def _bridging(local: Array, ring: Array, within: Array) -> int:
+    """Degree of the polynomial that the plate corrects.
+
+    A plate reproduces cubics whatever its hole; what a ground has beyond them a higher degree must bridge, which makes
+    more of the feature's own tails: only where that is much.
+    """
+
+    def missed(degree: int) -> tuple[float, float]:
+        rows = monomials(local[:, 0], local[:, 1], degree)
+        rest = local[:, 2] - rows @ np.linalg.lstsq(rows[ring], local[ring, 2], rcond=None)[0]
+        return float(np.sqrt((rest[ring] ** 2).mean())), float(np.abs(rest[within]).max(initial=0.0))
+
+    rest, height = missed(3)
+    if rest <= WORTH * height:
+        return 1
+    return DEGREE if missed(DEGREE)[0] * BETTER < missed(4)[0] else 4
