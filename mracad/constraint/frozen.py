@@ -9,7 +9,7 @@ its derivatives; edges, vertices and pcurves stay exactly valid.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -72,7 +72,11 @@ def reached(net: Net, faces: Sequence[Face]) -> dict[int, Array]:
 
 
 def separate(
-    net: Net, faces: Sequence[Face], edited: Collection[int], keep: str = "g1", moving: Collection[int] = ()
+    net: Net,
+    faces: Sequence[Face],
+    edited: Collection[int],
+    keep: str | Mapping[int, int] = "g1",
+    moving: Collection[int] = (),
 ) -> Separation:
     """Separate the control points of a surface.
 
@@ -84,8 +88,9 @@ def separate(
         All faces that lie on it.
     edited : collection of int
         Indices of those that may move; the others' whole region is frozen.
-    keep : {"g0", "g1", "g2"}
-        Which continuity each edge keeps with whatever lies beyond it.
+    keep : {"g0", "g1", "g2"} or mapping of int to int
+        Which continuity each edge keeps with whatever lies beyond it; or how many derivatives, by edge, those that are
+        not named their position alone.
     moving : collection of int
         Edges that may move, because what lies beyond them moves with them.
     """
@@ -99,7 +104,8 @@ def separate(
             visible |= reach[face.index]
             held = [i for i, trim in enumerate(face.trims) if trim.edge not in moving]
             crossed = Region(region.inside, tuple(region.crossed[i] for i in held))
-            frozen |= frozen_along(net, [face.trims[i].curve for i in held], crossed, keep)
+            orders = [CONTINUITY[keep] if isinstance(keep, str) else keep.get(face.trims[i].edge, 0) for i in held]
+            frozen |= frozen_along(net, [face.trims[i].curve for i in held], crossed, orders)
         else:
             frozen |= reach[face.index]
     return Separation(visible, frozen, reach)
@@ -126,8 +132,8 @@ def halvings(net: Net) -> Iterator[tuple[Net, Array, Array]]:
         yield net, u_knots, v_knots
 
 
-def frozen_along(net: Net, curves: Sequence[Curve], region: Region, keep: str = "g1") -> Array:
-    """Control points ``(nu, nv)`` that must stay so that ``net`` keeps its ``keep`` continuity along pcurves.
+def frozen_along(net: Net, curves: Sequence[Curve], region: Region, orders: Sequence[int]) -> Array:
+    """Control points ``(nu, nv)`` that must stay so that ``net`` keeps its derivatives along pcurves.
 
     Parameters
     ----------
@@ -135,16 +141,17 @@ def frozen_along(net: Net, curves: Sequence[Curve], region: Region, keep: str = 
     curves : sequence of Curve
     region : Region
         Of the face that the curves bound; its ``crossed`` cells are theirs.
-    keep : {"g0", "g1", "g2"}
+    orders : sequence of {0, 1, 2}
+        Highest derivative across each curve that is kept.
     """
     frozen = np.zeros(net.poles.shape[:2], bool)
     trimmed = np.zeros_like(region.inside)
-    for curve, crossed in zip(curves, region.crossed, strict=True):
+    for curve, crossed, order in zip(curves, region.crossed, orders, strict=True):
         for axis, knots in enumerate((net.u, net.v)):
             at = curve.poles[:, axis]
             position = float(at.mean())
             if np.ptp(at) <= 2 * ISO * local_span(knots, position):
-                rows = jet_support(knots, position, CONTINUITY[keep])
+                rows = jet_support(knots, position, order)
                 across = curve.poles[:, 1 - axis]
                 columns = meeting((net.u, net.v)[1 - axis], float(across.min()), float(across.max()))
                 frozen |= rows[:, None] & columns if axis == 0 else columns[:, None] & rows

@@ -15,6 +15,7 @@ import numpy as np
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.net import Net
 from mracad.constraint.frozen import separate
+from mracad.constraint.seam import Wishes, seams
 from mracad.errors import EditError
 from mracad.feature.compared import Copy
 from mracad.feature.copies import Laid, offset, over
@@ -154,7 +155,8 @@ def laid_on(
     net = model.surfaces[target.index].net
     fine = net.over(*knots)
     faces = [model.faces[i] for i in model.surfaces[target.index].faces]
-    free = separate(fine, faces, [f.index for f in target.faces], options.keep).free
+    own_faces = {face.index for face in target.faces}
+    free = separate(fine, faces, own_faces, seams(model, own_faces, Wishes(options.keep)).orders).free
     if not free.any():
         raise EditError(f"to: {options.to} has no free control point", "use --keep g0")
     window = _window(fine, free, band[1] / 2 if width is None else width)

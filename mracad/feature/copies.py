@@ -84,7 +84,6 @@ class _Task:
     fit: Fit
     shifts: Shifts
     removed: Mapping[int, Array]
-    keep: str
     nets: dict[int, Net]
     joints: Joints
     softness: Softness
@@ -164,7 +163,7 @@ def _task(copies: Copies, wishes: Wishes, removed: Mapping[int, Array]) -> _Task
     reach = float(copies.reach.max())
     tolerances = TIGHT * GAP, TIGHT * TURNED, TIGHT * BENT / reach
     softness = Softness(tolerances, (MISSED * copies.height) ** 2 * reach)
-    return _Task(copies, fit, shifts, removed, wishes.keep, nets, joined, softness)
+    return _Task(copies, fit, shifts, removed, nets, joined, softness)
 
 
 def _sewn(joined: Joints) -> Joints:
@@ -214,7 +213,7 @@ def _attempt(task: _Task, crossings: Sequence[Crossing], halvings: Mapping[int, 
         every, alone[i] = _wanted(task, i, net)
         on_it = [task.model.faces[f] for f in task.model.surfaces[i].faces]
         faces = task.copies.ground.sheets[i].faces
-        free = separate(net, on_it, [face.index for face in faces], task.keep, moving).free
+        free = separate(net, on_it, [face.index for face in faces], task.joints.orders, moving).free
         wanted[i] = Wanted(net, every, free, faces[0])
     return _Attempt(nets, held(wanted, crossings, task.softness), alone)
 

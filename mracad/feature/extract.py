@@ -9,6 +9,7 @@ import numpy as np
 from mracad.bspline.interpolate import interpolated
 from mracad.bspline.net import Net
 from mracad.constraint.frozen import separate
+from mracad.constraint.seam import Wishes, seams
 from mracad.errors import EditError
 from mracad.feature.chart import Charts
 from mracad.feature.detail import LOST, Feature, Origin, taper
@@ -118,13 +119,14 @@ def _made(
     if largest <= 1e-7:
         raise EditError(f"{label}: nothing stands out there", "name a window over a feature; see mracad feature list")
     model = ground.model
+    orders = seams(model, {face.index for i in offsets for face in ground.sheets[i].faces}, Wishes(keep)).orders
     for index in list(offsets):
         sheet = ground.sheets[index]
         surface = model.surfaces[index]
         faces = [model.faces[i] for i in surface.faces]
         edges = [model.edges[trim.edge] for face in faces for trim in face.trims if model.edges]
         moving = {e.index for e in edges if len(e.sides) == 2 and {side.face for side in e.sides} <= ground.chosen}
-        free = separate(surface.net, faces, [f.index for f in sheet.faces], keep, moving).free
+        free = separate(surface.net, faces, [f.index for f in sheet.faces], orders, moving).free
         lost = float(np.linalg.norm(offsets[index][~free], axis=-1).max(initial=0.0))
         if lost > LOST * largest:
             raise EditError(

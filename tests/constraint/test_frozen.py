@@ -5,7 +5,7 @@ import pytest
 
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.net import Net
-from mracad.constraint.frozen import frozen_along, jet_support, separate
+from mracad.constraint.frozen import CONTINUITY, frozen_along, jet_support, separate
 from mracad.constraint.region import region
 from mracad.model import Face, Trim
 from tests.constraint.test_region import circle, segment, square
@@ -23,7 +23,7 @@ TRIMS = {
 
 def along(net, curve, keep="g1"):
     """Points frozen by one curve."""
-    return frozen_along(net, [curve], region(net, [curve]), keep)
+    return frozen_along(net, [curve], region(net, [curve]), [CONTINUITY[keep]])
 
 
 def random_net(degrees, seed=0):
