@@ -14,7 +14,7 @@ from mracad.inspect.cells import quadrature
 from mracad.inspect.roughness import Change, Growth, Worse, worse
 from mracad.inspect.survey import Survey, changes, surveys
 from mracad.model import Face, Model
-from mracad.seam.conditions import matched
+from mracad.seam.conditions import doubled, matched
 from mracad.seam.conditions import rows as seam_rows
 from mracad.seam.contact import rows as contact_rows
 from mracad.seam.energy import forms
@@ -138,7 +138,7 @@ class Trial:
         self.width = max(sheet.wavelength for sheet in members.values())
         movable = {face for sheet in members.values() for face in sheet.movable}
         nets = {i: _space(scene, sheet, joined.moving) for i, sheet in members.items()}
-        nets = matched(nets, joined.exact)
+        nets = matched(doubled(matched(nets, joined.exact), joined.exact), joined.exact)
         spaces, contacts = {}, [contact(seam) for seam in joined.loose]
         for i, net in nets.items():
             sheet = members[i]
@@ -157,7 +157,7 @@ class Trial:
         closing = np.array([(each.close, each.fit, False) for each in contacts]).reshape(-1, 3)
         closed = closing[self.contacts.owner, self.contacts.order]
         self.wanted = _mended(self.contacts.matrix, f, closed)
-        rows, mended = seam_rows(nets, joined.exact)
+        rows, mended = seam_rows(nets, joined.exact, everywhere=True)
         weight = max(sheet.detail for sheet in members.values()) ** 2 * self.width
         tight = [TIGHT * limit for limit in self.limits]
         soft = pull = None
