@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 import time
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from types import MappingProxyType
@@ -15,7 +15,7 @@ from mracad import guard
 from mracad.audit.continuity import SeamMeasure, key, remeasured, seams
 from mracad.audit.deviation import Deviation, deviations
 from mracad.audit.mended import unmended
-from mracad.edit.result import Edit
+from mracad.edit.result import Edit, Reason
 from mracad.errors import EditError, UsageError
 from mracad.judge import Judged, Original
 from mracad.model import Model
@@ -147,7 +147,7 @@ def run(
     Raises
     ------
     EditError
-        When there is something to do and no face can move, or the result would be less valid than the input,
+        When faces were asked for one by one and none can move, or the result would be less valid than the input,
         whatever faces are left.  The document must then not be written.
     """
     from mracad.occ.apply import apply as put
@@ -174,7 +174,7 @@ def run(
     while True:
         result = edit(model, options, *others, scope=scope.holding(left.faces), progress=stage("editing"))
         result = _named(result, {face: left.faces[face] for face in left.faces.keys() & scope.chosen})
-        _refuse_if_stuck(model, result)
+        _refuse_if_asked(model, result, scope.named)
         stage("measuring seams")(0, 1)
         if valid_before is None:
             before = seams(model)
@@ -277,27 +277,23 @@ def looked_at(document: Document, options: Selection) -> tuple[Model, Scope]:
     nurbs = [i for i in every_nurbs(model) if own is None or i not in own.copies]
     scope = select_scope(model, options, partial(select_cq, document), nurbs)
     if own is not None:
-        faces, held = (frozenset(own.faces[i] for i in each & own.faces.keys()) for each in (scope.faces, scope.held))
-        scope = Scope(faces, held, frozenset(own.edges.get(i, i) for i in scope.edges))
+        faces, held, named = (
+            frozenset(own.faces[i] for i in each & own.faces.keys()) for each in (scope.faces, scope.held, scope.named)
+        )
+        scope = Scope(faces, held, frozenset(own.edges.get(i, i) for i in scope.edges), named)
         if options.faces and not faces:
             raise UsageError(f"no selected face is in '{options.instance}'", "leave out --faces, or select others")
     convertible = {i for i in scope.chosen if model.faces[i].surface is None}
     return (view(document, convert=convertible) if convertible else model), scope
 
 
-def _refuse_if_stuck(model: Model, result: Edit) -> None:
-    stuck = result.faces("stuck")
-    if stuck and not result.faces("edited"):
-        names = " ".join(f"#{o.face + 1}" for o in stuck[:6]) + (" …" if len(stuck) > 6 else "")
-        what = (
-            "one face has detail to remove and cannot"
-            if len(stuck) == 1
-            else f"{len(stuck)} faces have detail to remove and none can"
-        )
-        raise EditError(
-            f"{model.name}: {what} move ({names}: {stuck[0].reason})",
-            "try --refine, --keep g0 or a smaller scale",
-        )
+def _refuse_if_asked(model: Model, result: Edit, named: Collection[int]) -> None:
+    """Raise EditError where faces were asked for one by one and none of them can be done."""
+    asked = [outcome for outcome in result.outcomes if outcome.face in named]
+    left = [outcome for outcome in asked if outcome.status == "left"]
+    if left and not any(outcome.status == "edited" for outcome in asked):
+        names = " ".join(f"#{o.face + 1}" for o in left[:6]) + (" …" if len(left) > 6 else "")
+        raise EditError(f"{model.name}: {names} {left[0].words}", "leave out what cannot be done, or all of --faces")
 
 
 def _torn(before: list[SeamMeasure], after: list[SeamMeasure], edit: Edit, keep: str) -> set[int]:
@@ -325,7 +321,8 @@ def _named(result: Edit, spoiled: Mapping[int, str]) -> Edit:
     return replace(
         result,
         outcomes=tuple(
-            replace(o, status="stuck", reason=spoiled[o.face]) if o.face in spoiled else o for o in result.outcomes
+            replace(o, status="left", reason=Reason.SPOILED, said=spoiled[o.face]) if o.face in spoiled else o
+            for o in result.outcomes
         ),
     )
 

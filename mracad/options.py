@@ -204,9 +204,11 @@ class Selection(Options, frozen=True, kw_only=True, forbid_unknown_fields=True):
         Meta(description="Faces and edges (edge#4) that must not move; same selectors as --faces."),
     ] = ()
     keep: Annotated[
-        Literal["g0", "g1", "g2"],
-        Meta(description="Continuity that every edge keeps: position, tangent plane or curvature."),
-    ] = "g1"
+        Literal["as-is", "g0", "g1", "g2"],
+        Meta(
+            description="Continuity that every edge keeps: as-is, what it has; or position, tangent plane or curvature."
+        ),
+    ] = "as-is"
     edges: Annotated[
         Literal["coupled", "frozen"],
         Meta(
@@ -214,11 +216,15 @@ class Selection(Options, frozen=True, kw_only=True, forbid_unknown_fields=True):
             "is possible; frozen, none moves."
         ),
     ] = "coupled"
-    quiet: ClassVar[str]
 
     @property
     def done(self) -> str:
-        """What was done to an edited face, ``"smoothed at 5mm"``; ``quiet`` is what an unchanged one is."""
+        """What was done to an edited face, ``"smoothed at 5mm"``."""
+        raise NotImplementedError
+
+    @property
+    def quiet(self) -> str:
+        """What an unchanged face is, ``"already fair at 5mm"``."""
         raise NotImplementedError
 
     def models(self) -> tuple[str, ...]:
@@ -242,16 +248,19 @@ class Fitting(Selection, frozen=True, kw_only=True, forbid_unknown_fields=True):
         Meta(description="Gap (a length) that a seam along a trim curve may have after it moved, unless it was wider."),
     ] = "1e-4mm"
     refine: Annotated[
-        bool,
-        Meta(description="Insert knots (exactly) where a face has too few free control points."),
-    ] = False
+        Literal["auto", "never"],
+        Meta(
+            description="Control points where a face has too few of them for the edit: auto, knots are inserted "
+            "there, exactly; never, the face makes do with its own."
+        ),
+    ] = "auto"
     amount: Annotated[
         float,
         Meta(description="How much of the edit: 1 is all of it, 0 none.", ge=0.0, le=1.0),
     ] = 1.0
     max_deviation: Annotated[
         Length | None,
-        Meta(description="Bound on the displacement (a length): the edit is blended back locally until it holds."),
+        Meta(description="Bound on the deviation along the normal (a length): the edit is scaled back locally."),
     ] = None
 
 
@@ -259,7 +268,6 @@ class Smooth(Fitting, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Remove detail finer than a scale from the NURBS faces of a model."""
 
     function: ClassVar[str] = "mracad.edit.smooth:smooth"
-    quiet: ClassVar[str] = "already smooth there"
 
     scale: Annotated[
         Length | None,
@@ -278,7 +286,15 @@ class Smooth(Fitting, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
     @property
     def done(self) -> str:
-        return f"smoothed at {self.scale if self.scale is not None else f'level {self.level:g}'}"
+        return f"smoothed at {self._place}"
+
+    @property
+    def quiet(self) -> str:
+        return f"already fair at {self._place}" if self.amount else "left as they are: amount 0"
+
+    @property
+    def _place(self) -> str:
+        return self.scale if self.scale is not None else f"level {self.level:g}"
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -330,7 +346,9 @@ class Featured(Selection, frozen=True, kw_only=True, forbid_unknown_fields=True)
         bool, Meta(description="Let edges and holes that do not move take parts of copies, instead of refusing them.")
     ] = False
 
-    quiet: ClassVar[str] = "without a copy"
+    @property
+    def quiet(self) -> str:
+        return "without a copy"
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -461,8 +479,6 @@ class Transfer(Featured, frozen=True, kw_only=True, forbid_unknown_fields=True):
         ),
     ] = "add"
 
-    quiet: ClassVar[str] = "left as they are"
-
     def __post_init__(self) -> None:
         super().__post_init__()
         for name in ("source", "from_", "to"):
@@ -485,6 +501,10 @@ class Transfer(Featured, frozen=True, kw_only=True, forbid_unknown_fields=True):
     @property
     def done(self) -> str:
         return "edited with detail of another"
+
+    @property
+    def quiet(self) -> str:
+        return "left as they are"
 
 
 def band_of(text: str, diagonal: float) -> tuple[float, float]:

@@ -37,11 +37,14 @@ class Scope:
         Faces that must not move, whatever the others do.
     edges : frozenset of int
         Edges that must not move.
+    named : frozenset of int
+        Faces that were asked for one by one, by number or place.
     """
 
     faces: frozenset[int]
     held: frozenset[int] = frozenset()
     edges: frozenset[int] = frozenset()
+    named: frozenset[int] = frozenset()
 
     @property
     def chosen(self) -> frozenset[int]:
@@ -79,7 +82,9 @@ def scope(
     if faces.edges:
         raise UsageError(f"faces: edge#{min(faces.edges) + 1} is not a face", "only --hold takes edges")
     held = select(model, options.hold, default, cadquery)
-    return Scope(faces.faces if options.faces else frozenset(default), held.faces, held.edges)
+    named = select(model, (word for word in options.faces if word.startswith(("#", "near:"))), (), cadquery)
+    chosen = faces.faces if options.faces else frozenset(default)
+    return Scope(chosen, held.faces, held.edges, named.faces & chosen)
 
 
 def every_nurbs(model: Model) -> list[int]:

@@ -97,13 +97,9 @@ def edit_lines(report: Report, options: Selection, end: str, found: Found | None
     edit, model = report.edit, report.model
     nurbs = [o for o in edit.outcomes if o.status != "analytic"]
     parts = [f"{len(edit.faces('edited'))} {options.done}"]
-    unchanged = edit.faces("unchanged")
-    if unchanged:
-        reasons = Counter("crease lines only" if o.reason == "crease lines only" else options.quiet for o in unchanged)
-        parts += [f"{count} {reason}" for reason, count in reasons.items()]
-    stuck = edit.faces("stuck")
-    if stuck:
-        parts.append(f"{len(stuck)} held ({numbers([o.face for o in stuck])}: {stuck[0].reason}, try --refine)")
+    if edit.faces("unchanged"):
+        parts.append(f"{len(edit.faces('unchanged'))} {options.quiet}")
+    parts += left_words(edit.faces("left"))
     if edit.faces("held"):
         parts.append(f"{len(edit.faces('held'))} held by --hold")
     if edit.faces("unselected"):
@@ -116,6 +112,7 @@ def edit_lines(report: Report, options: Selection, end: str, found: Found | None
         worst = max(report.deviations, key=lambda d: d.largest)
         mean = sum(d.mean for d in report.deviations) / len(report.deviations)
         lines.append(f"deviation: max {mm(worst.largest)} on #{worst.face + 1}, mean {mm(mean)}")
+        lines[-1] += roughness_words(edit.faces("edited"))
     else:
         lines.append("deviation: none")
     if edit.copies:
@@ -133,6 +130,30 @@ def edit_lines(report: Report, options: Selection, end: str, found: Found | None
     now = found or Found(report.valid_after.valid, "in memory")
     lines.append(f"valid: {now.words} (was {verdict(report.valid_before.valid)}); {end}")
     return lines
+
+
+def left_words(left: Sequence[FaceOutcome]) -> list[str]:
+    """The faces that had to be left, by reason."""
+    groups: dict[str, list[int]] = {}
+    for each in left:
+        groups.setdefault(each.words, []).append(each.face)
+    most = sorted(groups.items(), key=lambda group: -len(group[1]))
+    return [f"{len(faces)} left ({numbers(faces)}: {why})" for why, faces in most]
+
+
+def roughness_words(edited: Sequence[FaceOutcome]) -> str:
+    """How rough edited faces were and are."""
+    both = [each.roughness for each in edited if each.roughness]
+    if not both:
+        return ""
+    bending, variation = (
+        [sum(getattr(pair[k], name) for pair in both) for k in (0, 1)] for name in ("bending", "variation")
+    )
+    curvature = [max(pair[k].curvature for pair in both) for k in (0, 1)]
+    return (
+        f"; bending {bending[0]:.3g} → {bending[1]:.3g}, curvature variation {variation[0]:.3g} → {variation[1]:.3g}"
+        f" 1/mm², curvature ≤ {curvature[1]:.3g} (was {curvature[0]:.3g}) 1/mm"
+    )
 
 
 def copies_line(report: Report) -> str:

@@ -220,16 +220,12 @@ class Treatment:
         ``mended``: it moves as a coupled one does, and its gap or tilt is pulled shut.
     reason : str
         Why it is frozen.
-    freedom : int
-        Degrees of freedom of the edge's curve in the coarse space, where coupled; the number of points at which the
-        coarse spaces of both sides meet, where it moves to the tolerance.
     """
 
     edge: int
     faces: tuple[int, ...]
     how: str
     reason: str = ""
-    freedom: int = 0
 
 
 @dataclass(frozen=True, eq=False)

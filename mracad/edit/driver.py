@@ -9,11 +9,12 @@ then together with those that seams join to it.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from mracad.bspline.net import Net
+from mracad.constraint.seam import Seam
 from mracad.constraint.trimmed import TrimmedSeam
 from mracad.edit.target import Sheet, Wish
 from mracad.edit.trial import ENOUGH, Scene, Trial, Verdict, Watch, displaced
@@ -28,6 +29,9 @@ ROUNDS = 4
 
 LEAST = 0.25
 """A surface of which less may be done is left, so that the others can do more."""
+
+APART, STAYS = "its faces get fairer each by itself", "a face there stays"
+"""Reasons for which a seam that could move does not."""
 
 BLENDS, PROMISE = 2, 1.05
 """Most times that what is best for each of joined surfaces is put together, and by how much it has to come nearer."""
@@ -53,6 +57,8 @@ class Moved:
         Free control points.
     gain, wanted : float
         By how much the surfaces that move with it came nearer to what was wanted, and all of that, as squared norms.
+    rough : bool
+        Whether what was wanted would take anything off its roughness.
     """
 
     sheet: Sheet
@@ -64,6 +70,7 @@ class Moved:
     free: int
     gain: float
     wanted: float
+    rough: bool = True
 
     @property
     def deviation(self) -> float:
@@ -95,10 +102,11 @@ class Moved:
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """What became of all surfaces, and the joints that moved with them."""
+    """What became of all surfaces, and the joints that moved with them; ``sheets`` are all that were looked at."""
 
     moved: Mapping[int, Moved]
     joints: Joints
+    sheets: Mapping[int, Sheet] = field(default_factory=dict)
 
     def displacement(self) -> Displacement:
         """What moves."""
@@ -123,7 +131,19 @@ def drive(scene: Scene, wish: Wish, progress: Callable[[int, int], None] | None 
             exact += [seam for seam in joined.exact if seam.a.surface != seam.b.surface]
             loose += joined.loose
             result |= part
-    return Result(result, replace(scene.joints, exact=tuple(exact), loose=tuple(loose)))
+    used = replace(scene.joints, exact=tuple(exact), loose=tuple(loose))
+    return Result(result, replace(used, frozen={**scene.joints.frozen, **_dropped(scene.joints, used, result)}))
+
+
+def _dropped(wanted: Joints, used: Joints, result: Mapping[int, Moved]) -> dict[int, str]:
+    """Edges that could have moved and do not, and why."""
+    dropped: dict[int, str] = {}
+    every: list[Seam | TrimmedSeam] = [*wanted.exact, *wanted.loose]
+    for seam in every:
+        if seam.edge not in used.moving:
+            both = all(side.surface in result and result[side.surface].amount > 0 for side in (seam.a, seam.b))
+            dropped |= dict.fromkeys((seam.edge, seam.twin), APART if both else STAYS)
+    return dropped
 
 
 def _together(
@@ -172,24 +192,27 @@ def _attempt(scene: Scene, wish: Wish, members: Mapping[int, Sheet], joined: Joi
     """The best that can be done to surfaces that move together; amounts may differ."""
     trial = Trial(scene, members, joined)
     target = wish.target(trial.problem, members, joined)
-    best = trial.nothing()
-    found = [best]
+    best, found = trial.nothing(), []
     for batch in wish.ways(trial.problem, target, trial.width) if trial.problem.free.any() else ():
         found += [trial.judged(wanted, target) for wanted in batch]
         best = max(found, key=_worth)
         if best.least > ENOUGH:
             break
-    for _ in range(BLENDS if len(members) > 1 else 0):
+    for _ in range(BLENDS if found and len(members) > 1 else 0):
         chosen = [(max(found, key=lambda each: each.gains[i]), i) for i in range(len(members))]
         if sum(each.gains[i] for each, i in chosen) <= PROMISE * best.gain:
             break
         found.append(trial.blended(chosen, target))
         best = max(found, key=_worth)
+    best = trial.confirmed(max([*found, trial.nothing()], key=_worth))
+    fairer = [True] * len(members) if best.least else trial.fairer(target)
     wished = float((target * (trial.problem.mass @ target)).sum())
     return {
-        i: Moved(members[i], space.net, amount * part, amount, change, limits, int(space.free.sum()), best.gain, wished)
-        for (i, space), part, amount, change, limits in zip(
-            trial.problem.spaces.items(), best.parts, best.amounts, best.changes, best.limits, strict=True
+        i: Moved(
+            members[i], space.net, amount * part, amount, change, limits, int(space.free.sum()), best.gain, wished, fair
+        )
+        for (i, space), part, amount, change, limits, fair in zip(
+            trial.problem.spaces.items(), best.parts, best.amounts, best.changes, best.limits, fairer, strict=True
         )
     }
 

@@ -94,6 +94,8 @@ def faired(
     rough = {
         i: each for i, each in every.items() if mending or each.detail > max(DETAIL[0], DETAIL[1] * each.wavelength)
     }
+    faces = {face for each in rough.values() for face in each.movable}
     bend = tolerances.bend / max((each.wavelength for each in rough.values()), default=1.0)
-    joined = joints(model, {face for each in rough.values() for face in each.movable}, replace(wishes, bend=bend))
-    return drive(Scene(model, rough, joined, tolerances, refine), wish, progress)
+    joined = joints(model, faces, replace(wishes, bend=bend))
+    result = drive(Scene(model, rough, joined, tolerances, refine), wish, progress)
+    return replace(result, sheets=every)

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from mracad.constraint.seam import Treatment, Wishes
-from mracad.edit.result import Edit, FaceOutcome
+from mracad.edit.result import Edit, FaceOutcome, Reason
 from mracad.errors import EditError, UsageError
 from mracad.feature.character import at_scale, laid_on
 from mracad.feature.copies import Laid, laid
@@ -229,15 +229,15 @@ def _outcome(
 ) -> FaceOutcome:
     """What became of a face; copies lie on those ``touched``."""
     if face.surface is None:
-        return FaceOutcome(face.index, "analytic", f"{face.kind}, not a NURBS face")
+        return FaceOutcome(face.index, "analytic", Reason.ANALYTIC, face.kind)
     if face.index in scope.held:
-        return FaceOutcome(face.index, "held", "held")
+        return FaceOutcome(face.index, "held", Reason.HELD)
     if face.index not in chosen:
-        return FaceOutcome(face.index, "unselected", "not selected")
+        return FaceOutcome(face.index, "unselected", Reason.UNSELECTED)
     surface, offset = model.surfaces[face.surface], laid.offsets.get(face.surface)
     points = int(np.prod(surface.net.poles.shape[:2]))
     moved = 0.0 if offset is None else float(np.linalg.norm(offset.poles, axis=-1).max())
     if offset is None or (len(surface.faces) > 1 and face.index not in touched and not moved):
-        return FaceOutcome(face.index, "unchanged", "no copy there", points=points)
+        return FaceOutcome(face.index, "unchanged", Reason.NO_COPY, points=points)
     inserted = len(offset.u_knots) + len(offset.v_knots)
     return FaceOutcome(face.index, "edited", moved=moved, points=points, inserted=inserted)

@@ -3,15 +3,32 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from enum import Enum
 from typing import Literal
 
 from mracad.constraint.seam import Treatment
 from mracad.feature.copies import Copy
+from mracad.inspect.roughness import Roughness
 from mracad.model import Displacement
 
-Status = Literal["edited", "unchanged", "stuck", "held", "unselected", "analytic"]
-"""``edited``; ``unchanged``: nothing to do there; ``stuck``: something to do but no free control point;
+Status = Literal["edited", "unchanged", "left", "held", "unselected", "analytic"]
+"""``edited``; ``unchanged``: nothing to do there; ``left``: something to do that cannot be done well;
 ``held``: by ``--hold``; ``unselected``; ``analytic``: not a NURBS face."""
+
+
+class Reason(Enum):
+    """Why a face did not change."""
+
+    FAIR = "already fair"
+    AMOUNT = "amount 0"
+    NO_COPY = "no copy there"
+    NO_FREE = "no free control points"
+    RIM = "cannot get fairer with its edges held"
+    ROUGHER = "would get rougher"
+    SPOILED = "would come out worse"
+    HELD = "held"
+    UNSELECTED = "not selected"
+    ANALYTIC = "not a NURBS face"
 
 
 @dataclass(frozen=True)
@@ -23,38 +40,44 @@ class FaceOutcome:
     face : int
         Index in ``Model.faces``.
     status : Status
-    reason : str
-        Why, in a few words; ``""`` for an edited face.
+    reason : Reason or None
+        Why it did not change.
+    said : str
+        More of that: in what it would get rougher, of what kind it is.
     detail : float
-        Largest change that the edit would make to a control point of the face were nothing frozen, mm.
+        Largest change that the edit would make to a control point of the face were nothing held, mm.
     moved : float
         Largest change made, mm.
+    amount : float
+        Share of what was wanted that was done.
     free, points : int
-        Free and all visible control points of the face.
-    spans : tuple of float
-        Least and largest knot span, mm; zero for a face that is not NURBS.
-    scale : float
-        Least wavelength whose removal the knots allow (two neighbouring spans), mm; 0 where there is none.
-    creases : int
-        Crease lines inside the face, which every edit keeps.
-    fairing : float
-        Length ℓ of the fairing solve, mm; 0 where the mask was used.
+        Free control points, and all of the surface as it is now.
     inserted : int
         Knots inserted.
+    creases : int
+        Crease lines inside the surface, which every edit keeps.
+    roughness : pair of Roughness, optional
+        Before and after, where the edit looks at it.
     """
 
     face: int
     status: Status
-    reason: str = ""
+    reason: Reason | None = None
+    said: str = ""
     detail: float = 0.0
     moved: float = 0.0
+    amount: float = 0.0
     free: int = 0
     points: int = 0
-    spans: tuple[float, float] = (0.0, 0.0)
-    scale: float = 0.0
-    creases: int = 0
-    fairing: float = 0.0
     inserted: int = 0
+    creases: int = 0
+    roughness: tuple[Roughness, Roughness] | None = None
+
+    @property
+    def words(self) -> str:
+        """Why it did not change."""
+        told = "" if self.reason is None else self.reason.value
+        return f"{told}: {self.said}" if told and self.said else told or self.said
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -11,8 +11,8 @@ import numpy as np
 from mracad.bspline.net import Net, cross
 from mracad.edit.target import Sheet, stiffness
 from mracad.inspect.cells import quadrature
-from mracad.inspect.roughness import Change, Growth, Worse, worse
-from mracad.inspect.survey import Survey, changes, surveys
+from mracad.inspect.roughness import Change, Growth, Worse, better, worse
+from mracad.inspect.survey import POINTS, Survey, changes, surveys
 from mracad.model import Face, Model
 from mracad.seam.conditions import doubled, matched
 from mracad.seam.conditions import rows as seam_rows
@@ -31,6 +31,12 @@ BISECTIONS = 5
 
 GROWTH = Growth(0.005, 0.005, 0.005, 0.02, 30.0)
 """What the judge lets pass by default: a quarter of the 2 % that count as worse where faces are compared."""
+
+CLOSER = 9
+"""Points a span at which a result is looked at again."""
+
+GAIN = 0.005
+"""Least share of its bending or curvature variation that a face must lose to be touched at all."""
 
 TIGHT = 0.3
 """Share of what a contact may be off at which its conditions aim."""
@@ -164,7 +170,8 @@ class Trial:
         if contacts:
             soft, pull = weight * self.contacts.form(tight), weight * self.contacts.pull(self.wanted, tight)
         self.problem = Problem(spaces, rows, _mended(rows, f, mended), soft, pull)
-        self.watch = Watch.of([(s.net, members[i].faces) for i, s in spaces.items()])
+        self.faces = [members[i].faces for i in spaces]
+        self.watch = Watch.of([(s.net, faces) for s, faces in zip(spaces.values(), self.faces, strict=True)])
 
     def nothing(self) -> Verdict:
         """What the judge makes of leaving everything as it is."""
@@ -182,6 +189,9 @@ class Trial:
         parts = list(problem.split(delta).values())
         ceiling = self._ceilings(delta)
         amounts, found, limits = _amounts(self.watch, list(problem.spaces.values()), parts, ceiling, self.tolerances)
+        for i, faces in enumerate(found):
+            if not any(better(change, GAIN) for change in faces.values()):
+                amounts[i], found[i] = 0.0, {face: change.undone() for face, change in faces.items()}
         gains = problem.gains(delta, target, amounts)
         gain = sum(problem.gains(delta, target, [min(amounts)] * len(parts)))
         return Verdict(parts, amounts, found, limits, gains, gain)
@@ -190,6 +200,20 @@ class Trial:
         """For each surface another verdict on it, by place, made to meet as smoothly as can be."""
         wanted = np.concatenate([each.amounts[i] * each.parts[i].reshape(-1, 3) for each, i in chosen])
         return self.judged(self.problem.nearest(wanted, stiffness(self.width)), target)
+
+    def confirmed(self, verdict: Verdict) -> Verdict:
+        """The verdict as a closer look leaves it: what grows between the points of the first is taken back."""
+        spaces, moving = list(self.problem.spaces.values()), np.array(verdict.amounts)
+        watch = Watch.of([(space.net, faces) for space, faces in zip(spaces, self.faces, strict=True)], CLOSER)
+        amounts, found, limits = _amounts(watch, spaces, verdict.parts, moving, self.tolerances)
+        why = [new or old for new, old in zip(limits, verdict.limits, strict=True)]
+        return replace(verdict, amounts=amounts, changes=found, limits=why)
+
+    def fairer(self, delta: Array) -> list[bool]:
+        """Whether a displacement would take anything off the roughness of each surface, whatever it adds to others."""
+        both = zip(self.problem.spaces.values(), self.problem.split(delta).values(), strict=True)
+        found = self.watch.changes({i: displaced(space.net, part) for i, (space, part) in enumerate(both)})
+        return [any(better(change, GAIN) for change in faces.values()) for faces in found.values()]
 
     def _ceilings(self, delta: Array) -> Array:
         """How much of a displacement contacts allow each surface."""
@@ -266,11 +290,11 @@ class Watch:
     owners: Sequence[tuple[int, int]]
 
     @classmethod
-    def of(cls, surfaces: Sequence[tuple[Net, Sequence[Face]]]) -> Watch:
-        """Look at faces of surfaces before an edit."""
+    def of(cls, surfaces: Sequence[tuple[Net, Sequence[Face]]], points: int = POINTS) -> Watch:
+        """Look at faces of surfaces before an edit, at so many points a span."""
         every = [(place, net, face) for place, (net, faces) in enumerate(surfaces) for face in faces]
         return cls(
-            surveys([(net, (face,), net.u, net.v) for _, net, face in every]),
+            surveys([(net, (face,), net.u, net.v) for _, net, face in every], points),
             [(place, face.index) for place, _, face in every],
         )
 

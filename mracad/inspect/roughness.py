@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
-from math import sqrt
 
 
 class Rougher(Enum):
@@ -71,6 +70,10 @@ class Change:
     deviation: float = 0.0
     motion: float = 0.0
 
+    def undone(self) -> Change:
+        """Nothing done instead."""
+        return Change(self.before, self.before, self.noise)
+
 
 @dataclass(frozen=True)
 class Growth:
@@ -103,18 +106,12 @@ class Worse:
 
 
 def worse(change: Change, allowed: Growth) -> tuple[Worse, ...]:
-    """In what a change made faces rougher than allowed, in the order of :class:`Rougher`.
-
-    Notes
-    -----
-    √bending and √variation are norms of the second fundamental form and of its derivative, so that a ripple of norm n
-    on a face of norm b gives at most b + n: what is within that may be noise, however small b is.
-    """
+    """In what a change made faces rougher than allowed, in the order of :class:`Rougher`."""
     before, after, noise = change.before, change.after, change.noise
     found = []
     for what, share in ((Rougher.BENDING, allowed.bending), (Rougher.VARIATION, allowed.variation)):
         old, new, ripple = (float(getattr(each, what.name.lower())) for each in (before, after, noise))
-        if sqrt(new) > sqrt(old * (1 + share)) + sqrt(ripple):
+        if new > old * (1 + share) + ripple:
             found.append(Worse(what, old, new))
     if after.curvature > before.curvature * (1 + allowed.curvature) + noise.curvature:
         found.append(Worse(Rougher.CURVATURE, before.curvature, after.curvature))
@@ -123,3 +120,10 @@ def worse(change: Change, allowed: Growth) -> tuple[Worse, ...]:
     if change.turn > allowed.fold:
         found.append(Worse(Rougher.FOLD, 0.0, change.turn))
     return tuple(found)
+
+
+def better(change: Change, share: float) -> bool:
+    """Whether a change took more than a share of the bending or of the curvature variation."""
+    both = (change.before.bending, change.after.bending), (change.before.variation, change.after.variation)
+    noise = change.noise.bending, change.noise.variation
+    return any(old - new > share * old + ripple for (old, new), ripple in zip(both, noise, strict=True))

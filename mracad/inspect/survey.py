@@ -21,8 +21,8 @@ Array = np.ndarray
 POINTS, FEWEST = 5, 24
 """Points a span, its ends among them, and at least along a face, in either direction: curvature peaks at knots."""
 
-RIPPLE = 1e-7
-"""Amplitude, mm, of a ripple one mean span long that counts for nothing: the kernel takes such points for one."""
+RIPPLE = 1e-8
+"""Amplitude, mm, of a ripple one mean span long that counts for nothing: a tenth of a point of the kernel."""
 
 ROUNDING = 16 * float(np.finfo(float).eps)
 """Error of a point of a surface, relative to its largest coordinate: a ripple as long as the span where it lies."""

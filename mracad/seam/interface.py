@@ -25,6 +25,9 @@ Array = np.ndarray
 RIM_POINTS = 65
 """Points of a boundary curve from which distances are taken."""
 
+POLE = 2
+"""Derivatives that are kept at a pole, where a side of a surface is one point: any motion there makes a cone of it."""
+
 END = 1e-9
 """Fraction of the domain within which a parameter line is its end."""
 
@@ -132,7 +135,7 @@ def rims(
             edge = model.edges[trim.edge]
             if edge.index in moving:
                 continue
-            order = joined.orders.get(edge.index, 0)
+            order = POLE if edge.degenerate else joined.orders.get(edge.index, 0)
             found = end(net, trim)
             if found is not None:
                 held |= _rows(net, trim, *found, order)
