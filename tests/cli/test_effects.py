@@ -150,9 +150,9 @@ OWN = {
     "move clip": ("--clip", "--to 19.8,5,0"),
     "transfer clip": ("--clip", "--to 0.3,5,0"),
     "move to": ("--to 15,4,0",),
-    "move keep": ("--keep g2", "--to 19.4,5,0 --clip"),
-    "repeat keep": ("--keep g2", "--at 19.4,5,0 --clip"),
-    "transfer keep": ("--keep g2", "--to 0.6,5,0 --clip"),
+    "move keep": ("--keep g2", "IN tangent.step --to 9.4,5,0 --clip --faces #1"),
+    "repeat keep": ("--keep g2", "IN tangent.step --at 9.4,5,0 --clip --faces #1"),
+    "transfer keep": ("--keep g2", "IN tangent.step --to 9.4,5,0 --clip --faces #1"),
     "repeat polar": ("--polar 2,8,5,0,0,0,1",),
 }
 
@@ -175,6 +175,10 @@ def folder(small, tmp_path_factory):
     mracad.write(bare, place / "gaping.step")
     flat = shapes.document(shapes.compound(*(shapes.face_on(shapes.bspline(0.0 * p + [1, 1, 0] * p)) for p in near)))
     mracad.write(flat, place / "flat.step")
+    one, two = (net - [0, 0, z] for net, z in zip(near, (0, 4e-4), strict=True))
+    two[0], two[1] = one[-1], 2 * one[-1] - one[-2]
+    sewn = shapes.sewn(*(shapes.face_on(shapes.bspline(poles)) for poles in (one, two)))
+    mracad.write(shapes.document(sewn), place / "tangent.step")
     text = (place / "sheet.step").read_bytes()
     (place / "latin.step").write_bytes(text.replace(b"'part'", b"'t\xe9t\xe9'"))
     for name in ("sheet", "slab"):
