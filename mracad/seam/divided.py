@@ -14,15 +14,17 @@ from typing import Any
 
 import numpy as np
 
-from mracad.seam.constrained import LEAST, PASSES
+from mracad.seam.constrained import LEAST
 from mracad.seam.factor import Definite
 
 Array = np.ndarray
 
-LEFT = 1e-6
+LEFT = 1e-5
 """Share of what the first strips had to make good that may be left to them."""
 
 SWEEPS = 20
+
+PASSES = 2
 
 PENALTY = 1e7
 """Weight of conditions against a form whose diagonal is one; each pass divides what they lack by about as much."""
@@ -107,8 +109,8 @@ class _Colour:
     ----------
     points : ndarray (q,) of int
         One strip after another, in the points about strips.
-    form : csr_array (q, points about strips)
-        With the penalties of conditions.
+    outside : csr_array (q, points about strips)
+        What the form and the penalties of conditions make of them outside of their strips.
     rows : csr_array (conditions, q)
     ends : ndarray of int
         Where strips begin.
@@ -117,7 +119,7 @@ class _Colour:
     """
 
     points: Array
-    form: Any
+    outside: Any
     rows: Any
     ends: Array
     factors: Sequence[Definite]
@@ -159,7 +161,7 @@ class Divided:
         joined: dict[tuple[int, int], Array],
         strips: Sequence[Array],
     ) -> None:
-        from scipy.sparse import diags_array
+        from scipy.sparse import csr_array, diags_array
 
         self.size = len(free)
         diagonal = diagonal if soft is None else diagonal + soft.diagonal()
@@ -180,8 +182,9 @@ class Divided:
             own = slice(begin, end)
             scale = self.scale[own]
             form = (form if soft is None else form + soft[own, own]).tocsr()
-            form.data = form.data * np.repeat(scale, np.diff(form.indptr)) * scale[form.indices]
-            form.setdiag(form.diagonal() + LEAST)
+            row = np.repeat(np.arange(end - begin), np.diff(form.indptr))
+            data = form.data * scale[row] * scale[form.indices] + LEAST * (row == form.indices)
+            form = csr_array((data, form.indices, form.indptr), shape=form.shape)
             inside = np.flatnonzero(free[own] & ~tied[own])
             self.insides.append((begin + inside, Definite(_part(form, inside))))
             near_by.append(_widened(form[np.flatnonzero(near[own])], own, self.size))
@@ -193,6 +196,7 @@ class Divided:
         from scipy.sparse import csr_array, vstack
 
         form = vstack(parts, format="csr")
+        parts.clear()
         if apart is not None:
             form = (form + apart.tocsr()[near]).tocsr()
         reached = np.zeros(self.size, bool)
@@ -217,7 +221,10 @@ class Divided:
                 Definite(_part(part[begin:end], place[strips[i]], slice(None)))
                 for i, begin, end in zip(members, ends[:-1], ends[1:], strict=True)
             ]
-            self.colours.append(_Colour(place[points], part, own, ends, factors))
+            strip = np.full(len(self.about), -1, np.int32)
+            strip[place[points]] = whose = np.repeat(np.arange(len(members), dtype=np.int32), np.diff(ends))
+            outside = _taken(part, strip[part.indices] != np.repeat(whose, np.diff(part.indptr)))
+            self.colours.append(_Colour(place[points], outside, own, ends, factors))
 
     def __call__(
         self, right: Array, start: Array | None = None, goal: Array | None = None, exactly: bool = True
@@ -230,18 +237,15 @@ class Divided:
             owed -= self.rows @ self._scaled(start)
         found = np.zeros_like(b)
         if owed.any():
-            found, taken = self._met(owed)
-            b = b - taken
+            found = self._met(owed, b)
         found += self._within(b)
         if exactly and len(owed):
-            found += self._met(owed - self.rows @ found)[0]
+            found += self._met(owed - self.rows @ found)
         return self.scale[:, None] * found
 
     def settled(self, x: Array) -> Array:
         """What is near to x, ``(n, k)``, with L x = 0."""
-        if not len(self.there):
-            return x
-        return x + self.scale[:, None] * self._met(-(self.rows @ self._scaled(x)))[0]
+        return x + self.scale[:, None] * self._met(-(self.rows @ self._scaled(x))) if len(self.there) else x
 
     def _scaled(self, x: Array) -> Array:
         return x / np.where(self.scale > 0, self.scale, np.inf)[:, None]
@@ -252,11 +256,12 @@ class Divided:
         left = np.zeros((len(self.about), right.shape[1]))
         left[self.at] = right[self.tied] - self.tied_form @ found
         first = np.linalg.norm(left)
-        for _ in range(SWEEPS):
+        for sweep in range(SWEEPS):
             step = np.zeros_like(left)
-            for colour in (*self.colours, *self.colours[-2::-1]):
+            for colour in self.colours[:: 1 - 2 * (sweep % 2)]:
                 moved = colour(left[colour.points])
-                left -= colour.form.T @ moved
+                left[colour.points] = 0.0
+                left -= colour.outside.T @ moved
                 step[colour.points] += moved
             found[self.about] += step
             rest = np.zeros_like(found)
@@ -276,21 +281,19 @@ class Divided:
             found[points] = factor(right[points])
         return found
 
-    def _met(self, owed: Array) -> tuple[Array, Array]:
-        """A displacement that meets conditions, and what the form makes of it."""
-        found, taken = np.zeros((2, len(self.about), owed.shape[1]))
+    def _met(self, owed: Array, right: Array | None = None) -> Array:
+        """A displacement that meets conditions; what the form makes of it is taken from a right-hand side."""
+        found = np.zeros((self.size, owed.shape[1]))
         for _ in range(PASSES):
             for colour in self.colours:
-                moved = colour(PENALTY * (colour.rows.T @ owed))
+                pull = PENALTY * (colour.rows.T @ owed)
+                moved = colour(pull)
                 met = colour.rows @ moved
                 owed = owed - met
-                found[colour.points] += moved
-                taken += colour.form.T @ moved - PENALTY * (self.conditions.T @ met)
-        return self._over_all(found), self._over_all(taken)
-
-    def _over_all(self, values: Array) -> Array:
-        found = np.zeros((self.size, values.shape[1]))
-        found[self.about] = values
+                found[self.about[colour.points]] += moved
+                if right is not None:
+                    right[self.about[colour.points]] -= pull
+                    right[self.about] -= colour.outside.T @ moved - PENALTY * (self.conditions.T @ met)
         return found
 
 
@@ -301,17 +304,23 @@ def _part(form: Any, columns: Array, rows: Array | slice | None = None) -> Any:
     form = form[columns if rows is None else rows]
     place = np.full(form.shape[1], -1, np.int32)
     place[columns] = np.arange(len(columns))
-    at = place[form.indices]
-    taken = at >= 0
-    ends = np.append(0, np.cumsum(taken))[form.indptr]
-    return csr_array((form.data[taken], at[taken], ends), shape=(form.shape[0], len(columns)))
+    form = csr_array((form.data, place[form.indices], form.indptr), shape=(form.shape[0], len(columns)))
+    return _taken(form, form.indices >= 0)
+
+
+def _taken(form: Any, which: Array) -> Any:
+    """Some of the entries of a matrix."""
+    from scipy.sparse import csr_array
+
+    ends = np.append(0, np.cumsum(which))[form.indptr].astype(np.int32)
+    return csr_array((form.data[which], form.indices[which], ends), shape=form.shape)
 
 
 def _widened(form: Any, own: slice, size: int) -> Any:
     """Rows over the points of one surface as rows over those of all."""
     from scipy.sparse import csr_array
 
-    return csr_array((form.data, form.indices + own.start, form.indptr), shape=(form.shape[0], size))
+    return csr_array((form.data, form.indices + np.int32(own.start), form.indptr), shape=(form.shape[0], size))
 
 
 def _apart(form: Any, layout: Layout) -> Any:

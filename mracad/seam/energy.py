@@ -78,11 +78,9 @@ def forms(net: Net, metric: Net, quadrature: Quadrature, creases: Sequence[Colle
     bend = {(a, b): _dot(frame[i], frame[j]) for i, a in enumerate(orders) for j, b in enumerate(orders[: i + 1])}
     periodic, scale = (net.u.periodic, net.v.periodic), net.weights
     smooth, sharp = _kinks(net, metric, quadrature, creases)
-    return Forms(
-        _sparse(integrals(along, {(ORDERS[0], ORDERS[0]): mass}), periodic, scale),
-        _sparse(integrals(along, bend), periodic, scale) + smooth,
-        sharp,
-    )
+    area = _sparse(integrals(along, {(ORDERS[0], ORDERS[0]): mass}), periodic, scale)
+    bending = _sparse(integrals(along, bend), periodic, scale)
+    return Forms(area, bending + smooth if smooth.nnz else _on_pattern(bending, area), sharp)
 
 
 def _kinks(net: Net, metric: Net, quadrature: Quadrature, creases: Sequence[Collection[float]]) -> tuple[Any, Any]:
@@ -207,6 +205,14 @@ def _dot(a: Array, b: Array) -> Array:
     return np.asarray(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
 
 
+def _on_pattern(form: Any, like: Any) -> Any:
+    """A matrix whose pattern is kept once where it is that of another."""
+    from scipy.sparse import csr_array
+
+    same = np.array_equal(form.indptr, like.indptr) and np.array_equal(form.indices, like.indices)
+    return csr_array((form.data, like.indices, like.indptr), shape=form.shape) if same else form
+
+
 def _sparse(form: Array, periodic: tuple[bool, bool], scale: Array | None) -> Any:
     """A stencil as ``scipy.sparse.csr_array`` on the control points in row-major order, scaled from both sides."""
     from scipy.sparse import csr_array
@@ -219,7 +225,7 @@ def _sparse(form: Array, periodic: tuple[bool, bool], scale: Array | None) -> An
     if scale is not None:
         form = form * scale[:, :, None, None] * scale.ravel()[at]
     there = form != 0
-    ends = np.append(0, np.count_nonzero(there.reshape(nu * nv, -1), axis=1).cumsum())
+    ends = np.append(0, np.count_nonzero(there.reshape(nu * nv, -1), axis=1).cumsum()).astype(np.int32)
     found = csr_array((form[there], at[there], ends), shape=(nu * nv, nu * nv))
     if any(periodic):
         found.sum_duplicates()

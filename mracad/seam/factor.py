@@ -45,9 +45,13 @@ class Definite:
             return right
         if self._band is None:
             return self._other(right)
-        found = np.empty_like(right)
-        found[self._order] = dpbtrs(self._band, np.asfortranarray(right[self._order]), lower=1, overwrite_b=1)[0]
-        return found
+        ordered = right if self._order is None else right[self._order]
+        found = dpbtrs(self._band, np.array(ordered, order="F"), lower=1, overwrite_b=1)[0]
+        if self._order is None:
+            return np.ascontiguousarray(found)
+        whole = np.empty_like(right)
+        whole[self._order] = found
+        return whole
 
 
 def nested(matrix: Any) -> Callable[[Array], Array]:
@@ -58,27 +62,31 @@ def nested(matrix: Any) -> Callable[[Array], Array]:
     return lambda right: np.asarray(factor.solve(right))
 
 
-def _ordered(matrix: Any) -> tuple[Array, int]:
-    """The order of the unknowns in which a band is narrower, as they come or by Cuthill and McKee, and its width."""
+def _ordered(matrix: Any) -> tuple[Array | None, int]:
+    """The order of the unknowns in which a band is narrower, as they come (None) or by Cuthill and McKee; its width."""
     from scipy.sparse.csgraph import reverse_cuthill_mckee
 
-    n = matrix.shape[0]
-    row = np.repeat(np.arange(n), np.diff(matrix.indptr))
-    found = []
-    for order in (np.arange(n), reverse_cuthill_mckee(matrix, symmetric_mode=True)):
-        place = np.empty(n, int)
-        place[order] = np.arange(n)
-        found.append((int(np.abs(place[row] - place[matrix.indices]).max(initial=0)), order))
-    width, order = min(found, key=lambda each: each[0])
-    return order, width
+    row = np.repeat(np.arange(matrix.shape[0]), np.diff(matrix.indptr))
+    width = int(np.abs(row - matrix.indices).max(initial=0))
+    order = reverse_cuthill_mckee(matrix, symmetric_mode=True)
+    place = _places(order)
+    other = int(np.abs(place[row] - place[matrix.indices]).max(initial=0))
+    return (order, other) if other < width else (None, width)
 
 
-def _band(matrix: Any, order: Array, width: int) -> Array:
+def _places(order: Array) -> Array:
+    place = np.empty(len(order), int)
+    place[order] = np.arange(len(order))
+    return place
+
+
+def _band(matrix: Any, order: Array | None, width: int) -> Array:
     """The lower half of a matrix in an order as LAPACK stores bands, ``(width + 1, n)``."""
     n = matrix.shape[0]
-    place = np.empty(n, int)
-    place[order] = np.arange(n)
-    row, column = place[np.repeat(np.arange(n), np.diff(matrix.indptr))], place[matrix.indices]
+    row, column = np.repeat(np.arange(n), np.diff(matrix.indptr)), matrix.indices
+    if order is not None:
+        place = _places(order)
+        row, column = place[row], place[column]
     lower = row >= column
     band = np.zeros((n, width + 1))
     band[column[lower], (row - column)[lower]] = matrix.data[lower]

@@ -255,8 +255,14 @@ class Problem:
 
 def _sum(forms: Forms, stiffness: float) -> Any:
     """M + stiffness · K."""
-    found = forms.mass + stiffness * forms.bending if stiffness else forms.mass
-    return found + stiffness * forms.creases if stiffness and forms.creases.nnz else found
+    from scipy.sparse import csr_array
+
+    mass, bending = forms.mass, forms.bending
+    if not stiffness:
+        return mass
+    if bending.indices is mass.indices and not forms.creases.nnz:
+        return csr_array((mass.data + stiffness * bending.data, mass.indices, mass.indptr), shape=mass.shape)
+    return mass + stiffness * (bending + forms.creases)
 
 
 def _chebyshev(power: Callable[[Array], Array], first: Array) -> Array:
