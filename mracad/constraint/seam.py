@@ -154,6 +154,8 @@ class Joint:
         Largest part of T_n within the tangent plane that a S_n + b S_t misses, relative.
     close, fit : bool
         Whether the gap and the tilt of the input are to be pulled shut instead of carried.
+    smoother : Joint or None
+        What there is of second order, where only the first is kept.
     """
 
     order: int
@@ -164,6 +166,7 @@ class Joint:
     missed: float = 0.0
     close: bool = False
     fit: bool = False
+    smoother: Joint | None = None
 
     @property
     def varying(self) -> bool:
@@ -174,7 +177,8 @@ class Joint:
         """The same between two fractions of the edge, of which it is then the whole."""
         size = high - low
         across, along = (_composed(law, low, size) for law in (self.across, self.along))
-        return replace(self, across=across, along=along / size, shear=self.shear / size)
+        smoother = self.smoother and self.smoother.part(low, high)
+        return replace(self, across=across, along=along / size, shear=self.shear / size, smoother=smoother)
 
 
 @dataclass(frozen=True, eq=False)
@@ -486,7 +490,8 @@ def _joint(
             missed = float((np.linalg.norm(off, axis=1) / size).max())
             if missed <= limit:
                 joint = Joint(1, p, q, missed=missed, close=close, fit=fit)
-                return joint if order == 1 else _bent(joint, sn, st, snn, tnn)
+                bent = _bent(joint, sn, st, snn, tnn)
+                return bent if order == 2 or bent is joint else replace(joint, smoother=bent)
     return Joint(0, np.ones(1), np.empty(0), close=close)
 
 

@@ -2,7 +2,8 @@
 
 On one surface, level j is the L2 projection on the splines over the knots that j rungs leave, as in the wavelet
 transform.  A level of patches that seams join is a level of the surface that they make: with P the refinement from
-coarse spaces whose ladders the patches share (:mod:`mracad.seam.ladders`) and L the conditions of their seams,
+coarse spaces whose ladders the patches share (:mod:`mracad.seam.ladders`) and L the conditions of their seams, as
+smooth as these are,
 
     y = argmin ‖P y − f‖_G   subject to   L (P y − f) = r,      δ = P y − f,
 
@@ -15,7 +16,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -70,6 +71,7 @@ class Level:
             {i: sheet.creases for i, sheet in sheets.items()},
             joined.exact,
         )
+        smooth = [replace(seam, joint=seam.joint.smoother or seam.joint) for seam in joined.exact]
         total = np.zeros_like(problem.f)
         for weight, level in self._steps():
             if level:
@@ -77,7 +79,7 @@ class Level:
                     i: (found[i, 0].coarse((i, 0), level, s.net.u), found[i, 1].coarse((i, 1), level, s.net.v))
                     for i, s in problem.spaces.items()
                 }
-                total += weight * projected(problem, coarse, joined.exact)
+                total += weight * projected(problem, coarse, smooth)
         return total
 
     def ways(self, problem: Problem, target: Array, width: float) -> Iterable[Iterable[Array]]:

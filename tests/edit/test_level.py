@@ -142,17 +142,17 @@ def figures(shape, keep, change=lambda patches: patches):
     return coupled / unsplit
 
 
-@pytest.mark.parametrize(
-    ("shape", "keep", "most"), [((2, 3), "g1", 1.14), ((2, 3), "g2", 1.02), ((4, 4), "g1", 1.14), ((4, 4), "g2", 1.02)]
-)
-def test_a_level_of_patches_is_a_level_of_the_surface_they_make(shape, keep, most):
-    assert figures(shape, keep) <= most
+@pytest.mark.parametrize("shape", [(2, 3), (4, 4)])
+@pytest.mark.parametrize("keep", ["g1", "g2"])
+def test_a_level_of_patches_is_a_level_of_the_surface_they_make(shape, keep):
+    """Also where less is kept of seams than they have."""
+    assert figures(shape, keep) <= 1.02
 
 
 @pytest.mark.parametrize("change", [other_senses, other_degrees])
-@pytest.mark.parametrize(("keep", "most"), [("g1", 1.14), ("g2", 1.02)])
-def test_patches_that_differ_come_as_close(change, keep, most):
-    assert figures((2, 3), keep, change) <= most
+@pytest.mark.parametrize("keep", ["g1", "g2"])
+def test_patches_that_differ_come_as_close(change, keep):
+    assert figures((2, 3), keep, change) <= 1.02
 
 
 def test_a_joint_of_varying_ratio_does_not_lock():
