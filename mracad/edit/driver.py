@@ -16,8 +16,9 @@ import numpy as np
 from mracad.bspline.net import Net
 from mracad.constraint.seam import Seam
 from mracad.constraint.trimmed import TrimmedSeam
+from mracad.edit.pose import Scene
 from mracad.edit.target import Sheet, Wish
-from mracad.edit.trial import ENOUGH, Scene, Trial, Verdict, Watch, displaced
+from mracad.edit.trial import ENOUGH, Trial, Verdict, Watch, displaced
 from mracad.inspect.roughness import Change, Worse
 from mracad.model import Displacement, Offset
 from mracad.seam.interface import Joints
@@ -203,7 +204,9 @@ def _attempt(scene: Scene, wish: Wish, members: Mapping[int, Sheet], joined: Joi
         if sum(each.gains[i] for each, i in chosen) <= PROMISE * best.gain:
             break
         found.append(trial.blended(chosen, target))
-        best = max(found, key=_worth)
+        if found[-1].worth <= best.worth:
+            break
+        best = found[-1]
     best = trial.confirmed(max([*found, trial.nothing()], key=_worth))
     fairer = [True] * len(members) if best.least else trial.fairer(target)
     wished = float((target * (trial.problem.mass @ target)).sum())

@@ -19,8 +19,8 @@ import numpy as np
 from mracad.bspline.net import Net
 from mracad.constraint.seam import Wishes
 from mracad.edit.driver import Result, drive
+from mracad.edit.pose import Scene, Tolerances
 from mracad.edit.target import Sheet, Wish, sheets, stiffness
-from mracad.edit.trial import Scene, Tolerances
 from mracad.model import Model
 from mracad.seam.interface import Joints, joints
 from mracad.seam.ladders import Creases

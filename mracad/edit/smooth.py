@@ -10,9 +10,9 @@ from mracad.constraint.seam import HELD, Treatment, Wishes
 from mracad.edit.driver import Moved, Result
 from mracad.edit.fair import Filter, faired
 from mracad.edit.level import Level
+from mracad.edit.pose import Tolerances
 from mracad.edit.result import Edit, FaceOutcome, Reason, Status
 from mracad.edit.target import Wish
-from mracad.edit.trial import Tolerances
 from mracad.inspect.roughness import Worse
 from mracad.model import Face, Model
 from mracad.options import Smooth, length

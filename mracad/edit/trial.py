@@ -4,24 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
 from mracad.bspline.net import Net, cross
+from mracad.edit.pose import Scene, Tolerances, pose
 from mracad.edit.target import Sheet, stiffness
-from mracad.inspect.cells import quadrature
-from mracad.inspect.roughness import Change, Growth, Worse, better, worse
+from mracad.inspect.roughness import Change, Worse, better, worse
 from mracad.inspect.survey import POINTS, Survey, changes, surveys
-from mracad.model import Face, Model
-from mracad.seam.conditions import doubled, matched
-from mracad.seam.conditions import rows as seam_rows
-from mracad.seam.contact import rows as contact_rows
-from mracad.seam.energy import forms
-from mracad.seam.interface import Joints, away, contact, rims
-from mracad.seam.metric import seen
-from mracad.seam.solve import Problem, Space
-from mracad.seam.space import refined
+from mracad.model import Face
+from mracad.seam.interface import Joints
+from mracad.seam.solve import Space
 from mracad.wavelet.ladder import arc_lengths
 
 Array = np.ndarray
@@ -29,18 +22,11 @@ Array = np.ndarray
 BISECTIONS = 5
 """Steps in which the amount is found."""
 
-GROWTH = Growth(0.005, 0.005, 0.005, 0.02, 30.0)
-"""What the judge lets pass by default: a quarter of the 2 % that count as worse where faces are compared."""
-
 CLOSER = 9
 """Points a span at which a result is looked at again."""
 
 GAIN = 0.005
 """Least share of its bending or curvature variation that a face must lose to be touched at all."""
-
-TIGHT = 0.3
-"""Share of what a contact may be off at which its conditions aim."""
-
 
 ENOUGH = 0.9
 """Where more than this of a displacement may be done, no other is tried."""
@@ -51,51 +37,6 @@ leaves something of every wave everywhere."""
 
 FINER = 3
 """Steps from one Greville point to the next in which deviations are looked for."""
-
-
-@dataclass(frozen=True)
-class Tolerances:
-    """What a result may be worse in.
-
-    Attributes
-    ----------
-    gap : float
-        Of a contact, mm.
-    angle, bend : float
-        By which the angle (radians) and the curvature (over the wavelength of the edit) along a contact may grow.
-    growth : Growth
-        Of roughness.
-    deviation : float
-        Largest deviation along the normal, mm.
-    """
-
-    gap: float
-    angle: float = 1.4e-4
-    bend: float = 1e-3
-    growth: Growth = GROWTH
-    deviation: float = np.inf
-
-
-@dataclass(frozen=True, eq=False)
-class Scene:
-    """What an edit works on.
-
-    Attributes
-    ----------
-    model : Model
-    sheets : mapping of int to Sheet
-        The surfaces that it may move.
-    joints : Joints
-    tolerances : Tolerances
-    refine : bool
-        Whether control points may be added beside rims.
-    """
-
-    model: Model
-    sheets: Mapping[int, Sheet]
-    joints: Joints
-    tolerances: Tolerances
-    refine: bool = True
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,36 +83,12 @@ class Trial:
     def __init__(self, scene: Scene, members: Mapping[int, Sheet], joined: Joints) -> None:
         self.tolerances = scene.tolerances
         self.width = max(sheet.wavelength for sheet in members.values())
-        movable = {face for sheet in members.values() for face in sheet.movable}
-        nets = {i: _space(scene, sheet, joined.moving) for i, sheet in members.items()}
-        nets = matched(doubled(matched(nets, joined.exact), joined.exact), joined.exact)
-        spaces, contacts = {}, [contact(seam) for seam in joined.loose]
-        for i, net in nets.items():
-            sheet = members[i]
-            form = forms(net, sheet.metric, quadrature(net, sheet.faces), sheet.creases)
-            points = seen(net, form)
-            held, more = rims(scene.model, net, sheet.all_faces, movable, joined)
-            contacts += more
-            far = away(scene.model, net, sheet.faces, joined.moving)
-            trend = sheet.trend.over(net.u, net.v).poles
-            spaces[i] = Space(net, form, points & ~held, points, trend, far)
-        t = self.tolerances
-        self.limits = t.gap, t.angle, t.bend / self.width
-        self.contacts = contact_rows(nets, contacts)
-        self.owners = [each.surfaces for each in contacts]
-        f = np.concatenate([net.poles.reshape(-1, 3) for net in nets.values()])
-        closing = np.array([(each.close, each.fit, False) for each in contacts]).reshape(-1, 3)
-        closed = closing[self.contacts.owner, self.contacts.order]
-        self.wanted = _mended(self.contacts.matrix, f, closed)
-        rows, mended = seam_rows(nets, joined.exact, everywhere=True)
-        weight = max(sheet.detail for sheet in members.values()) ** 2 * self.width
-        tight = [TIGHT * limit for limit in self.limits]
-        soft = pull = None
-        if contacts:
-            soft, pull = weight * self.contacts.form(tight), weight * self.contacts.pull(self.wanted, tight)
-        self.problem = Problem(spaces, rows, _mended(rows, f, mended), soft, pull)
-        self.faces = [members[i].faces for i in spaces]
-        self.watch = Watch.of([(s.net, faces) for s, faces in zip(spaces.values(), self.faces, strict=True)])
+        self.pose = pose(scene, members, joined, self.width, max(sheet.detail for sheet in members.values()))
+        self.problem = self.pose.problem
+        self.faces = [members[i].faces for i in self.problem.spaces]
+        self.watch = Watch.of(
+            [(s.net, faces) for s, faces in zip(self.problem.spaces.values(), self.faces, strict=True)]
+        )
 
     def nothing(self) -> Verdict:
         """What the judge makes of leaving everything as it is."""
@@ -218,23 +135,11 @@ class Trial:
     def _ceilings(self, delta: Array) -> Array:
         """How much of a displacement contacts allow each surface."""
         ceiling = dict.fromkeys(self.problem.spaces, 1.0)
-        for surfaces, off in zip(self.owners, self.contacts.off(delta, self.wanted, self.limits), strict=True):
+        room = self.pose.contacts.room(delta, self.pose.opened, self.pose.limits)
+        for surfaces, most in zip(self.pose.owners, room, strict=True):
             for i in surfaces & ceiling.keys():
-                ceiling[i] = min(ceiling[i], 1.0 / max(off, 1.0))
+                ceiling[i] = min(ceiling[i], most)
         return np.array(list(ceiling.values()))
-
-
-def _mended(rows: Any, f: Array, which: Array) -> Array:
-    """What conditions ask of a displacement, ``(conditions, 3)``: some that it mend what the input lacks."""
-    return np.where(which[:, None], -(rows @ (f - f.mean(axis=0))), 0.0)
-
-
-def _space(scene: Scene, sheet: Sheet, moving: frozenset[int]) -> Net:
-    """The surface with control points enough beside its rims."""
-    if not scene.refine:
-        return sheet.net
-    held = [(face, trim) for face in sheet.faces for trim in face.trims if trim.edge not in moving]
-    return refined(sheet.net, held, sheet.wavelength / 4)
 
 
 def bounded(net: Net, offset: Array, bound: float, width: float) -> Array:

@@ -131,9 +131,9 @@ def _problem(
     if not contacts:
         return Problem(spaces, rows, -(rows @ laid))
     soft = contact_rows(nets, contacts)
-    weight, tolerances = softness.weight, softness.tolerances
-    pull = weight * soft.pull(-(soft.matrix @ laid), tolerances)
-    return Problem(spaces, rows, -(rows @ laid), weight * soft.form(tolerances), pull)
+    weight, limits = softness.weight, np.asarray(softness.tolerances)[soft.order]
+    pull = weight * soft.pull(-(soft.matrix @ laid), limits)
+    return Problem(spaces, rows, -(rows @ laid), weight * soft.form(limits), pull)
 
 
 def _contacts(crossings: Sequence[Crossing]) -> list[Contact]:

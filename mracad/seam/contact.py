@@ -6,7 +6,8 @@ points of every piece between knot lines of either side,
     G0   δ_b = δ_a,      G1   D_c δ_b = D_c δ_a,      G2   D_c² δ_b + D_z δ_b = D_c² δ_a
 
 (δ_b = 0 at a rim; directions as in :mod:`mracad.constraint.trimmed`), weighted with the inverse square of what each may
-be off: where the net can, it does, and where it cannot δ gives way.
+lack: where the net can, it does, and where it cannot δ gives way.  What two noisy sides lack already is their noise:
+conditions are drawn towards surfaces that meet, the more gently the more they lacked.
 """
 
 from __future__ import annotations
@@ -80,24 +81,37 @@ class Rows:
     width: Array
     owner: Array
 
-    def form(self, tolerances: Sequence[float]) -> Any:
-        """``Cᵀ W C``, ``(points, points)``, W the widths over the squared tolerances of each order."""
-        scaled = self.matrix.multiply(np.sqrt(self._weights(tolerances))[:, None]).tocsr()
+    def limits(self, opened: Array, tolerances: Sequence[float]) -> Array:
+        """How far contacts may be open, ``(conditions,)``.
+
+        Parameters
+        ----------
+        opened : ndarray (conditions, 3)
+            How far they were: positions may be so at every place, slopes and curvatures as at their worst.
+        tolerances : sequence of float
+            By how much more, in each order.
+        """
+        old, worst = np.linalg.norm(opened, axis=1), np.zeros((int(self.owner.max(initial=-1)) + 1, 3))
+        np.maximum.at(worst, (self.owner, self.order), old)
+        most = np.where(self.order == 0, old, worst[self.owner, self.order])
+        return np.asarray(most + np.asarray(tolerances)[self.order])
+
+    def form(self, limits: Array) -> Any:
+        """``Cᵀ W C``, ``(points, points)``, W the widths over the squared limits ``(conditions,)``."""
+        scaled = self.matrix.multiply((np.sqrt(self.width) / limits)[:, None]).tocsr()
         return scaled.T @ scaled
 
-    def pull(self, wanted: Array, tolerances: Sequence[float]) -> Array:
+    def pull(self, wanted: Array, limits: Array) -> Array:
         """``Cᵀ W wanted``, ``(points, 3)``: what draws the contacts to values ``(conditions, 3)``."""
-        return np.asarray(self.matrix.T @ (self._weights(tolerances)[:, None] * wanted))
+        return np.asarray(self.matrix.T @ ((self.width / limits**2)[:, None] * wanted))
 
-    def off(self, delta: Array, wanted: Array, tolerances: Sequence[float]) -> Array:
-        """How far each contact is off what is wanted, as a multiple of its tolerances."""
-        ratio = np.linalg.norm(self.matrix @ delta - wanted, axis=1) / np.asarray(tolerances)[self.order]
-        worst = np.zeros(int(self.owner.max(initial=-1)) + 1)
-        np.maximum.at(worst, self.owner, ratio)
-        return worst
-
-    def _weights(self, tolerances: Sequence[float]) -> Array:
-        return self.width / np.asarray(tolerances)[self.order] ** 2
+    def room(self, delta: Array, opened: Array, limits: Array) -> Array:
+        """How much of a displacement ``(points, 3)`` each contact allows, 0 to 1."""
+        old, new = (np.linalg.norm(each, axis=1) for each in (opened, opened + self.matrix @ delta))
+        share = np.where(new > limits, (limits - old) / np.maximum(new - old, 1e-300), 1.0)
+        room = np.ones(int(self.owner.max(initial=-1)) + 1)
+        np.minimum.at(room, self.owner, share)
+        return room
 
 
 def rows(nets: Mapping[int, Net], contacts: Sequence[Contact]) -> Rows:

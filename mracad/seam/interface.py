@@ -7,7 +7,7 @@ that is asked for.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -62,6 +62,12 @@ class Joints:
         loose = (edge for seam in self.loose for edge in (seam.edge, seam.twin))
         return frozenset(self.closing).union(exact, loose)
 
+    @property
+    def mended(self) -> tuple[Seam | TrimmedSeam, ...]:
+        """Those of which a gap or a tilt is pulled shut."""
+        exact = (seam for seam in self.exact if seam.joint.close or seam.joint.fit)
+        return (*exact, *(seam for seam in self.loose if seam.close or seam.fit))
+
     def pairs(self) -> Iterator[tuple[int, int]]:
         """Surfaces that a seam joins."""
         yield from ((seam.a.surface, seam.b.surface) for seam in self.exact)
@@ -105,7 +111,12 @@ def contact(seam: TrimmedSeam) -> Contact:
 
 
 def rims(
-    model: Model, net: Net, faces: Iterable[Face], movable: Collection[int], joined: Joints
+    model: Model,
+    net: Net,
+    faces: Iterable[Face],
+    movable: Collection[int],
+    joined: Joints,
+    given: Collection[int] = (),
 ) -> tuple[Array, list[Contact]]:
     """What holds a surface: control points that stay, and contacts with what stays.
 
@@ -120,6 +131,8 @@ def rims(
         Faces that may move.
     joined : Joints
         What moves with them, and what the other edges keep.
+    given : collection of int
+        Edges that hold nothing.
 
     Returns
     -------
@@ -133,7 +146,7 @@ def rims(
             continue
         for trim in face.trims:
             edge = model.edges[trim.edge]
-            if edge.index in moving:
+            if edge.index in moving or edge.index in given:
                 continue
             order = POLE if edge.degenerate else joined.orders.get(edge.index, 0)
             found = end(net, trim)
@@ -142,6 +155,39 @@ def rims(
             elif not edge.degenerate:
                 contacts.append(Contact(trace_of(model, face, trim), None, order))
     return held, contacts
+
+
+def mended_ends(
+    model: Model, net: Net, surface: int, faces: Sequence[Face], movable: Collection[int], joined: Joints, within: float
+) -> Array:
+    """Control points ``(nu, nv)`` that only free edges hold, near the ends of seams that are to be mended.
+
+    Parameters
+    ----------
+    model : Model
+    net : Net
+        The surface, in the space of its displacement.
+    surface : int
+    faces, movable, joined
+        As for :func:`rims`.
+    within : float
+        mm.
+    """
+    from scipy.spatial import KDTree
+
+    ends = [
+        net.evaluate(side.places(np.array([0.0, 1.0])))
+        for seam in joined.mended
+        for side in (seam.a, seam.b)
+        if side.surface == surface
+    ]
+    if not ends:
+        return np.zeros(net.poles.shape[:2], bool)
+    free = {trim.edge for face in faces for trim in face.trims if model.edges[trim.edge].free} - joined.orders.keys()
+    firm, _ = rims(model, net, faces, movable, joined, free)
+    points = np.asarray(net.grid(net.u.greville(), net.v.greville())).reshape(-1, 3)
+    near = KDTree(np.concatenate(ends)).query(points)[0] <= within
+    return ~firm & near.reshape(firm.shape)
 
 
 def away(model: Model, net: Net, faces: Iterable[Face], moving: Collection[int]) -> Array:

@@ -170,8 +170,9 @@ class Problem:
         solve = self._solver(stiffness, self.free if free is None else free)
         base = self.above if trended else self.f
         mended = np.zeros_like(base)
-        if self.goal is not None or self.pull is not None:
-            mended = solve(mended if self.pull is None else self.pull, goal=self.goal)
+        pull = self.pull if free is None else None
+        if self.goal is not None or pull is not None:
+            mended = solve(mended if pull is None else pull, goal=self.goal)
         first = solve(-stiffness * (self.bending @ (base + mended)), exactly=False)
         delta = _chebyshev(lambda x: solve(self.mass @ x, exactly=False), first)
         return mended + solve.settled(delta)

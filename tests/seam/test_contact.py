@@ -15,9 +15,9 @@ INF = float("inf")
 HALF = np.sqrt(0.5)
 
 
-def only(order):
-    """Tolerances by which just one order counts."""
-    return [1.0 if k == order else INF for k in range(3)]
+def only(found, order):
+    """Limits by which just one order counts."""
+    return np.where(found.order == order, 1.0, INF)
 
 
 def field(net, function):
@@ -41,7 +41,7 @@ def test_squares_along_the_diagonal_of_a_plane(function, squares):
     found = rows({0: net}, [Contact(Trace(0, 0, segment((0, 0), (1, 1))), None, 2)])
     delta = field(net, function)
     for order, mean in enumerate(squares):
-        value = (delta.T @ found.form(only(order)) @ delta).item()
+        value = (delta.T @ found.form(only(found, order)) @ delta).item()
         assert value == pytest.approx(mean * np.sqrt(2), rel=1e-9, abs=1e-9)
 
 
@@ -71,7 +71,7 @@ def test_rows_on_a_curved_surface_against_finite_differences():
     expected = values[1], (values[2] - values[0]) / (2 * h), (values[2] - 2 * values[1] + values[0]) / h**2
     length = (weight * np.linalg.norm(tangent, axis=1)).sum()
     for order, each in enumerate(expected):
-        value = (delta.T @ found.form(only(order)) @ delta).item()
+        value = (delta.T @ found.form(only(found, order)) @ delta).item()
         assert value == pytest.approx(length * (each**2 * weight).sum(), rel=1e-3), order
 
 
@@ -140,25 +140,44 @@ def contact_of(close=False):
 def test_weights_are_inverse_squares_and_pull_where_wanted():
     net = plane(3)
     found = rows({0: net}, [contact_of()])
-    form = found.form([0.1, 0.2, 0.3])
-    assert np.abs(found.form([0.2, 0.4, 0.6]) - form / 4).max() < 1e-12 * np.abs(form).max()
+    limits = np.array([0.1, 0.2, 0.3])[found.order]
+    form = found.form(limits)
+    assert np.abs(found.form(2 * limits) - form / 4).max() < 1e-12 * np.abs(form).max()
     delta = np.random.default_rng(0).standard_normal((net.u.count * net.v.count, 3))
-    pull = found.pull(found.matrix @ delta, [0.1, 0.2, 0.3])
+    pull = found.pull(found.matrix @ delta, limits)
     assert np.abs(pull - form @ delta).max() < 1e-9 * np.abs(pull).max()
 
 
-def test_how_far_contacts_are_off():
+def test_contacts_may_lack_what_they_lacked_and_a_little_more():
+    net = plane(3)
+    found = rows({0: net}, [contact_of()])
+    lacked = np.abs(np.random.default_rng(0).standard_normal(len(found.order)))
+    opened = lacked[:, None] * np.array([0.6, 0.0, -0.8])
+    limits = found.limits(opened, [0.1, 0.2, 0.3])
+    assert limits[found.order == 0] == pytest.approx(lacked[found.order == 0] + 0.1)
+    for order, more in ((1, 0.2), (2, 0.3)):
+        assert limits[found.order == order] == pytest.approx(lacked[found.order == order].max() + more)
+
+
+def test_room_is_what_leaves_every_contact_within_its_limits():
     net = plane(3)
     found = rows({0: net, 1: net}, [contact_of(), Contact(Trace(1, 1, segment((0, 0.5), (1, 0.5))), None, 1)])
     n = net.u.count * net.v.count
-    delta = np.zeros((2 * n, 3))
-    delta[:n] = [0.0, 0.0, 0.03]
-    delta[n:, 2] = 2e-3 * net.poles[..., 1].ravel()
-    wanted = np.zeros((len(found.order), 3))
-    tolerances = [0.01, 1e-3, 1.0]
-    assert found.off(delta, wanted, tolerances) == pytest.approx([3.0, 2.0])
-    assert found.off(delta, found.matrix @ delta, tolerances) == pytest.approx([0.0, 0.0], abs=1e-12)
-    assert rows({0: net}, []).off(delta[:n], wanted[:0], tolerances).size == 0
+    rng = np.random.default_rng(3)
+    opened = 0.01 * rng.standard_normal((len(found.order), 3))
+    limits = found.limits(opened, [0.01, 1e-3, 1.0])
+    delta = rng.standard_normal((2 * n, 3))
+    for amount in found.room(delta, opened, limits)[found.owner]:
+        assert 0 < amount < 1
+    room = found.room(delta, opened, limits)
+    off = np.linalg.norm(opened + room[found.owner, None] * (found.matrix @ delta), axis=1)
+    assert (off <= limits * (1 + 1e-9)).all()
+    still = np.zeros_like(delta)
+    still[:n, 2] = 1e-4
+    assert found.room(still, 0 * opened, found.limits(0 * opened, [0.01, 1e-3, 1.0])) == pytest.approx([1.0, 1.0])
+    straight = found.room(100 * still, 0 * opened, found.limits(0 * opened, [4e-3, 1e-3, 1.0]))
+    assert straight == pytest.approx([0.4, 1.0])
+    assert rows({0: net}, []).room(delta[:n], opened[:0], limits[:0]).size == 0
 
 
 def test_only_what_is_asked_has_rows():

@@ -1,0 +1,155 @@
+"""The problem that surfaces which move together make: their spaces, what joins them and what holds them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from mracad.bspline.net import Net
+from mracad.edit.target import Sheet
+from mracad.inspect.cells import quadrature
+from mracad.inspect.roughness import Growth
+from mracad.model import Model
+from mracad.seam.conditions import doubled, matched
+from mracad.seam.conditions import rows as seam_rows
+from mracad.seam.contact import Rows
+from mracad.seam.contact import rows as contact_rows
+from mracad.seam.energy import forms
+from mracad.seam.interface import Joints, away, contact, mended_ends, rims
+from mracad.seam.metric import seen
+from mracad.seam.solve import Problem, Space
+from mracad.seam.space import refined
+
+Array = np.ndarray
+
+GROWTH = Growth(0.005, 0.005, 0.005, 0.02, 30.0)
+"""What the judge lets pass by default: a quarter of the 2 % that count as worse where faces are compared."""
+
+TIGHT = 0.3
+"""Share of what a contact may lack at which its conditions aim."""
+
+
+@dataclass(frozen=True)
+class Tolerances:
+    """What a result may be worse in.
+
+    Attributes
+    ----------
+    gap : float
+        Of a contact, mm.
+    angle, bend : float
+        By which the angle (radians) and the curvature (over the wavelength of the edit) along a contact may grow.
+    growth : Growth
+        Of roughness.
+    deviation : float
+        Largest deviation along the normal, mm.
+    """
+
+    gap: float
+    angle: float = 1.4e-4
+    bend: float = 1e-3
+    growth: Growth = GROWTH
+    deviation: float = np.inf
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """What an edit works on.
+
+    Attributes
+    ----------
+    model : Model
+    sheets : mapping of int to Sheet
+        The surfaces that it may move.
+    joints : Joints
+    tolerances : Tolerances
+    refine : bool
+        Whether control points may be added beside rims.
+    """
+
+    model: Model
+    sheets: Mapping[int, Sheet]
+    joints: Joints
+    tolerances: Tolerances
+    refine: bool = True
+
+
+@dataclass(frozen=True, eq=False)
+class Pose:
+    """A problem and its contacts.
+
+    Attributes
+    ----------
+    problem : Problem
+    contacts : Rows
+    owners : sequence of set of int
+        The surfaces of each contact.
+    opened : ndarray (conditions, 3)
+        What contacts between two surfaces lack as they are: gap, slope, curvature.
+    limits : ndarray (conditions,)
+        What they may lack.
+    """
+
+    problem: Problem
+    contacts: Rows
+    owners: list[set[int]]
+    opened: Array
+    limits: Array
+
+
+def pose(
+    scene: Scene, members: Mapping[int, Sheet], joined: Joints, width: float, detail: float, longest: float = np.inf
+) -> Pose:
+    """The problem of surfaces that move together.
+
+    Parameters
+    ----------
+    scene : Scene
+    members : mapping of int to Sheet
+    joined : Joints
+    width : float
+        Within which displacements fade, mm.
+    detail : float
+        Size of the displacements that are wanted, mm: the larger, the more contacts weigh.
+    longest : float
+        Longest knot spans beside seams along trim curves, mm.
+    """
+    movable = {face for sheet in members.values() for face in sheet.movable}
+    nets = matched({i: _space(scene, sheet, joined, longest) for i, sheet in members.items()}, joined.exact)
+    nets = matched(doubled(nets, joined.exact), joined.exact)
+    spaces, contacts = {}, [contact(seam) for seam in joined.loose]
+    for i, net in nets.items():
+        sheet = members[i]
+        form = forms(net, sheet.metric, quadrature(net, sheet.faces), sheet.creases)
+        points = seen(net, form)
+        held, more = rims(scene.model, net, sheet.all_faces, movable, joined)
+        held &= ~mended_ends(scene.model, net, i, sheet.all_faces, movable, joined, width / 2)
+        contacts += more
+        far = away(scene.model, net, sheet.faces, joined.moving)
+        spaces[i] = Space(net, form, points & ~held, points, sheet.trend.over(net.u, net.v).poles, far)
+    found = contact_rows(nets, contacts)
+    f = np.concatenate([net.poles.reshape(-1, 3) for net in nets.values()])
+    f = f - f.mean(axis=0)
+    rows, goal = seam_rows(nets, joined.exact, everywhere=True)
+    pairs = np.array([each.b is not None for each in contacts], bool)[found.owner]
+    opened = np.where(pairs[:, None], found.matrix @ f, 0.0)
+    t = scene.tolerances
+    limits = found.limits(opened, (t.gap, t.angle, t.bend / width))
+    weight = (detail / TIGHT) ** 2 * width
+    soft, pull = (weight * found.form(limits), -weight * found.pull(opened, limits)) if contacts else (None, None)
+    problem = Problem(spaces, rows, np.where(goal[:, None], -(rows @ f), 0.0), soft, pull)
+    return Pose(problem, found, [each.surfaces for each in contacts], opened, limits)
+
+
+def _space(scene: Scene, sheet: Sheet, joined: Joints, longest: float) -> Net:
+    """The surface with control points enough beside its rims, and beside seams along trim curves."""
+    if not scene.refine:
+        return sheet.net
+    trims = [(face, trim) for face in sheet.faces for trim in face.trims]
+    net = refined(sheet.net, [each for each in trims if each[1].edge not in joined.moving], sheet.wavelength / 4)
+    if not np.isfinite(longest):
+        return net
+    loose = {edge for seam in joined.loose for edge in (seam.edge, seam.twin)}
+    return refined(net, [each for each in trims if each[1].edge in loose], longest)
