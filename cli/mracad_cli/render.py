@@ -113,6 +113,8 @@ def edit_lines(report: Report, options: Selection, end: str, found: Found | None
         mean = sum(d.mean for d in report.deviations) / len(report.deviations)
         lines.append(f"deviation: max {mm(worst.largest)} on #{worst.face + 1}, mean {mm(mean)}")
         lines[-1] += roughness_words(edit.faces("edited"))
+        before, after = control_points(report)
+        lines[-1] += f"; control points: {after} (were {before})" if after != before and not edit.copies else ""
     else:
         lines.append("deviation: none")
     if edit.copies:
@@ -192,10 +194,11 @@ def edge_words(edges: tuple[Treatment, ...]) -> str:
 
 def seam_line(new: SeamSummary, old: SeamSummary | None = None) -> str:
     """The seams in one line."""
-    angle, gap = degrees(new.angle), mm(new.gap)
+    angle, bend, gap = degrees(new.angle), f"{new.bend:.2g} 1/mm", mm(new.gap)
     if old:
-        angle, gap = f"{angle} (was {degrees(old.angle)})", f"{gap} (was {mm(old.gap)})"
-    line = f"seams: {new.smooth} smooth of {new.seams}, angle ≤ {angle}; gap ≤ {gap}"
+        angle, bend = f"{angle} (was {degrees(old.angle)})", f"{bend} (was {old.bend:.2g})"
+        gap = f"{gap} (was {mm(old.gap)})"
+    line = f"seams: {new.smooth} smooth of {new.seams}, angle ≤ {angle}, curvature jump ≤ {bend}; gap ≤ {gap}"
     return line + (f"; {new.unsewn} not sewn" if new.unsewn else "")
 
 

@@ -70,13 +70,15 @@ class SeamMeasure:
 
 @dataclass(frozen=True)
 class SeamSummary:
-    """Totals over seams: counts, worst gap of all and worst angle of the smooth ones."""
+    """Totals over seams: counts, worst gap (mm) of all, worst angle (degrees) and curvature jump (1/mm) of the smooth
+    ones."""
 
     seams: int
     smooth: int
     unsewn: int
     gap: float
     angle: float
+    bend: float
 
 
 def seams(model: Model, every: bool = False) -> list[SeamMeasure]:
@@ -101,6 +103,7 @@ def summary(measures: list[SeamMeasure], smooth: frozenset[tuple[int, tuple[int,
         unsewn=sum(not m.sewn for m in measures),
         gap=max((m.gap for m in measures), default=0.0),
         angle=max((m.angle for m in chosen), default=0.0),
+        bend=max((m.bend for m in chosen if not np.isnan(m.bend)), default=0.0),
     )
 
 
