@@ -186,8 +186,8 @@ def _spans(rule: Quadrature, knots: tuple[KnotVector, KnotVector]) -> Array:
     """Length in parameters of the knot spans about each point of a rule, along u and v, ``(2, q)``."""
     sizes = []
     for kv, x in zip(knots, (rule.u, rule.v), strict=True):
-        span, _ = kv.locate(x.ravel())
-        sizes.append(kv.knots[span + 1] - kv.knots[span])
+        span, _ = kv.locate((x[:, 0] + x[:, -1]) / 2)  # the ends of a row are on knots, perhaps of a shorter span
+        sizes.append(np.repeat(kv.knots[span + 1] - kv.knots[span], x.shape[1]))
     grid = np.broadcast_arrays(sizes[0], sizes[1][:, None])
     return np.stack([each[rule.mask.T] for each in grid])
 

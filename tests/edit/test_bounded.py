@@ -1,4 +1,4 @@
-"""However badly seams hold, the work of a group stays in proportion to it; counted, not timed."""
+"""However badly faces come out, edits are done again a bounded number of times; counted, not timed."""
 
 import sys
 from dataclasses import replace
@@ -6,10 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mracad import guard, job, produce
+from mracad import job, produce
 from mracad.audit.faults import Fault, ReadBack, Reason
-from mracad.edit import group as module
-from mracad.edit.group import Group
+from mracad.edit import driver
 from mracad.edit.result import Edit, FaceOutcome
 from mracad.edit.smooth import smooth
 from mracad.errors import Code, EditError
@@ -17,28 +16,8 @@ from mracad.model import Displacement
 from mracad.occ.view import view
 from mracad.options import Smooth
 from mracad.recipe import Step
-from tests.edit import halves, panels
+from tests.edit import panels
 from tests.occ import shapes
-
-
-@pytest.fixture
-def solved(monkeypatch):
-    """Control points of every coupled projection and every shutting of trimmed seams, in order."""
-    points = []
-    project, shut = Group._moved, module.shut
-
-    def projected(self, couplings, separations, bound):
-        points.append(module.PROJECTION * module._points(p.net for p in couplings[0][1].patches.values()))
-        return project(self, couplings, separations, bound)
-
-    def shutting(sheets, *rest):
-        points.append(module._points(sheet.net for sheet in sheets.values()))
-        return shut(sheets, *rest)
-
-    monkeypatch.setattr(Group, "_moved", projected)
-    monkeypatch.setattr(module, "shut", shutting)
-    monkeypatch.setattr(module, "LEAST_WORK", 0)
-    return points
 
 
 def panel(side, spans=6):
@@ -46,51 +25,26 @@ def panel(side, spans=6):
     return view(panels.document(panels.cut(noisy, (side, side))))
 
 
-def own_points(model):
-    return module._points(surface.net for surface in model.surfaces)
+@pytest.mark.parametrize("side", [2, 4])
+def test_groups_are_solved_a_bounded_number_of_times(side, monkeypatch):
+    """The judge takes everything from one surface more in every round, as if there were no end of them."""
+    tried, refused = [], set()
+    attempt = driver._attempt
 
+    def refusing(scene, wish, members, joined):
+        found = attempt(scene, wish, members, joined)
+        if len(members) > 1:
+            tried.append(len(members))
+            refused.add(min(members))
+        return {
+            i: replace(moved, amount=0.0) if i in refused and len(members) > 1 else moved for i, moved in found.items()
+        }
 
-@pytest.mark.parametrize("side", [3, 5])
-def test_rounds_do_not_grow_with_the_seams_of_a_group(side, solved, monkeypatch):
-    """Every round finds one more seam that does not hold, as if there were no end of them."""
-    monkeypatch.setattr(Group, "_broken", lambda self, moved: {self._every()[0].edge: "would gape"})
+    monkeypatch.setattr(driver, "_attempt", refusing)
     model = panel(side)
     edit = smooth(model, Smooth(scale="60mm"))
-    assert sum(solved) <= (module.WORK + module.LAST_WORK) * own_points(model)
-    given_up = [edge for edge in edit.edges if edge.reason.startswith("given up after ")]
-    assert len(given_up) > len(edit.edges) / 4 and all(edge.how == "frozen" for edge in given_up)
-    assert {edge.reason for edge in given_up} <= {
-        "given up after 1 round",
-        *(f"given up after {n} rounds" for n in range(2, 12)),
-    }
-    assert all(edge.how == "frozen" for edge in edit.edges) and edit.faces("edited")
-
-
-def test_seams_that_hold_are_not_given_up(solved):
-    edit = smooth(panel(3), Smooth(scale="60mm"))
-    assert not any(edge.reason.startswith("given up") for edge in edit.edges)
-    assert sum(edge.how == "coupled" for edge in edit.edges) == 12 and len(solved) == 1
-
-
-def test_spans_are_halved_only_up_to_a_bound_for_the_whole_group(solved, monkeypatch):
-    """A trimmed seam that stays open whatever is done."""
-    _, left, right = halves.surfaces(0.2, (12, 24))
-    model = view(halves.document(left, right))
-    monkeypatch.setattr(module, "MOST_POINTS", 2 * own_points(model))
-    monkeypatch.setattr(Group, "_excess", lambda self, seam, after: (np.linspace(0, 1, 9), np.full(9, 2.0)))
-    edit = smooth(model, Smooth(scale="30mm"))
-    shutting = solved[1:]
-    assert len(shutting) > 1 and max(shutting) <= module.MOST_GROWTH * own_points(model)
-    assert sum(solved) <= (module.WORK + module.LAST_WORK) * own_points(model)
-    assert all(edge.how == "frozen" for edge in edit.edges)
-
-
-def test_what_a_group_is_at_is_noted(monkeypatch):
-    """For the message of a time limit."""
-    noted = []
-    monkeypatch.setattr(guard, "doing", lambda stage="", subject="": noted.append(stage))
-    smooth(panel(2), Smooth(scale="60mm"))
-    assert "smoothing group 1 of 1, round 1" in noted
+    assert 0 < sum(tried) <= driver.ROUNDS * side * side
+    assert len(edit.faces("edited")) == side * side and all(edge.how == "frozen" for edge in edit.edges)
 
 
 class Stub:
@@ -134,9 +88,9 @@ def test_an_edit_is_done_again_a_bounded_number_of_times(monkeypatch):
     monkeypatch.setattr(job, "_torn", first_edited(row))
     report = job.run(document, stub, Smooth(level=1))
     assert stub.rounds == job.ROUNDS + 2
-    stuck = report.edit.faces("stuck")
-    assert [outcome.face for outcome in stuck] == list(row)
-    assert {outcome.reason for outcome in stuck} == {"its seams would not hold"}
+    left = report.edit.faces("left")
+    assert [outcome.face for outcome in left] == list(row)
+    assert {outcome.said for outcome in left} == {"its seams would not hold"}
     assert [outcome.face for outcome in report.edit.faces("edited")] == [row.stop, row.stop + 1, row.stop + 2]
 
 
@@ -164,14 +118,3 @@ def test_files_are_made_again_a_bounded_number_of_times(monkeypatch):
             document, lambda: chains(*[1] * (produce.ROUNDS + 4)), [step], [produce.Target("out.brep", "brep")]
         )
     assert caught.value.code == Code.CANNOT_EDIT and stub.rounds == produce.ROUNDS
-
-
-def test_trimmed_seams_join_no_more_surfaces_than_can_be_solved_at_once(monkeypatch):
-    left, right = halves.surfaces(0.2, (30, 60))[1:]
-    model = view(halves.document(left, right))
-    for most, how in ((own_points(model), "to tolerance"), (own_points(model) - 1, "frozen")):
-        monkeypatch.setattr("mracad.edit.together.MOST_TOGETHER", most)
-        edit = smooth(model, Smooth(scale="30mm"))
-        (seam,) = (edge for edge in edit.edges if len(edge.faces) == 2)
-        assert seam.how == how and (how != "frozen" or seam.reason == "too many faces there to move together")
-        assert len(edit.faces("edited")) == 2
