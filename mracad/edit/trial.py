@@ -120,10 +120,15 @@ class Trial:
 
     def confirmed(self, verdict: Verdict) -> Verdict:
         """The verdict as a closer look leaves it: what grows between the points of the first is taken back."""
-        spaces, moving = list(self.problem.spaces.values()), np.array(verdict.amounts)
-        watch = Watch.of([(space.net, faces) for space, faces in zip(spaces, self.faces, strict=True)], CLOSER)
-        amounts, found, limits = _amounts(watch, spaces, verdict.parts, moving, self.tolerances)
-        why = [new or old for new, old in zip(limits, verdict.limits, strict=True)]
+        spaces, amounts, found, why = list(self.problem.spaces.values()), [], [], []
+        for i, (space, faces) in enumerate(
+            zip(spaces, self.faces, strict=True)
+        ):  # one by one: so many points are large
+            watch, most = Watch.of([(space.net, faces)], CLOSER), np.array(verdict.amounts[i : i + 1])
+            amount, change, limits = _amounts(watch, [space], verdict.parts[i : i + 1], most, self.tolerances)
+            amounts += amount
+            found += change
+            why.append(limits[0] or verdict.limits[i])
         return replace(verdict, amounts=amounts, changes=found, limits=why)
 
     def fairer(self, delta: Array) -> list[bool]:

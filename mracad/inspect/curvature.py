@@ -11,6 +11,9 @@ Array = np.ndarray
 THIN = 1e-6
 """Sine of the angle between S_u and S_v below which a surface counts as degenerate."""
 
+_BLOCK = 8192
+"""Points that are gone through at once: what is computed of them fits the processor's cache."""
+
 
 @dataclass(frozen=True, eq=False)
 class Forms:
@@ -55,7 +58,15 @@ def forms(jet: Array) -> Forms:
     do Carmo, *Differential Geometry of Curves and Surfaces*, §3.3: H = (e G − 2 f F + g E) / 2 (E G − F²), the
     derivatives of the normal by Weingarten's equations.
     """
-    _, su, sv, suu, suv, svv, suuu, suuv, suvv, svvv = jet
+    parts = [_forms(jet[1:, :, begin : begin + _BLOCK]) for begin in range(0, max(jet.shape[2], 1), _BLOCK)]
+    if len(parts) == 1:
+        return parts[0]
+    names = [each.name for each in fields(Forms)]
+    return Forms(*(np.concatenate([getattr(part, name) for part in parts], axis=-1) for name in names))
+
+
+def _forms(derivatives: Array) -> Forms:
+    su, sv, suu, suv, svv, suuu, suuv, suvv, svvv = derivatives
     ee, ff, gg = _dot(su, su), _dot(su, sv), _dot(sv, sv)
     normal = _cross(su, sv)
     density = np.sqrt(_dot(normal, normal))

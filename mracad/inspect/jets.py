@@ -33,8 +33,7 @@ def jets(net: Net, u: Array, v: Array, mask: Array, centre: Array, most: int = 3
     Returns
     -------
     ndarray (10, 3, q)
-        Or less, as the highest order asks;
-        by ``ORDERS``, coordinate and point, v slowest.
+        By ``ORDERS``, as many as the highest order asks, coordinate and point, v slowest.
     """
     poles = net.poles - centre
     if net.weights is not None:
@@ -43,17 +42,17 @@ def jets(net: Net, u: Array, v: Array, mask: Array, centre: Array, most: int = 3
     rows, in_u = _local(net.u, u, most)
     columns, in_v = _local(net.v, v, most)
     along = np.matmul(in_u.reshape(len(u), -1, in_u.shape[-1]), poles[rows].reshape(*rows.shape, -1))
-    along = along.reshape(u.size, most + 1, net.v.count, k).transpose(1, 2, 3, 0)  # order, column, coordinate, u
-    inside = slice(None) if mask.all() else np.flatnonzero(mask.T)
+    along = along.reshape(u.size, most + 1, net.v.count, k).transpose(1, 3, 2, 0)  # order, coordinate, column, u
+    in_v = np.ascontiguousarray(in_v.transpose(2, 0, 1, 3))
     orders = [order for order in ORDERS if sum(order) <= most]
-    found = np.empty((len(orders), k, np.count_nonzero(mask)))
+    found = np.empty((len(orders), k, *v.shape, u.size))
     for r in range(most + 1):
-        windows = along[r][columns].reshape(*columns.shape, -1)
-        taken = in_v[:, :, : most + 1 - r]
-        grid = np.matmul(taken.reshape(len(v), -1, taken.shape[-1]), windows)
-        grid = grid.reshape(v.size, most + 1 - r, k, u.size).transpose(1, 2, 0, 3).reshape(most + 1 - r, k, -1)
+        windows = along[r][:, columns]
         for s in range(most + 1 - r):
-            found[orders.index((r, s))] = grid[s][:, inside]
+            np.matmul(in_v[s], windows, out=found[orders.index((r, s))])
+    found = found.reshape(len(orders), k, -1)
+    if not mask.all():
+        found = found[:, :, np.flatnonzero(mask.T)]
     return found if net.weights is None else _quotient(found)
 
 

@@ -167,10 +167,8 @@ def _seen(surfaces: Sequence[tuple[Net, Quadrature, Array]]) -> Iterator[tuple[A
     block = (sizes.cumsum() - sizes) // _BLOCK
     for number in np.unique(block):
         members = np.flatnonzero(block == number).tolist()
-        jet = np.concatenate(
-            [jets(net, rule.u, rule.v, rule.mask, centre) for net, rule, centre in (surfaces[i] for i in members)],
-            axis=2,
-        )
+        each = [jets(net, rule.u, rule.v, rule.mask, centre) for net, rule, centre in (surfaces[i] for i in members)]
+        jet = each[0] if len(each) == 1 else np.concatenate(each, axis=2)
         form = forms(jet)
         ends = sizes[members].cumsum()
         for begin, end in zip(ends - sizes[members], ends, strict=True):
