@@ -162,7 +162,8 @@ class TrimmedSeam:
         """
         share = judged(after, (self.a, self.b))
         old, now = (parted(model, self.a, self.b, share) for model in (before, after))
-        limit = np.repeat(np.maximum(allowed, self.opening + more)[:, None], len(share), axis=1)
+        worst = np.fmax(self.opening, np.fmax.reduce(old, axis=1))  # there are more places on finer nets
+        limit = np.repeat(np.maximum(allowed, worst + more)[:, None], len(share), axis=1)
         limit[0] = np.minimum(limit[0], old[0] + allowed[0] + more[0])
         return share, (now / limit)[: self.order + 1].max(axis=0)
 

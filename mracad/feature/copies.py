@@ -43,6 +43,7 @@ HALVINGS, LARGEST = 3, 100_000
 """Most times that the spans under a trimmed seam are halved, and most control points of a net for which they are."""
 
 OPEN, BROKEN, UNSEWN = "trimmed: not within the tolerance", "would not hold", "trimmed and not sewn"
+BARE = "no copy beyond it"
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,12 +177,10 @@ def _sewn(joined: Joints) -> Joints:
 
 
 def _told(ground: Ground, under: Collection[int], joined: Joints) -> Joints:
-    """Joints that say nothing of edges beyond which a face could move if a copy lay there, too."""
-    edges = ground.model.edges
-    needless = {
-        e for e in joined.frozen if any(s.face in ground.chosen and s.face not in under for s in edges[e].sides)
-    }
-    return replace(joined, frozen={e: why for e, why in joined.frozen.items() if e not in needless})
+    """Joints with what is to be said of edges beyond which a face could move if a copy lay there, too."""
+    apart = ground.chosen - set(under)
+    sides = {e: {side.face for side in ground.model.edges[e].sides} for e in joined.frozen}
+    return replace(joined, frozen={e: BARE if sides[e] & apart else why for e, why in joined.frozen.items()})
 
 
 def _crossings(task: _Task) -> list[Crossing]:
@@ -223,7 +222,7 @@ def _holds(task: _Task, each: Crossing, after: Model) -> bool:
     seam = each.seam
     if isinstance(seam, TrimmedSeam):
         bend = BENT / float(task.copies.reach.max())
-        return bool(seam.excess(task.model, after, (GAP, 0.0, 0.0), (0.0, TURNED, bend))[1].max() <= 1.0)
+        return bool(seam.excess(task.model, after, (GAP, 0.0, 0.0), (WIDER, TURNED, bend))[1].max() <= 1.0)
     for stretch in each.stretches:
         part = seam.part(*stretch)
         old, new = (opening(model, part.a, part.b) for model in (task.model, after))

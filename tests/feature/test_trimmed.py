@@ -7,12 +7,15 @@ import pytest
 
 from mracad import job
 from mracad.audit.continuity import seams
+from mracad.constraint.seam import Wishes
 from mracad.edit.features import extract, move, repeat
 from mracad.errors import EditError
 from mracad.feature.detail import save
+from mracad.model import Displacement, Offset
 from mracad.occ.step import read_step, write_step
 from mracad.occ.view import view
 from mracad.options import Move, Repeat
+from mracad.seam.interface import joints
 from tests.edit import halves
 from tests.edit.models import sheet
 from tests.feature import grounds
@@ -125,3 +128,22 @@ def test_a_trimmed_seam_that_is_not_sewn_takes_its_part_and_says_so(feature):
         job.run(document(sewn=False), repeat, Repeat(feature=feature, at=(place,)))
     report = job.run(document(sewn=False), repeat, Repeat(feature=feature, at=(place,), clip=True))
     assert {t.reason for t in report.edit.edges} == {"free edge", "trimmed and not sewn"}
+
+
+def test_a_seam_is_no_worse_than_itself_on_finer_nets():
+    """It is looked at in more places there, where the input may be wider open than where it was measured."""
+    _, *nets = halves.surfaces(0.2, (8, 16))
+    before = view(halves.document(*nets))
+    (seam,) = joints(before, {0, 1}, Wishes("g1")).loose
+    still = {}
+    for surface in before.surfaces:
+        u, v = surface.net.u, surface.net.v
+        finer = (np.linspace(*k.domain, 152)[1:-1] for k in (u, v))
+        still[surface.index] = Offset(np.zeros((u.count + 150, v.count + 150, 3)), *finer)
+    after = Displacement(still).applied(before)
+    assert seam.excess(before, after, (1e-9, 0.0, 0.0), (1e-9, 1e-9, 1e-9))[1].max() <= 1.0
+
+
+def test_edges_beyond_which_no_copy_lies_are_told_as_such(feature):
+    report = job.run(document(), repeat, Repeat(feature=feature, at=(word(on_seam(100.0, -45.0)),)))
+    assert how(report) == ("frozen", "no copy beyond it")
