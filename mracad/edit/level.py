@@ -9,7 +9,8 @@ smooth as these are,
 
 the conditions asked at as many places as the coarse splines along a seam have functions: exact where the joint has
 constant coefficients, and never more than the coarse spaces have room for where they vary.  G is the Gram matrix of
-the transform on each surface, by its area.  What the conditions ask beyond that, and rims, the solver sees to.
+the transform on each surface, by its area.  In y the conditions count 1 / ``LOOSE``; the solver, which sees to rims,
+keeps them exactly.
 """
 
 from __future__ import annotations
@@ -38,6 +39,10 @@ from mracad.wavelet.project import projection
 Array = np.ndarray
 Coarse = Mapping[int, tuple[KnotVector, KnotVector]]
 """Coarse knots in u and v, by surface."""
+
+LOOSE = 1e-4
+"""How little, relative, fitting counts against the conditions of seams on coarse splines: those of joints that lack
+something contradict each other a little at vertices, and are not to be met at any price."""
 
 
 @dataclass(frozen=True)
@@ -121,4 +126,5 @@ def _joined(problem: Problem, coarse: Coarse, seams: Sequence[Seam], system: tup
     nets = {i: space.net for i, space in problem.spaces.items()}
     conditions, mended = rows(nets, seams, coarse=coarse)
     delta = np.where(mended[:, None], conditions @ (p @ y), conditions @ (p @ y - problem.f))
-    return Constrained(form, conditions @ p, np.ones(len(y), dtype=bool))(np.zeros_like(y), goal=-delta)
+    solve = Constrained(form, conditions @ p, np.ones(len(y), dtype=bool), LOOSE)
+    return solve(np.zeros_like(y), goal=-delta, exactly=False)

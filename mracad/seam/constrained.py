@@ -32,9 +32,11 @@ class Constrained:
         A, positive semidefinite.
     rows : scipy.sparse matrix (m, n)
     free : ndarray of bool (n,)
+    slack : float
+        ε, relative: so much less than the form conditions may count in a single pass, where they contradict each other.
     """
 
-    def __init__(self, form: Any, rows: Any, free: Array) -> None:
+    def __init__(self, form: Any, rows: Any, free: Array, slack: float = SLACK) -> None:
         from scipy.sparse import block_array, diags_array, eye_array
 
         self.free, self.size = np.flatnonzero(free), len(free)
@@ -50,7 +52,7 @@ class Constrained:
         self.rows = (diags_array(1.0 / self.length) @ rows[self.there]).tocsr()
         count = self.rows.shape[0]
         self._solve = (
-            nested(block_array([[self.form, self.rows.T], [self.rows, -SLACK * eye_array(count)]]))
+            nested(block_array([[self.form, self.rows.T], [self.rows, -slack * eye_array(count)]]))
             if count
             else Definite(self.form)
         )
