@@ -97,10 +97,10 @@ def test_recipe_pipeline_record_and_schema_agree(tmp_path):
 
 def test_options_are_set_and_variables_filled(tmp_path):
     found = recipe.load(written(tmp_path)).with_values(
-        ["fair.faces=['{name}', '!#2']", "fair.refine=true", "check.kink=2"]
+        ["fair.faces=['{name}', '!#2']", "fair.refine=never", "check.kink=2"]
     )
     fair, check = (step.options for step in found.steps("models/lid.step"))
-    assert (fair.faces, fair.refine, check.kink) == (("lid", "!#2"), True, 2.0)
+    assert (fair.faces, fair.refine, check.kink) == (("lid", "!#2"), "never", 2.0)
     for wrong, hint in (("fair.scal=1", "scale"), ("fai.scale=1", "fair"), ("scale", "step.option=value")):
         with pytest.raises(UsageError, match=hint):
             found.with_values([wrong])

@@ -103,7 +103,11 @@ def test_the_report_says_everything(mracad, samples, tmp_path):
     body = json.loads(result.out)
     assert body["written"] == ["out.step"] and body["options"]["scale"] == "16mm"
     assert body["valid"]["before"]["valid"] is True and body["valid"]["after"]["valid"] is True
-    assert len(body["faces"]) == 6 and all(face["fairing"] > 0 for face in body["faces"])
+    assert len(body["faces"]) == 6
+    for face in body["faces"]:
+        before, after = face["roughness"]
+        assert after["bending"] < before["bending"] and after["variation"] < before["variation"]
+    assert body["control_points"]["after"] >= body["control_points"]["before"] > 0
     assert len(body["seams"]["each"]) == 7 and {"gap", "angle", "after"} <= body["seams"]["each"][0].keys()
     assert len(body["deviation"]) == 6 and all(d["largest"] <= d["bound"] + 1e-12 for d in body["deviation"])
 

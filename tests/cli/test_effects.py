@@ -113,7 +113,7 @@ WAYS = {
     "along": ("--along edge#1,1,3",),
     "record": ("--record",),
     "reference_unit": ("--reference-unit in",),
-    "refine": ("--refine", "IN strip.step --scale 8mm"),
+    "refine": ("--refine never", "IN strip.step --scale 8mm"),
     "report": ("--report a.json",),
     "rotate": ("--rotate 40",),
     "sarif": ("--sarif a.sarif",),

@@ -99,15 +99,12 @@ def test_an_unknown_command_names_the_nearest(mracad):
     assert "'smooth'" in result.err
 
 
-def test_a_model_on_which_nothing_can_move(mracad, tmp_path):
-    from tests.cli.shapes import ruled_strip
-
-    source, out = ruled_strip(tmp_path / "strip.step"), tmp_path / "out.step"
-    result = mracad("smooth", source, "--scale", "8mm", "-o", out)
-    one_line(result, 4)
-    assert "--refine" in result.err and not out.exists()
-    result = mracad("smooth", source, "--scale", "8mm", "--refine", "-o", out)
-    assert result.code == 0 and out.exists() and "1 smoothed" in result.out
+def test_a_model_that_is_fair_goes_through_and_says_so(mracad, samples, tmp_path):
+    out = tmp_path / "out.step"
+    for words in ((), ("--faces", "#1")):
+        result = mracad("smooth", samples / "panel_clean.step", "--scale", "0.1%", "-o", out, "--overwrite", *words)
+        assert result.code == 0 and out.exists() and "already fair at 0.1%" in result.out
+        assert "nothing changed" in result.out.splitlines()[0]
 
 
 @pytest.mark.parametrize(

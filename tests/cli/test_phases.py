@@ -22,7 +22,7 @@ def panel(tmp_path):
     ("place", "phase"),
     [
         ("mracad.occ.view:view", "looking at faces"),
-        ("mracad.edit.group:Group.smoothed", "smoothing group 1 of 1, round 1"),
+        ("mracad.edit.fair:drive", "editing"),
     ],
 )
 def test_a_time_limit_names_the_phase(place, phase, mracad, panel, tmp_path, monkeypatch):
@@ -41,7 +41,6 @@ def test_every_phase_of_an_edit_is_noted_in_its_turn(mracad, panel, tmp_path, mo
     phases = [
         "reading",
         "looking at faces",
-        "smoothing group 1 of 1, round 1",
         "editing",
         "measuring seams",
         "checking the input",

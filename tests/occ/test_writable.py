@@ -203,7 +203,7 @@ def test_reports_say_which_faces_are_in_parts(mracad, tmp_path):
     done = mracad("convert", tmp_path / "in.brep", "-o", tmp_path / "again.step", "-o", tmp_path / "out.stl", "--json")
     assert json.loads(done.out)["cut"] == {"again.step": [{"face": 1, "parts": 2}], "out.stl": []}
     report = tmp_path / "report.json"
-    words = ("--scale", "30%", "--refine", "--report", report, "-o", tmp_path / "smooth.step")
+    words = ("--scale", "30%", "--report", report, "-o", tmp_path / "smooth.step")
     done = mracad("smooth", tmp_path / "in.brep", *words)
     assert done.code == 0 and ", #1 in 2 parts, " in done.out
     assert json.loads(report.read_text())["cut"] == {"smooth.step": [{"face": 1, "parts": 2}]}

@@ -164,7 +164,7 @@ def _status(face: Face, scales: FaceScales | None) -> tuple[str, str]:
         return "unchanged", "crease lines only" if creases else "no span finer than the scale"
     if scales.detail <= LEAST:
         return "unchanged", "no detail"
-    return ("changes", "") if scales.free else ("stuck", "no free control points unless edges move or with --refine")
+    return "changes", ""
 
 
 def _row(model: Model, face: Face, scales: FaceScales | None) -> Sequence[str]:
@@ -191,7 +191,7 @@ def _row(model: Model, face: Face, scales: FaceScales | None) -> Sequence[str]:
         " ".join(shape),
         f"{scales.free}/{scales.points}",
         f"{scales.spans[0]:.3g}–{scales.spans[1]:.3g}",
-        change if status == "changes" else f"{change}: {reason}" if status == "stuck" else reason,
+        change if status == "changes" else reason,
         f"{scales.finest:.3g} mm" if scales.finest else "never",
         name,
     )
