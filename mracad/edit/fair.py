@@ -20,13 +20,18 @@ from mracad.bspline.net import Net
 from mracad.constraint.seam import Wishes
 from mracad.edit.driver import Result, drive
 from mracad.edit.pose import Scene, Tolerances
-from mracad.edit.target import Sheet, Wish, sheets, stiffness
+from mracad.edit.target import Sheet, Wish, eased, sheets, stiffness
+from mracad.inspect.curvature import forms
+from mracad.inspect.jets import jets
 from mracad.model import Model
 from mracad.seam.interface import Joints, joints
 from mracad.seam.ladders import Creases
 from mracad.seam.solve import Problem
 
 Array = np.ndarray
+
+SHARP = 0.2, 0.5
+"""Curvatures over ℓ from which on less is done, and from which on nothing: there the filter takes shape."""
 
 DETAIL = 1e-7, 1e-6
 """Least displacement that counts as detail: the tolerance of coincidence, mm, and a share of the wavelength."""
@@ -60,6 +65,23 @@ class Filter:
         fade, stiff = problem.fading(width), stiffness(self.scale)
         yield problem.nearest(target), problem.nearest(fade * target), problem.filtered(stiff, trended=True)
         yield problem.filtered(stiff), problem.nearest(fade * problem.filtered(stiff, problem.seen))
+        yield [problem.nearest(fade * calm(problem, target, width) * target)]
+
+
+def calm(problem: Problem, target: Array, width: float) -> Array:
+    """1 where surfaces have no shape finer than a width (mm), 0 at noses and fillets, smooth between, ``(points, 1)``.
+
+    They are looked at as they were after all of the target, so that ripples are no shape.
+    """
+    found = []
+    for space, part in zip(problem.spaces.values(), problem.split(target).values(), strict=True):
+        net = Net(space.net.u, space.net.v, space.net.poles + part, space.net.weights)
+        us, vs = (knots.greville()[:, None] for knots in (net.u, net.v))
+        jet = jets(net, us, vs, np.ones(net.poles.shape[:2], bool), np.zeros(3))
+        bent = forms(jet).largest.reshape(len(vs), len(us)).T * width / (2 * np.pi)
+        share = np.clip((SHARP[1] - bent) / (SHARP[1] - SHARP[0]), 0.0, 1.0)
+        found.append(eased(net, share, width).ravel())
+    return np.concatenate(found)[:, None]
 
 
 def faired(

@@ -128,3 +128,16 @@ def _trend(net: Net, sharp: Creases, scale: float) -> Net:
         if coarse != knots:
             poles = projection(coarse, knots).apply(poles, axis=axis)
     return Net(net.u, net.v, poles, net.weights)
+
+
+def eased(net: Net, share: Array, width: float) -> Array:
+    """Shares ``(nu, nv)`` of the control points of a net that change smoothly, and are nowhere larger than they were.
+
+    The mean over a window of the width (mm) of the least over the same window.
+    """
+    from scipy.ndimage import minimum_filter, uniform_filter
+
+    spacing = (arc_lengths(net, axis).sum() / net.poles.shape[axis] for axis in (0, 1))
+    window = tuple(2 * int(min(width / 2 / step, count)) + 1 for step, count in zip(spacing, share.shape, strict=True))
+    least = minimum_filter(share, window, mode="nearest")
+    return np.asarray(np.minimum(share, uniform_filter(least, window, mode="nearest")))

@@ -9,13 +9,12 @@ import numpy as np
 
 from mracad.bspline.net import Net, cross
 from mracad.edit.pose import Scene, Tolerances, pose
-from mracad.edit.target import Sheet, stiffness
+from mracad.edit.target import Sheet, eased, stiffness
 from mracad.inspect.roughness import Change, Worse, better, worse
 from mracad.inspect.survey import POINTS, Survey, changes, surveys
 from mracad.model import Face
 from mracad.seam.interface import Joints
 from mracad.seam.solve import Space
-from mracad.wavelet.ladder import arc_lengths
 
 Array = np.ndarray
 
@@ -150,8 +149,7 @@ class Trial:
 def bounded(net: Net, offset: Array, bound: float, width: float) -> Array:
     """Offsets ``(nu, nv, 3)`` that are scaled back, smoothly within a width, until none leads far along the normal.
 
-    The share a = min(1, bound / |δ · n|) beside each Greville point gives way to the mean, over a window of the width,
-    of its least values over the same window: never more than a, and smooth.
+    Each takes the share min(1, bound / |δ · n|), eased, of what is largest beside its Greville point.
 
     Parameters
     ----------
@@ -160,7 +158,7 @@ def bounded(net: Net, offset: Array, bound: float, width: float) -> Array:
     bound, width : float
         mm.
     """
-    from scipy.ndimage import maximum_filter, minimum_filter, uniform_filter
+    from scipy.ndimage import maximum_filter
 
     us, vs = (_between(knots.greville()) for knots in (net.u, net.v))
     normals = cross(net.tangents(us, vs, 0), net.tangents(us, vs, 1))
@@ -168,11 +166,7 @@ def bounded(net: Net, offset: Array, bound: float, width: float) -> Array:
     far = np.abs((np.asarray(Net(net.u, net.v, offset, net.weights).grid(us, vs)) * normals).sum(axis=-1))
     far = maximum_filter(far, 2 * FINER + 1, mode="nearest")[::FINER, ::FINER]
     share = bound / np.maximum(far, bound)
-    spacing = (arc_lengths(net, axis).sum() / net.poles.shape[axis] for axis in (0, 1))
-    window = tuple(2 * int(min(width / 2 / step, count)) + 1 for step, count in zip(spacing, share.shape, strict=True))
-    least = minimum_filter(share, window, mode="nearest")
-    share = np.minimum(share, uniform_filter(least, window, mode="nearest"))
-    return offset * share[..., None]
+    return offset * eased(net, share, width)[..., None]
 
 
 def _between(places: Array) -> Array:
