@@ -34,6 +34,9 @@ WHOLE = 1.25
 """What may be done in whole is preferred to a part of what comes nearer to the target by less than this factor: a part
 leaves something of every wave everywhere."""
 
+SINGULAR = 1e3
+"""Curvature over the wavelength from which on a face is singular."""
+
 FINER = 3
 """Steps from one Greville point to the next in which deviations are looked for."""
 
@@ -80,8 +83,9 @@ class Trial:
     """Surfaces that move together: their problem, and the judge of what is done to them."""
 
     def __init__(self, scene: Scene, members: Mapping[int, Sheet], joined: Joints) -> None:
-        self.tolerances = scene.tolerances
         self.width = max(sheet.wavelength for sheet in members.values())
+        growth = replace(scene.tolerances.growth, singular=SINGULAR / self.width)
+        self.tolerances = replace(scene.tolerances, growth=growth)
         self.pose = pose(scene, members, joined, self.width, max(sheet.detail for sheet in members.values()))
         self.problem = self.pose.problem
         self.faces = [members[i].faces for i in self.problem.spaces]

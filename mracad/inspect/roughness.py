@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
+from math import inf
 
 
 class Rougher(Enum):
@@ -14,6 +15,7 @@ class Rougher(Enum):
     CURVATURE = "largest curvature"
     KINK = "kink"
     FOLD = "fold"
+    SINGULAR = "singular point"
 
 
 @dataclass(frozen=True)
@@ -87,6 +89,8 @@ class Growth:
         By how much an angle across a knot line may grow, degrees.
     fold : float
         By how much a normal may turn, degrees.
+    singular : float
+        Curvature before, 1/mm, from which on what a grid sees of a face depends on where its points lie.
     """
 
     bending: float = 0.0
@@ -94,6 +98,7 @@ class Growth:
     curvature: float = 0.0
     kink: float = 0.0
     fold: float = 30.0
+    singular: float = inf
 
 
 @dataclass(frozen=True)
@@ -119,6 +124,8 @@ def worse(change: Change, allowed: Growth) -> tuple[Worse, ...]:
         found.append(Worse(Rougher.KINK, before.kink, after.kink))
     if change.turn > allowed.fold:
         found.append(Worse(Rougher.FOLD, 0.0, change.turn))
+    if before.curvature > allowed.singular:
+        found.append(Worse(Rougher.SINGULAR, before.curvature, after.curvature))
     return tuple(found)
 
 
