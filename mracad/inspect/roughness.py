@@ -56,8 +56,8 @@ class Change:
     opened : float
         By how much the angle across a knot line grew, where it grew most, degrees.
     turn : float
-        Largest angle between a normal after and the nearest of those before within a knot span of there, degrees:
-        noise that goes turns normals into what they were beside it, a fold turns them over.
+        Largest angle between the normals before and after, degrees; where noise goes, between a normal after and the
+        nearest of those before within a knot span of there.
     deviation : float
         Largest motion along the normal, mm.
     motion : float

@@ -27,8 +27,9 @@ RIPPLE = 1e-8
 ROUNDING = 16 * float(np.finfo(float).eps)
 """Error of a point of a surface, relative to its largest coordinate: a ripple as long as the span where it lies."""
 
-STEEP = 20.0
-"""Normals that turn by more, degrees, are compared with those around, too."""
+NOISY, STEEP = 1.0, 20.0
+"""Where normals turn by more than the first in the median, degrees, noise goes; those that turn by more than the second
+are then compared with those around, too."""
 
 _BLOCK = 50_000
 
@@ -138,11 +139,12 @@ def changes(surveyed: Sequence[Survey], nets: Sequence[Net]) -> list[Change]:
 def _turned(survey: Survey, normals: Array, counted: Array) -> Array:
     """How far normals ``(3, q)`` are from those before, as chords, ``(q,)``.
 
-    Where that is far, from the nearest of those within as many points as a span has.
+    Where noise goes all over the face, what is far is taken from the nearest of those within as many points as a span
+    has: noise that goes turns normals into what they were beside it, a fold turns them over.
     """
     off = np.where(counted, np.linalg.norm(normals - survey.normals, axis=0), 0.0)
-    rule, most = survey.rule, 2 * np.sin(np.radians(STEEP / 2))
-    if (off > most).any():
+    rule, (noisy, most) = survey.rule, 2 * np.sin(np.radians([NOISY / 2, STEEP / 2]))
+    if (off > most).any() and np.median(off[counted]) > noisy:
         reach, mask = (rule.v.shape[1], rule.u.shape[1]), rule.mask.T
         place = np.full(mask.shape, -1)
         place[mask] = np.where(survey.regular, np.arange(len(off)), -1)
