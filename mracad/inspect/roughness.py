@@ -90,7 +90,7 @@ class Growth:
     fold : float
         By how much a normal may turn, degrees.
     singular : float
-        Curvature before, 1/mm, from which on what a grid sees of a face depends on where its points lie.
+        Curvature that stays, 1/mm, from which on what a grid sees of a face depends on where its points lie.
     """
 
     bending: float = 0.0
@@ -124,7 +124,7 @@ def worse(change: Change, allowed: Growth) -> tuple[Worse, ...]:
         found.append(Worse(Rougher.KINK, before.kink, after.kink))
     if change.turn > allowed.fold:
         found.append(Worse(Rougher.FOLD, 0.0, change.turn))
-    if before.curvature > allowed.singular:
+    if min(before.curvature, after.curvature) > allowed.singular:
         found.append(Worse(Rougher.SINGULAR, before.curvature, after.curvature))
     return tuple(found)
 

@@ -255,3 +255,10 @@ def test_many_surfaces_at_once_are_as_each_by_itself():
     together = changes(surveys([(n, f, n.u, n.v) for n, f in zip(nets, faces, strict=True)]), later)
     for net, new, each, found in zip(nets, later, faces, together, strict=True):
         assert found == change(net, new, each)
+
+
+def test_only_singular_points_that_stay_are_held_against_an_edit():
+    fine, singular = Roughness(curvature=1.0), Roughness(curvature=1e6)
+    allowed, what = Growth(singular=1e3), [Rougher.SINGULAR]
+    assert [each.what for each in worse(Change(singular, singular, Roughness()), allowed)] == what
+    assert worse(Change(singular, fine, Roughness()), allowed) == worse(Change(fine, fine, Roughness()), allowed) == ()
