@@ -103,11 +103,13 @@ class Moved:
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """What became of all surfaces, and the joints that moved with them; ``sheets`` are all that were looked at."""
+    """What became of all surfaces, and the joints that moved with them; ``sheets`` are all that were looked at, and
+    ``mended`` edges that were pulled shut."""
 
     moved: Mapping[int, Moved]
     joints: Joints
     sheets: Mapping[int, Sheet] = field(default_factory=dict)
+    mended: frozenset[int] = frozenset()
 
     def displacement(self) -> Displacement:
         """What moves."""

@@ -19,6 +19,7 @@ import numpy as np
 from mracad.bspline.net import Net
 from mracad.constraint.seam import Wishes
 from mracad.edit.driver import Result, drive
+from mracad.edit.mend import Mended, mended
 from mracad.edit.pose import Scene, Tolerances
 from mracad.edit.target import Sheet, Wish, eased, sheets, stiffness
 from mracad.inspect.curvature import forms
@@ -112,12 +113,18 @@ def faired(
         Called with surfaces done and surfaces in all, each counted twice: by itself and together with others.
     """
     every = sheets(model, movable, wish)
-    mending = wishes.close_gaps or wishes.fit > 0.0
-    rough = {
-        i: each for i, each in every.items() if mending or each.detail > max(DETAIL[0], DETAIL[1] * each.wavelength)
-    }
-    faces = {face for each in rough.values() for face in each.movable}
-    bend = tolerances.bend / max((each.wavelength for each in rough.values()), default=1.0)
-    joined = joints(model, faces, replace(wishes, bend=bend))
-    result = drive(Scene(model, rough, joined, tolerances, refine), wish, progress)
-    return replace(result, sheets=every)
+    wishes = replace(wishes, bend=tolerances.bend / max((each.wavelength for each in every.values()), default=1.0))
+    mends = Mended(model)
+    if wishes.close_gaps or wishes.fit > 0.0:
+        mends = mended(Scene(model, every, joints(model, _faces(every), wishes), tolerances, refine))
+    if mends.moved:
+        wishes = replace(wishes, fit=0.0, close_gaps=False)
+    now = sheets(mends.model, movable, wish) if mends.moved else every
+    rough = {i: each for i, each in now.items() if each.detail > max(DETAIL[0], DETAIL[1] * each.wavelength)}
+    joined = joints(mends.model, _faces(rough), wishes)
+    result = drive(Scene(mends.model, rough, joined, tolerances, refine), wish, progress)
+    return replace(mends.before(result, every), sheets=every)
+
+
+def _faces(members: Mapping[int, Sheet]) -> set[int]:
+    return {face for each in members.values() for face in each.movable}

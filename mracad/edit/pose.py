@@ -90,6 +90,8 @@ class Pose:
         What contacts between two surfaces lack as they are: gap, slope, curvature.
     limits : ndarray (conditions,)
         What they may lack.
+    trimmed : ndarray of bool (conditions,)
+        Where what seams along trim curves lack is to be mended.
     """
 
     problem: Problem
@@ -97,6 +99,12 @@ class Pose:
     owners: list[set[int]]
     opened: Array
     limits: Array
+    trimmed: Array
+
+    def open(self, delta: Array) -> bool:
+        """Whether a displacement leaves seams along trim curves open that are to be mended."""
+        lacked = np.linalg.norm(self.opened + self.contacts.matrix @ delta, axis=1)
+        return bool((lacked > self.limits)[self.trimmed].any())
 
 
 def pose(
@@ -136,11 +144,17 @@ def pose(
     pairs = np.array([each.b is not None for each in contacts], bool)[found.owner]
     opened = np.where(pairs[:, None], found.matrix @ f, 0.0)
     t = scene.tolerances
-    limits = found.limits(opened, (t.gap, t.angle, t.bend / width))
+    most = t.gap, t.angle, t.bend / width
+    limits, tolerances = found.limits(opened, most), found.limits(0.0 * opened, most)
+    mends = np.array([(each.close, each.fit, False) for each in contacts], bool).reshape(-1, 3)
+    mends = mends[found.owner, found.order]
+    limits = np.where(mends, tolerances, limits)
     weight = (detail / TIGHT) ** 2 * width
-    soft, pull = (weight * found.form(limits), -weight * found.pull(opened, limits)) if contacts else (None, None)
+    shut = np.where(mends[:, None], opened, 0.0) if joined.mended else opened
+    soft, pull = (weight * found.form(limits), -weight * found.pull(shut, limits)) if contacts else (None, None)
+    trimmed = mends & np.array([not each.since for each in contacts], bool)[found.owner]
     problem = Problem(spaces, rows, np.where(goal[:, None], -(rows @ f), 0.0), soft, pull)
-    return Pose(problem, found, [each.surfaces for each in contacts], opened, limits)
+    return Pose(problem, found, [each.surfaces for each in contacts], opened, limits, trimmed)
 
 
 def _space(scene: Scene, sheet: Sheet, joined: Joints, longest: float) -> Net:
@@ -151,5 +165,5 @@ def _space(scene: Scene, sheet: Sheet, joined: Joints, longest: float) -> Net:
     net = refined(sheet.net, [each for each in trims if each[1].edge not in joined.moving], sheet.wavelength / 4)
     if not np.isfinite(longest):
         return net
-    loose = {edge for seam in joined.loose for edge in (seam.edge, seam.twin)}
+    loose = {edge for seam in joined.loose if not seam.since for edge in (seam.edge, seam.twin)}
     return refined(net, [each for each in trims if each[1].edge in loose], longest)

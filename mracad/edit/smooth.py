@@ -140,10 +140,9 @@ def treatments(model: Model, movable: set[int], result: Result, options: Smooth)
     joints, frozen = result.joints, dict(result.joints.frozen)
     if options.edges == "frozen":
         frozen = {edge: FROZEN if why == HELD else why for edge, why in frozen.items()}
-    how = dict.fromkeys(joints.moving, "mended" if options.close_gaps or options.fit_g1 is not None else "coupled")
-    if not (options.close_gaps or options.fit_g1 is not None):
-        how |= {edge: "to tolerance" for seam in joints.loose for edge in (seam.edge, seam.twin)}
-    how |= dict.fromkeys(joints.closing, "coupled")
+    how = dict.fromkeys(joints.moving, "coupled")
+    how |= {edge: "to tolerance" for seam in joints.loose for edge in (seam.edge, seam.twin)}
+    how |= dict.fromkeys(result.mended, "mended")
     found = []
     for edge in model.edges:
         faces = tuple(side.face for side in edge.sides)

@@ -197,6 +197,10 @@ class Problem:
             pull = pull + self.pull
         return kept + self._solver(stiffness, self.free)(pull, start=kept, goal=self.goal)
 
+    def settled(self, delta: Array, stiffness: float = 0.0) -> Array:
+        """A displacement ``(points, 3)`` with what it misses of the conditions put right as smoothly as can be."""
+        return delta + self._solver(stiffness, self.free)(np.zeros_like(delta), start=delta, goal=self.goal)
+
     def _solver(self, stiffness: float, free: Array) -> Constrained | Divided:
         """The solver of the form M + stiffness · K and the contacts."""
         soft = self.soft is not None and free is self.free

@@ -1,0 +1,144 @@
+"""Mending: gaps and tilts along seams pulled shut by the smoothest least displacement, before anything else is done.
+
+    δ = argmin ‖δ‖²_M + ℓ⁴ |δ|²_K    subject to    L δ = r,    ℓ = width / 2π
+
+r what joints lack.  It fades within the width, and what an edit does afterwards is judged against the mended surfaces:
+mending is asked for by name.  Ends of seams on free edges are closed, too: these give way near there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from mracad.bspline.net import Net
+from mracad.constraint.trimmed import TrimmedSeam, along
+from mracad.edit.driver import Moved, Result, groups
+from mracad.edit.pose import Pose, Scene, pose
+from mracad.edit.target import Sheet, stiffness
+from mracad.edit.trial import Watch, displaced
+from mracad.model import Model
+from mracad.seam.interface import Joints
+
+Array = np.ndarray
+
+OPEN = 1e-10
+"""Gap, mm, or tilt, radians, that counts as one."""
+
+HALVINGS = 4
+"""Most times that spans beside a trim curve are halved until its seam holds."""
+
+PASSES = 4
+"""Times that what a mending has left is mended."""
+
+DETAIL = 3.0
+"""Displacements along trim curves count for so many of the widest gap there."""
+
+
+@dataclass(frozen=True, eq=False)
+class Mended:
+    """What mending made of a model.
+
+    Attributes
+    ----------
+    model : Model
+    moved : mapping of int to Moved
+        The surfaces that it moved.
+    edges : frozenset of int
+        Those that were pulled shut.
+    """
+
+    model: Model
+    moved: Mapping[int, Moved] = field(default_factory=dict)
+    edges: frozenset[int] = frozenset()
+
+    def before(self, result: Result, sheets: Mapping[int, Sheet]) -> Result:
+        """All that was done to a model, this first; ``sheets`` are those of the model as it was."""
+        moved = dict(result.moved)
+        for i, each in self.moved.items():
+            moved[i] = _both(each, moved[i], sheets[i]) if i in moved else each
+        joined = result.joints
+        frozen = {edge: why for edge, why in joined.frozen.items() if edge not in self.edges}
+        return replace(result, moved=moved, joints=replace(joined, frozen=frozen), mended=self.edges)
+
+
+def mended(scene: Scene) -> Mended:
+    """Pull the gaps and tilts shut that the joints of a scene say."""
+    moved: dict[int, Moved] = {}
+    edges: set[int] = set()
+    for group in groups(scene.sheets, scene.joints):
+        joined = scene.joints.among(group)
+        wide = _widest(joined)
+        if wide <= OPEN:
+            continue
+        members = {i: scene.sheets[i] for i in group}
+        parts = _moved(members, *_shut(scene, members, _yielding(joined), wide))
+        turned = max(change.turn for each in parts.values() for change in each.changes.values())
+        if turned <= scene.tolerances.growth.fold:
+            moved |= parts
+            edges |= {edge for seam in joined.mended for edge in (seam.edge, seam.twin)}
+    result = Result(moved, scene.joints)
+    return Mended(result.displacement().applied(scene.model), moved, frozenset(edges))
+
+
+def _widest(joined: Joints) -> float:
+    """The largest gap (mm) or tilt (radians) that is to be mended."""
+    exact = [(s.joint.close * s.gap, s.joint.fit * s.angle) for s in joined.exact]
+    loose = [(s.close * s.opening[0], s.fit * s.opening[1]) for s in joined.loose]
+    return float(max((max(each) for each in [*exact, *loose]), default=0.0))
+
+
+def _yielding(joined: Joints) -> Joints:
+    """The joints, of which those that are to be mended keep their position exactly and the rest to the tolerance.
+
+    Where four patches meet, gaps that are closed have slopes that tilts must follow, and the other way round.
+    """
+    exact, loose = [], list(joined.loose)
+    for seam in joined.exact:
+        joint = seam.joint
+        if joint.order and (joint.close or joint.fit):
+            sides, opening = (along(seam.a), along(seam.b)), np.array([seam.gap, seam.angle, 0.0])
+            loose.append(TrimmedSeam(seam.edge, seam.twin, *sides, joint.order, opening, False, joint.fit, since=1))
+            seam = replace(seam, joint=replace(joint, order=0))
+        exact.append(seam)
+    return replace(joined, exact=tuple(exact), loose=tuple(loose))
+
+
+def _shut(scene: Scene, members: Mapping[int, Sheet], joined: Joints, wide: float) -> tuple[Pose, Array]:
+    """The problem of surfaces, and the displacement by which joints are shut."""
+    width = max(sheet.wavelength for sheet in members.values())
+    longest = np.inf
+    for halving in range(HALVINGS + 1):
+        found = pose(scene, members, joined, width, DETAIL * wide, longest)
+        delta = found.problem.nearest(np.zeros_like(found.problem.f), stiffness(width))
+        for _ in range(PASSES):  # rows that depend on each other leave something of what they ask
+            delta = found.problem.settled(delta, stiffness(width))
+        if not scene.refine or not found.open(delta):
+            break
+        longest = width / 2 ** (halving + 3)
+    return found, delta
+
+
+def _moved(members: Mapping[int, Sheet], found: Pose, delta: Array) -> dict[int, Moved]:
+    result = {}
+    for (i, space), part in zip(found.problem.spaces.items(), found.problem.split(delta).values(), strict=True):
+        result[i] = _whole(members[i], space.net, part, int(space.free.sum()))
+    return result
+
+
+def _whole(sheet: Sheet, net: Net, offset: Array, free: int) -> Moved:
+    """A displacement that was done in whole."""
+    now = Watch.of([(net, sheet.faces)]).changes({0: displaced(net, offset)})[0]
+    return Moved(sheet, net, offset, 1.0, now, (), free, 0.0, 0.0)
+
+
+def _both(first: Moved, then: Moved, sheet: Sheet) -> Moved:
+    """One displacement after another."""
+    u, v = then.net.u, then.net.v
+    lifted = Net(first.net.u, first.net.v, first.offset, first.net.weights).over(u, v)
+    whole = _whole(sheet, sheet.origin.over(u, v), lifted.poles + then.offset, then.free)
+    return replace(
+        whole, amount=then.amount or 1.0, limits=then.limits, gain=then.gain, wanted=then.wanted, rough=then.rough
+    )
