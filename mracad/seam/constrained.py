@@ -14,7 +14,9 @@ SLACK = 1e-9
 """Proximal parameter of the conditions, relative: rows may depend on each other; each pass divides what is left of
 ``L δ`` by about as much."""
 
-PASSES = 3
+PASSES, MOST, MET = 3, 24, 1e-12
+"""Proximal passes, and most of them until conditions are met to a share of what moves: rows that barely depend on each
+other are met slowly."""
 
 LEAST = 1e-10
 """Share of the largest diagonal entry that is added to the form: functions that barely reach into a face stay put."""
@@ -84,11 +86,15 @@ class Constrained:
         if start is not None:
             owed -= self.rows @ (start[self.free] / self.scale[:, None])
         x, y = np.zeros_like(b), np.zeros_like(owed)
-        for _ in range(PASSES if exactly and len(y) else 1):
+        missed = owed
+        for done in range(MOST if exactly and len(y) else 1):
+            if done >= PASSES and np.abs(missed).max() <= MET * np.abs(x).max():
+                break
             residual = b - self.form @ x - self.rows.T @ y
-            step = self._solve(np.concatenate([residual, owed - self.rows @ x]))
+            step = self._solve(np.concatenate([residual, missed]))
             x += step[: len(x)]
             y += step[len(x) :]
+            missed = owed - self.rows @ x
         return self._whole(x)
 
     def settled(self, x: Array) -> Array:
