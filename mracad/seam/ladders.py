@@ -10,7 +10,7 @@ the highest of their degrees.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -95,21 +95,21 @@ def ladders(nets: Mapping[int, Net], creases: Mapping[int, Creases], seams: Sequ
     seams : sequence of Seam
         Between these surfaces.
     """
+    knots = {(i, axis): each for i, net in nets.items() for axis, each in enumerate((net.u, net.v))}
     found: dict[Direction, Ladder] = {}
-    for members in _linked(nets, seams):
-        each = _ladder(nets, creases, members)
-        found |= dict.fromkeys(members, each)
+    for members in _linked(knots, seams):
+        found |= dict.fromkeys(members, _ladder(nets, creases, members))
     return found
 
 
-def _linked(nets: Mapping[int, Net], seams: Sequence[Seam]) -> list[dict[Direction, Map]]:
+def _linked(knots: Mapping[Direction, KnotVector], seams: Sequence[Seam]) -> list[dict[Direction, Map]]:
     """Directions that seams link, directly or through others, by surface; a seam that contradicts others links none."""
-    of: dict[Direction, dict[Direction, Map]] = {(i, axis): {(i, axis): (1.0, 0.0)} for i in nets for axis in (0, 1)}
+    of: dict[Direction, dict[Direction, Map]] = {m: {m: (1.0, 0.0)} for m in knots}
     for seam in seams:
         one, two = (seam.a.surface, 1 - seam.a.axis), (seam.b.surface, 1 - seam.b.axis)
         slope = (seam.a.stop - seam.a.start) / (seam.b.stop - seam.b.start)
         shift = seam.a.start - slope * seam.b.start
-        if of[one] is of[two] or not _alike(_knots(nets, one), _knots(nets, two), slope, shift):
+        if of[one] is of[two] or not _alike(knots[one], knots[two], slope, shift):
             continue
         # own parameter -> parameter of two -> parameter of one -> common parameter
         a, b = of[one][one]
@@ -119,11 +119,6 @@ def _linked(nets: Mapping[int, Net], seams: Sequence[Seam]) -> list[dict[Directi
         of[one] |= {member: (ratio * p, ratio * q + move) for member, (p, q) in of[two].items()}
         of |= dict.fromkeys(of[two], of[one])
     return list({id(members): members for members in of.values()}.values())
-
-
-def _knots(nets: Mapping[int, Net], direction: Direction) -> KnotVector:
-    net = nets[direction[0]]
-    return (net.u, net.v)[direction[1]]
 
 
 def _alike(one: KnotVector, two: KnotVector, slope: float, shift: float) -> bool:
@@ -141,51 +136,45 @@ class _Placed:
     knots: KnotVector
     kept: Array
     lengths: Array
+    sharp: Mapping[float, int] = field(default_factory=dict)
 
+    def rungs(self) -> list[KnotVector]:
+        return rungs_by_level(self.knots, keep=self.kept, lengths=self.lengths)
 
-def _pieces(knots: KnotVector) -> int:
-    """Spans, where a knot of multiplicity r counts as r knots."""
-    return int(knots.multiplicities[1:-1].sum()) + 1
+    def density(self, rung: KnotVector) -> float:
+        """Logarithm of spans by length, where a knot of multiplicity r counts as r knots."""
+        return float(np.log((rung.multiplicities[1:-1].sum() + 1) / self.lengths.sum()))
 
 
 def _ladder(nets: Mapping[int, Net], creases: Mapping[int, Creases], members: Mapping[Direction, Map]) -> Ladder:
-    """The ladder on the union of the members' knots.
+    """The ladder on the union of the members' own knots.
 
-    A level has as many pieces as the members have on theirs, on average.  It has the lowest degree whose splines all
-    members hold.
+    A level is as dense as those of the members are on average, and of the lowest degree whose splines all of them hold.
     """
-    own = {m: _knots(nets, m) for m in members}
-    degrees = [knots.degree for knots in own.values()]
-    placed = [_placed(nets, creases, m, way, min(degrees)) for m, way in members.items()]
+    degrees = [(nets[i].u, nets[i].v)[axis].degree for i, axis in members]
+    placed = [_placed(nets[m[0]], creases[m[0]][m[1]], m[1], way, min(degrees)) for m, way in members.items()]
     union, copies = _union(placed, [max(degrees) - degree for degree in degrees])
-    rungs = rungs_by_level(union.knots, keep=union.kept, lengths=union.lengths)
-    have = np.log([_pieces(rung) / float(union.lengths.sum()) for rung in rungs])
-    each = [rungs_by_level(one.knots, keep=one.kept, lengths=one.lengths) for one in placed]
-    levels = [rungs[0]]
-    for level in range(1, max(map(len, each))):
-        wanted = [
-            np.log(_pieces(those[min(level, len(those) - 1)]) / float(one.lengths.sum()))
-            for those, one in zip(each, placed, strict=True)
-        ]
-        levels.append(rungs[int(np.abs(have - np.mean(wanted)).argmin())])
-    sharp = {
-        m: {float(x): int(knots.multiplicities[knots.breaks == x][0]) - knots.degree for x in creases[m[0]][m[1]]}
-        for m, knots in own.items()
-    }
+    rungs, each = union.rungs(), [(one, one.rungs()) for one in placed]
+    have, levels = np.array([union.density(rung) for rung in rungs]), [rungs[0]]
+    for level in range(1, max(len(those) for _, those in each)):
+        wanted = np.mean([one.density(those[min(level, len(those) - 1)]) for one, those in each])
+        levels.append(rungs[int(np.abs(have - wanted).argmin())])
+    sharp = {m: one.sharp for m, one in zip(members, placed, strict=True)}
     return Ladder(members, levels, (max(degrees), max(min(degrees), max(degrees) + 1 - copies)), sharp)
 
 
-def _placed(nets: Mapping[int, Net], creases: Mapping[int, Creases], m: Direction, way: Map, degree: int) -> _Placed:
+def _placed(net: Net, creases: frozenset[float], axis: int, way: Map, degree: int) -> _Placed:
     """A direction on the common parameter, its knots as smooth as they are but of a lower degree."""
-    knots, lengths = _knots(nets, m), arc_lengths(nets[m[0]], m[1])
+    knots, lengths = (net.u, net.v)[axis], arc_lengths(net, axis)
     order = slice(None, None, 1 if way[0] > 0 else -1)
     counts = np.clip(knots.multiplicities + degree - knots.degree, 1, degree)
     if not knots.periodic:
         counts[[0, -1]] = degree + 1
     breaks = way[0] * knots.breaks + way[1]
-    kept = np.isin(knots.breaks, list(creases[m[0]][m[1]]))
+    kept = np.isin(knots.breaks, list(creases))
     vector = KnotVector.from_multiplicities(breaks[order], counts[order], degree, knots.periodic)
-    return _Placed(vector, kept[order], lengths[order])
+    excess = zip(knots.breaks[kept].tolist(), (knots.multiplicities[kept] - knots.degree).tolist(), strict=True)
+    return _Placed(vector, kept[order], lengths[order], dict(excess))
 
 
 def _union(placed: Sequence[_Placed], elevations: Sequence[int]) -> tuple[_Placed, int]:
@@ -194,8 +183,7 @@ def _union(placed: Sequence[_Placed], elevations: Sequence[int]) -> tuple[_Place
     breaks = every[np.append(True, np.diff(every) > SAME * (every[-1] - every[0]))]
     middle = (breaks[:-1] + breaks[1:]) / 2
     counts, kept = np.ones(len(breaks), dtype=int), np.zeros(len(breaks), dtype=bool)
-    total, shares = np.zeros(len(middle)), np.zeros(len(middle))
-    copies = np.ones(len(breaks), dtype=int)
+    total, shares, copies = np.zeros(len(middle)), np.zeros(len(middle)), np.ones(len(breaks), dtype=int)
     for one, more in zip(placed, elevations, strict=True):
         at = np.abs(one.knots.breaks[:, None] - breaks).argmin(axis=1)
         inner = slice(None) if one.knots.periodic else slice(1, -1)
