@@ -17,9 +17,9 @@ from mracad.seam.interface import Joints
 from mracad.seam.solve import Problem, Space
 from mracad.wavelet.ladder import arc_lengths, rungs_by_level
 from mracad.wavelet.project import projection
-from tests.edit import panels
+from tests.edit import halves, panels
 from tests.edit.models import sheet
-from tests.edit.test_fair import rough
+from tests.edit.test_fair import beside, rough
 from tests.edit.test_seams import other_degrees, other_senses, skewed
 
 SPANS, NOISE = 16, 0.3
@@ -170,3 +170,15 @@ def test_a_joint_of_varying_ratio_does_not_lock():
         errors.append(np.sqrt(np.mean(np.concatenate(off) ** 2)))
     print(f"ratio that varies {errors[0]:.4f} mm, constant {errors[1]:.4f} mm")
     assert errors[0] <= 1.14 * errors[1]
+
+
+def test_halves_that_meet_along_a_trim_curve_come_closer_together_than_alone():
+    clean, left, right = halves.surfaces(0.2, (30, 60))
+    model = view(halves.document(left, right))
+    errors = []
+    for hold in (frozenset(), frozenset(range(len(model.edges)))):
+        result = faired(model, {0, 1}, Level(2), Wishes("g1", hold=hold), Tolerances(1e-3))
+        after = result.displacement().applied(model)
+        assert len(result.joints.loose) == (not hold)
+        errors.append(beside([surface.net for surface in after.surfaces], clean))
+    assert errors[0] < 0.95 * errors[1]
