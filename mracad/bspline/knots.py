@@ -152,6 +152,12 @@ class KnotVector:
         return float(self.breaks[-1] - self.breaks[0])
 
     @property
+    def full(self) -> Array:
+        """Knots of multiplicity ``degree`` or more inside the domain, and at the end of a period."""
+        stop = None if self.periodic else -1
+        return self.breaks[1:stop][self.multiplicities[1:stop] >= self.degree]
+
+    @property
     def spans(self) -> int:
         """Number of non-empty knot spans within the domain."""
         return len(self.breaks) - 1

@@ -16,7 +16,8 @@ KINK = math.radians(0.1)
 
 
 def crease_lines(net: Net, axis: int, visible: Array) -> frozenset[float]:
-    """Interior knots of full multiplicity across which the normal turns by more than the kink angle.
+    """Knots of full multiplicity, one at the end of a period among them, across which the normal turns by more than the
+    kink angle.
 
     Parameters
     ----------
@@ -26,10 +27,9 @@ def crease_lines(net: Net, axis: int, visible: Array) -> frozenset[float]:
         Control points that some face depends on; a line counts only where one of those on it is visible.
     """
     knots, other = (net.u, net.v)[axis], (net.u, net.v)[1 - axis]
-    full = np.flatnonzero(knots.multiplicities[1:-1] >= knots.degree) + 1
-    if not len(full):
+    lines, across = knots.full, other.greville()
+    if not len(lines):
         return frozenset()
-    lines, across = knots.breaks[full], other.greville()
     first, values = basis(knots, lines)
     on = (first + values.argmax(axis=1)) % knots.count
     line, place = np.nonzero((visible if axis == 0 else visible.T)[on])

@@ -90,10 +90,9 @@ def _kinks(net: Net, metric: Net, quadrature: Quadrature, creases: Sequence[Coll
     n = net.u.count * net.v.count
     found = [csr_array((n, n)), csr_array((n, n))]
     for axis in (0, 1):
-        knots = (net.u, net.v)[axis]
-        inner = knots.breaks[1:-1][knots.multiplicities[1:-1] >= knots.degree]
+        full = (net.u, net.v)[axis].full
         for sharp in (False, True):
-            lines = [t for t in inner if (t in creases[axis]) == sharp]
+            lines = [t for t in full if (t in creases[axis]) == sharp]
             if lines:
                 found[sharp] = found[sharp] + _kink(net, metric, quadrature, axis, np.array(lines))
     return found[0], found[1]
@@ -110,11 +109,17 @@ def _kink(net: Net, metric: Net, quadrature: Quadrature, axis: int, lines: Array
     row = np.repeat(np.arange(len(uv)), index.shape[1])
     place = np.concatenate([row, row]), np.concatenate([where.ravel() for where, _ in halves])
     jump = csr_array((np.concatenate([-low.slope.ravel(), high.slope.ravel()]), place), shape=(len(uv), total))
-    near = np.searchsorted(knots.breaks, uv[:, axis])
-    before, after = (knots.breaks[near + k + 1] - knots.breaks[near + k] for k in (-1, 0))
+    breaks = _onwards(knots)
+    near = np.searchsorted(breaks, uv[:, axis])
+    before, after = (breaks[near + k + 1] - breaks[near + k] for k in (-1, 0))
     step = 0.5 * (before * low.height + after * high.height)
     scaled = jump.multiply(np.sqrt(KINK_WEIGHT * high.length * weight / step)[:, None]).tocsr()
     return scaled.T @ scaled
+
+
+def _onwards(knots: KnotVector) -> Array:
+    """The breaks, and of a periodic direction the first one of the next turn."""
+    return np.append(knots.breaks, knots.breaks[1] + knots.period) if knots.periodic else knots.breaks
 
 
 def _on_lines(quadrature: Quadrature, axis: int, knots: KnotVector, lines: Array) -> tuple[Array, Array]:
@@ -122,10 +127,11 @@ def _on_lines(quadrature: Quadrature, axis: int, knots: KnotVector, lines: Array
     across, along = (quadrature.u, quadrature.v)[:: 1 - 2 * axis]
     weight = (quadrature.wv, quadrature.wu)[axis]
     mask = quadrature.mask if axis == 0 else quadrature.mask.T
-    points = np.concatenate([[-np.inf], across.ravel(), [np.inf]])
-    above, near = np.searchsorted(points, lines), np.searchsorted(knots.breaks, lines)
-    beside = (points[above - 1] > knots.breaks[near - 1]) & (points[above] < knots.breaks[near + 1])
-    mask = np.pad(mask, ((1, 1), (0, 0)))
+    breaks, after = _onwards(knots), across.ravel()[0] + knots.period if knots.periodic else np.inf
+    points = np.concatenate([[-np.inf], across.ravel(), [after]])
+    above, near = np.searchsorted(points, lines), np.searchsorted(breaks, lines)
+    beside = (points[above - 1] > breaks[near - 1]) & (points[above] < breaks[near + 1])
+    mask = np.concatenate([np.zeros_like(mask[:1]), mask, mask[:1] if knots.periodic else np.zeros_like(mask[:1])])
     seen = mask[above - 1] & mask[above] & beside[:, None]
     at, t = np.meshgrid(lines, along.ravel(), indexing="ij")
     uv = np.stack([at[seen], t[seen]][:: 1 - 2 * axis], axis=1)

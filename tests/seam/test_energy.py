@@ -6,6 +6,7 @@ import pytest
 from mracad.bspline.interpolate import interpolated
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.net import Net
+from mracad.constraint.crease import crease_lines
 from mracad.inspect.cells import quadrature
 from mracad.seam.energy import KINK_WEIGHT, forms
 from tests.edit.models import rotation
@@ -115,6 +116,30 @@ def test_a_kink_counts_only_where_the_line_lies_on_a_face():
     assert c @ half @ c == pytest.approx(whole / 2, rel=1e-10)
     aside = of(net, rectangle(0.0, 0.0, 0.4, 1.0)).bending
     assert abs(c @ aside @ c) < 1e-10 * whole
+
+
+def test_a_kink_where_a_period_ends_is_one_like_the_others():
+    """A cylinder of four cubic quarters: nothing tells its closing line from the other three lines."""
+    net = cylinder()
+    net = net.over(net.u.elevated(3), net.v.elevated(3))
+    c = np.random.default_rng(6).standard_normal((net.u.count, net.v.count))
+    for bent in (False, True):
+        creases = [net.u.full, ()] if bent else ((), ())
+        found = of(net, creases=creases)
+        one, other = (x.ravel() for x in (c, np.roll(c, net.u.count // 4, axis=0)))
+        for form in (found.bending, found.creases):
+            assert one @ form @ one == pytest.approx(other @ form @ other, rel=1e-9)
+        assert bool(found.creases.nnz) is bent
+
+
+def test_a_crease_where_a_period_ends_is_one():
+    net = cylinder()
+    net = net.over(net.u.elevated(3), net.v)
+    every = np.ones(net.poles.shape[:2], bool)
+    assert not crease_lines(net, 0, every)
+    poles = net.poles.copy()
+    poles[0] *= 1.1
+    assert crease_lines(Net(net.u, net.v, poles, net.weights), 0, every) == {1.0}
 
 
 def weighted():
