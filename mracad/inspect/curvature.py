@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -10,9 +11,6 @@ Array = np.ndarray
 
 THIN = 1e-6
 """Sine of the angle between S_u and S_v below which a surface counts as degenerate."""
-
-_BLOCK = 8192
-"""Points that are gone through at once: what is computed of them fits the processor's cache."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +47,13 @@ class Forms:
         """The forms at some of the points."""
         return Forms(*(getattr(self, each.name)[..., points] for each in fields(self)))
 
+    @classmethod
+    def joined(cls, parts: Sequence[Forms]) -> Forms:
+        """The forms at the points of all of them."""
+        if len(parts) == 1:
+            return parts[0]
+        return cls(*(np.concatenate([getattr(part, each.name) for part in parts], axis=-1) for each in fields(cls)))
+
 
 def forms(jet: Array) -> Forms:
     """The forms of a surface with derivatives ``jet``, see :func:`mracad.inspect.jets.jets`.
@@ -58,15 +63,7 @@ def forms(jet: Array) -> Forms:
     do Carmo, *Differential Geometry of Curves and Surfaces*, §3.3: H = (e G − 2 f F + g E) / 2 (E G − F²), the
     derivatives of the normal by Weingarten's equations.
     """
-    parts = [_forms(jet[1:, :, begin : begin + _BLOCK]) for begin in range(0, max(jet.shape[2], 1), _BLOCK)]
-    if len(parts) == 1:
-        return parts[0]
-    names = [each.name for each in fields(Forms)]
-    return Forms(*(np.concatenate([getattr(part, name) for part in parts], axis=-1) for name in names))
-
-
-def _forms(derivatives: Array) -> Forms:
-    su, sv, suu, suv, svv, suuu, suuv, suvv, svvv = derivatives
+    _, su, sv, suu, suv, svv, suuu, suuv, suvv, svvv = jet
     ee, ff, gg = _dot(su, su), _dot(su, sv), _dot(sv, sv)
     normal = _cross(su, sv)
     density = np.sqrt(_dot(normal, normal))

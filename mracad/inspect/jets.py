@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from math import comb
 
 import numpy as np
@@ -14,6 +15,10 @@ Array = np.ndarray
 
 ORDERS = ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2), (3, 0), (2, 1), (1, 2), (0, 3))
 """Derivatives, by how often they are taken along u and v, in the order in which they are given."""
+
+
+_BLOCK = 8192
+"""Points that are gone through at once: what is computed of them fits the processor's cache."""
 
 
 def jets(net: Net, u: Array, v: Array, mask: Array, centre: Array, most: int = 3) -> Array:
@@ -35,6 +40,11 @@ def jets(net: Net, u: Array, v: Array, mask: Array, centre: Array, most: int = 3
     ndarray (10, 3, q)
         By ``ORDERS``, as many as the highest order asks, coordinate and point, v slowest.
     """
+    return np.concatenate(list(blocks(net, u, v, mask, centre, most)), axis=2)
+
+
+def blocks(net: Net, u: Array, v: Array, mask: Array, centre: Array, most: int = 3) -> Iterator[Array]:
+    """As :func:`jets`, some points at a time."""
     poles = net.poles - centre
     if net.weights is not None:
         poles = np.concatenate([poles * net.weights[..., None], net.weights[..., None]], axis=2)
@@ -43,17 +53,22 @@ def jets(net: Net, u: Array, v: Array, mask: Array, centre: Array, most: int = 3
     columns, in_v = _local(net.v, v, most)
     along = np.matmul(in_u.reshape(len(u), -1, in_u.shape[-1]), poles[rows].reshape(*rows.shape, -1))
     along = along.reshape(u.size, most + 1, net.v.count, k).transpose(1, 3, 2, 0)  # order, coordinate, column, u
-    in_v = np.ascontiguousarray(in_v.transpose(2, 0, 1, 3))
+    along, in_v = np.ascontiguousarray(along), np.ascontiguousarray(in_v.transpose(2, 0, 1, 3))
     orders = [order for order in ORDERS if sum(order) <= most]
-    found = np.empty((len(orders), k, *v.shape, u.size))
-    for r in range(most + 1):
-        windows = along[r][:, columns]
-        for s in range(most + 1 - r):
-            np.matmul(in_v[s], windows, out=found[orders.index((r, s))])
-    found = found.reshape(len(orders), k, -1)
-    if not mask.all():
-        found = found[:, :, np.flatnonzero(mask.T)]
-    return found if net.weights is None else _quotient(found)
+    wide = v.shape[1]
+    step = max(1, _BLOCK // max(wide * u.size, 1))
+    for begin in range(0, max(len(v), 1), step):
+        part = slice(begin, begin + step)
+        found = np.empty((len(orders), k, len(v[part]), wide, u.size))
+        for r in range(most + 1):
+            windows = along[r][:, columns[part]]
+            for s in range(most + 1 - r):
+                np.matmul(in_v[s, part], windows, out=found[orders.index((r, s))])
+        found = found.reshape(len(orders), k, -1)
+        inside = mask[:, begin * wide : (begin + step) * wide].T
+        if not inside.all():
+            found = found[:, :, np.flatnonzero(inside)]
+        yield found if net.weights is None else _quotient(found)
 
 
 def _local(kv: KnotVector, x: Array, most: int) -> tuple[Array, Array]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from mracad.bspline.net import Net
 from mracad.inspect.cells import Quadrature, quadrature
 from mracad.inspect.creases import CLUSTER, Crossing, crossings
 from mracad.inspect.curvature import Forms, forms
-from mracad.inspect.jets import jets
+from mracad.inspect.jets import blocks
 from mracad.inspect.roughness import Change, Roughness
 from mracad.model import Face
 
@@ -32,6 +33,9 @@ NOISY, STEEP = 1.0, 20.0
 are then compared with those around, too."""
 
 _BLOCK = 50_000
+
+_ENOUGH = 4096
+"""Points that are worth being gone through together."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,12 +173,26 @@ def _seen(surfaces: Sequence[tuple[Net, Quadrature, Array]]) -> Iterator[tuple[A
     block = (sizes.cumsum() - sizes) // _BLOCK
     for number in np.unique(block):
         members = np.flatnonzero(block == number).tolist()
-        each = [jets(net, rule.u, rule.v, rule.mask, centre) for net, rule, centre in (surfaces[i] for i in members)]
-        jet = each[0] if len(each) == 1 else np.concatenate(each, axis=2)
-        form = forms(jet)
+        parts = chain.from_iterable(
+            blocks(net, rule.u, rule.v, rule.mask, centre) for net, rule, centre in (surfaces[i] for i in members)
+        )
+        points, found = zip(*((part[0], forms(part)) for part in _gathered(parts)), strict=True)
+        at, form = np.concatenate(points, axis=1), Forms.joined(found)
         ends = sizes[members].cumsum()
         for begin, end in zip(ends - sizes[members], ends, strict=True):
-            yield jet[0, :, begin:end].copy(), form.part(slice(begin, end))
+            yield at[:, begin:end], form.part(slice(begin, end))
+
+
+def _gathered(parts: Iterable[Array]) -> Iterator[Array]:
+    """Small parts put together."""
+    waiting: list[Array] = []
+    for part in parts:
+        waiting.append(part)
+        if sum(each.shape[-1] for each in waiting) >= _ENOUGH:
+            yield waiting[0] if len(waiting) == 1 else np.concatenate(waiting, axis=-1)
+            waiting = []
+    if waiting:
+        yield waiting[0] if len(waiting) == 1 else np.concatenate(waiting, axis=-1)
 
 
 def _areas(rule: Quadrature, form: Forms) -> Array:

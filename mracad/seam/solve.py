@@ -265,7 +265,7 @@ def _sum(forms: Forms, stiffness: float) -> Any:
     mass, bending = forms.mass, forms.bending
     if not stiffness:
         return mass
-    if bending.indices is mass.indices and not forms.creases.nnz:
+    if np.may_share_memory(bending.indices, mass.indices) and not forms.creases.nnz:
         return csr_array((mass.data + stiffness * bending.data, mass.indices, mass.indptr), shape=mass.shape)
     return mass + stiffness * (bending + forms.creases)
 
