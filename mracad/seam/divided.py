@@ -14,17 +14,16 @@ from typing import Any
 
 import numpy as np
 
-from mracad.seam.constrained import LEAST
+from mracad.seam.constrained import LEAST, MET, MOST
 from mracad.seam.factor import Definite
 
 Array = np.ndarray
 
-LEFT = 1e-5
+LEFT = 1e-4
 """Share of what the first strips had to make good that may be left to them."""
 
 SWEEPS = 20
-
-PASSES = 2
+"""Most sweeps; one or two serve."""
 
 PENALTY = 1e7
 """Weight of conditions against a form whose diagonal is one; each pass divides what they lack by about as much."""
@@ -237,15 +236,18 @@ class Divided:
             owed -= self.rows @ self._scaled(start)
         found = np.zeros_like(b)
         if owed.any():
-            found = self._met(owed, b)
+            found = self._met(owed, 0.0, b)
         found += self._within(b)
         if exactly and len(owed):
-            found += self._met(owed - self.rows @ found)
+            found += self._met(owed - self.rows @ found, float(np.abs(found).max(initial=0.0)))
         return self.scale[:, None] * found
 
     def settled(self, x: Array) -> Array:
         """What is near to x, ``(n, k)``, with L x = 0."""
-        return x + self.scale[:, None] * self._met(-(self.rows @ self._scaled(x))) if len(self.there) else x
+        if not len(self.there):
+            return x
+        scaled = self._scaled(x)
+        return x + self.scale[:, None] * self._met(-(self.rows @ scaled), float(np.abs(scaled).max(initial=0.0)))
 
     def _scaled(self, x: Array) -> Array:
         return x / np.where(self.scale > 0, self.scale, np.inf)[:, None]
@@ -281,10 +283,10 @@ class Divided:
             found[points] = factor(right[points])
         return found
 
-    def _met(self, owed: Array, right: Array | None = None) -> Array:
-        """A displacement that meets conditions; what the form makes of it is taken from a right-hand side."""
+    def _met(self, owed: Array, size: float, right: Array | None = None) -> Array:
+        """What meets conditions beside a displacement of a size; what the form makes of it is taken from ``right``."""
         found = np.zeros((self.size, owed.shape[1]))
-        for _ in range(PASSES):
+        for _ in range(MOST):
             for colour in self.colours:
                 pull = PENALTY * (colour.rows.T @ owed)
                 moved = colour(pull)
@@ -294,6 +296,8 @@ class Divided:
                 if right is not None:
                     right[self.about[colour.points]] -= pull
                     right[self.about] -= colour.outside.T @ moved - PENALTY * (self.conditions.T @ met)
+            if np.abs(owed).max(initial=0.0) <= MET * max(size, np.abs(found).max(initial=0.0)):
+                break
         return found
 
 

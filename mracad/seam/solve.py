@@ -42,7 +42,7 @@ DIRECT = 12_000
 OVERLAP = 2.0
 """Most control points in strips, over those that there are, where surfaces are solved in turn with strips."""
 
-WIDTH = 9.0
+WIDTH = 7.0
 """Width of strips in lengths within which what joints do fades."""
 
 MASS = 0.37

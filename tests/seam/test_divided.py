@@ -9,7 +9,7 @@ from scipy.sparse import csr_array
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.net import Net
 from mracad.inspect.cells import quadrature
-from mracad.seam.divided import Divided
+from mracad.seam.divided import LEFT, Divided
 from mracad.seam.energy import forms
 from mracad.seam.solve import Problem, Space
 from tests.edit.models import rotation
@@ -65,7 +65,8 @@ def problem(monkeypatch, most, nets=None, held=True, **more):
 def both(monkeypatch):
     """Displacements of a call on the divided problem and on the same in one go."""
 
-    def run(call, **more):
+    def run(call, left=1e-9, **more):
+        monkeypatch.setattr("mracad.seam.divided.LEFT", left)
         divided, whole = (problem(monkeypatch, most, **more) for most in (0, 10**9))
         monkeypatch.setattr("mracad.seam.solve.DIRECT", 0)
         found = call(divided)
@@ -90,6 +91,11 @@ def test_filtered_is_that_of_the_whole_system(both, held):
     assert size(p.rows @ found) < 1e-12 * size(found) and not found[~p.free].any()
     x = p.f + found
     assert np.trace(x.T @ (p.bending @ x)) < np.trace(p.f.T @ (p.bending @ p.f))
+
+
+def test_little_is_left_of_what_strips_make_good(both):
+    _, found, wanted = both(lambda p: p.filtered(STIFFNESS), left=LEFT)
+    assert size(found - wanted) < 1e-4 * size(wanted)
 
 
 def test_nearest_is_that_of_the_whole_system(both):

@@ -164,6 +164,13 @@ def test_the_filter_is_linear_and_commutes_with_rotation():
     assert np.abs(problem(one, turn).filtered(STIFFNESS) - deltas[0] @ turn.T).max() < 1e-9
 
 
+@pytest.mark.parametrize("rows", [False, True])
+def test_rotation_commutes_where_the_length_is_many_spans(rows):
+    spans, turn = 24, rotation([1, 2, -0.5], 0.7)
+    plain, turned = (problem(rough(1, spans), how, rows=rows).filtered((20 / spans) ** 4) for how in (None, turn))
+    assert np.abs(plain).max() > 0.1 and np.abs(turned - plain @ turn.T).max() < 1e-9
+
+
 def test_a_trend_keeps_its_bending():
     net = rough()
     p = problem(net, trend=net.poles)
