@@ -10,13 +10,13 @@ from mracad.seam.factor import Definite, nested
 
 Array = np.ndarray
 
-SLACK = 1e-8
+SLACK = 1e-9
 """Proximal parameter of the conditions, relative: rows may depend on each other; each pass divides what is left of
 ``L δ`` by about as much."""
 
 PASSES, MOST, MET = 2, 24, 1e-14
-"""Proximal passes (one leaves errors of 1e-6 where lengths are many spans), and most of them until conditions are met to
-a share of what moves: rows that barely depend on each other are met slowly."""
+"""Proximal passes (one leaves errors of 1e-6 where lengths are many spans), and most of them until conditions are met
+to a share of what moves: rows that barely depend on each other are met slowly."""
 
 LEAST = 1e-10
 """Share of the largest diagonal entry that is added to the form: functions that barely reach into a face stay put."""
