@@ -434,7 +434,7 @@ def _property(part: dict[str, Any], is_length: bool) -> dict[str, Any]:
 
 def page() -> str:
     """Every step with its options, as the Markdown page ``docs/steps.md``."""
-    lines = ["# Steps of recipes", "", "Made by `make docs` from `mracad/options.py`; see [recipes](recipes.md).", ""]
+    lines = ["# Steps of recipes", "", "Made by `make docs` from `mracad/options`; see [recipes](recipes.md).", ""]
     for use, definition in schema()["$defs"].items():
         lines += [f"## {use}", "", definition["description"], "", "| option | default | |", "|---|---|---|"]
         for name, part in definition["properties"].items():

@@ -1,0 +1,178 @@
+"""What the options of every step have in common: which of them are lengths and which name files."""
+
+from __future__ import annotations
+
+import types
+import typing
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from typing import Annotated, Any, ClassVar, Literal
+
+from msgspec import Meta, Struct, structs
+
+from mracad.options.quantity import Length, length
+
+
+@dataclass(frozen=True)
+class Naming:
+    """How the text of an option names a file: what stands before the path, how it ends where it is one at all, and
+    whether digits alone name none."""
+
+    prefix: str = ""
+    ending: str = ""
+    or_number: bool = False
+
+    def file(self, text: str) -> str | None:
+        """The path in a text; None where it names no file."""
+        named = text.startswith(self.prefix) and text.endswith(self.ending)
+        return text[len(self.prefix) :] if named and not (self.or_number and text.isdecimal()) else None
+
+    def renamed(self, text: str, files: Mapping[str, str]) -> str:
+        """The text with its path replaced, where it has one that ``files`` knows."""
+        file = self.file(text)
+        return text if file is None else self.prefix + files.get(file, file)
+
+
+File = Annotated[str, Naming()]
+"""The type of a field that names a file."""
+
+FeatureText = Annotated[str, Naming(ending=".feature")]
+"""The type of a field that is a feature, or names the file of one."""
+
+CountText = Annotated[str, Naming(or_number=True)]
+"""The type of a field that is a number, or names a file that holds it."""
+
+PlaceText = Annotated[str, Naming(prefix="@")]
+"""The type of a field that is a place, or names a file of places."""
+
+
+def dashed(name: str) -> str:
+    """An option's name as on the command line; one that is a word of Python ends in _ there."""
+    return name.rstrip("_").replace("_", "-")
+
+
+@cache
+def lengths(struct: type[Struct]) -> frozenset[str]:
+    """The fields of a struct that hold a length."""
+    return frozenset(name for name, kind in plain_types(struct).items() if kind is Length)
+
+
+@cache
+def namings(struct: type[Struct]) -> dict[str, Naming]:
+    """The fields of a struct that name files, and how."""
+    hints = typing.get_type_hints(struct, include_extras=True)
+    found = ((name, _naming(hints[name])) for name in struct.__struct_fields__)
+    return {name: naming for name, naming in found if naming}
+
+
+def _naming(hint: Any) -> Naming | None:
+    return hint if isinstance(hint, Naming) else next(filter(None, map(_naming, typing.get_args(hint))), None)
+
+
+@cache
+def plain_types(struct: type[Struct]) -> dict[str, Any]:
+    """The type of each field, without its help and without None."""
+    hints = typing.get_type_hints(struct, include_extras=True)
+    return {name: _plain(hints[name]) for name in struct.__struct_fields__}
+
+
+def _plain(hint: Any) -> Any:
+    """``T`` from ``Annotated[T | None, …]``; :data:`Length` stays what it is."""
+    if hint is Length:
+        return hint
+    if typing.get_origin(hint) is Annotated:
+        return _plain(hint.__origin__)
+    if typing.get_origin(hint) in (types.UnionType, typing.Union):
+        return _plain(next(member for member in typing.get_args(hint) if member is not type(None)))
+    return hint
+
+
+class Options(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What every step is asked with.
+
+    Attributes
+    ----------
+    function : str
+        Where the step is done, ``"module:function"``.
+    """
+
+    function: ClassVar[str]
+
+    def __post_init__(self) -> None:
+        for name in lengths(type(self)):
+            if (text := getattr(self, name)) is not None:
+                length(text, 1.0, dashed(name))
+
+    def given(self) -> dict[str, Any]:
+        """The options that differ from their defaults, by name."""
+        every = {field.name: (getattr(self, field.name), field.default) for field in structs.fields(self)}
+        return {name: value for name, (value, default) in every.items() if value != default}
+
+    def files(self) -> tuple[str, ...]:
+        """Files that the options name, beside the model: what the result depends on, too."""
+        texts = ((naming, text) for name, naming in namings(type(self)).items() for text in self._texts(name))
+        return tuple(file for naming, text in texts if (file := naming.file(text)))
+
+    def relocated(self, files: Mapping[str, str]) -> typing.Self:
+        """The options with the files that they name replaced by others."""
+        changed: dict[str, Any] = {}
+        for name, naming in namings(type(self)).items():
+            texts = tuple(naming.renamed(text, files) for text in self._texts(name))
+            changed[name] = texts if isinstance(getattr(self, name), tuple) else next(iter(texts), None)
+        return structs.replace(self, **changed)
+
+    def _texts(self, name: str) -> tuple[str, ...]:
+        """The text or texts of a field."""
+        value = getattr(self, name)
+        return value if isinstance(value, tuple) else () if value is None else (value,)
+
+
+class Selection(Options, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Which faces an edit may touch and how their edges are treated; shared by every edit."""
+
+    faces: Annotated[
+        tuple[str, ...],
+        Meta(
+            description="Faces to edit: #3, a product or face name, type:bspline, colour:#ff0000, near:X,Y,Z, "
+            "cq:'>Z'; !SEL excludes. Default: all NURBS faces."
+        ),
+    ] = ()
+    instance: Annotated[
+        str | None,
+        Meta(
+            description="Edit one instance of a part that stands in several places, as plate/bolt#2 (see info --all); "
+            "it becomes a part of its own. Default: a part is edited, wherever it stands."
+        ),
+    ] = None
+    hold: Annotated[
+        tuple[str, ...],
+        Meta(description="Faces and edges (edge#4) that must not move; same selectors as --faces."),
+    ] = ()
+    keep: Annotated[
+        Literal["as-is", "g0", "g1", "g2"],
+        Meta(
+            description="Continuity that every edge keeps: as-is, what it has; or position, tangent plane or curvature."
+        ),
+    ] = "as-is"
+    edges: Annotated[
+        Literal["coupled", "frozen"],
+        Meta(
+            description="Edges between two edited faces: coupled, they move and stay as smooth as they were where that "
+            "is possible; frozen, none moves."
+        ),
+    ] = "coupled"
+
+    @property
+    def done(self) -> str:
+        """What was done to an edited face, ``"smoothed at 5mm"``."""
+        raise NotImplementedError
+
+    @property
+    def quiet(self) -> str:
+        """What an unchanged face is, ``"already fair at 5mm"``."""
+        raise NotImplementedError
+
+    def models(self) -> tuple[str, ...]:
+        """Other files whose models the edit needs."""
+        return ()

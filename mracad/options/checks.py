@@ -1,0 +1,78 @@
+"""Options of checks and comparisons."""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar, Literal
+
+from msgspec import Meta
+
+from mracad.options.base import CountText, File, Options
+from mracad.options.quantity import Length
+
+
+class Check(Options, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Check validity and continuity; what fails it stops a recipe, and a command ends with exit code 1."""
+
+    function: ClassVar[str] = "mracad.judge:check"
+
+    max_gap: Annotated[Length | None, Meta(description="Largest gap along any seam.")] = None
+    max_angle: Annotated[
+        Annotated[float, Meta(ge=0.0)] | None,
+        Meta(description="Largest angle (degrees) along seams that are meant to be smooth."),
+    ] = None
+    kink: Annotated[float, Meta(description="A seam with a smaller angle (degrees) is meant to be smooth.", ge=0.0)] = (
+        1.0
+    )
+    expect: Annotated[
+        CountText | None,
+        Meta(
+            description="How many seams are to be smooth: a number, or the report (JSON) of an earlier check or edit."
+        ),
+    ] = None
+    max_tolerance: Annotated[Length | None, Meta(description="Largest tolerance of edges and vertices.")] = None
+    min_wall: Annotated[Length | None, Meta(description="Least thickness of the walls of solids.")] = None
+    layer_limit: Annotated[
+        Annotated[float, Meta(gt=0.0)] | None,
+        Meta(description="Seconds for each layer; one that takes longer says nothing."),
+    ] = None
+    fail_on: Annotated[
+        tuple[
+            Literal["invalid", "unknown", "free-edges", "unsewn", "file", "self-intersection", "mesh", "nothing"], ...
+        ],
+        Meta(description="What fails the check beside the limits; repeatable."),
+    ] = ("invalid",)
+
+
+class Compare(Options, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Compare with a reference; what differs beyond its limit stops a recipe, and a command ends with exit code 1."""
+
+    function: ClassVar[str] = "mracad.judge:compare"
+
+    reference: Annotated[
+        File | None, Meta(description="File to compare with; by default the model as it came into the recipe.")
+    ] = None
+    reference_unit: Annotated[
+        str | None,
+        Meta(description="Length unit of the numbers in the reference, where it names a wrong one: mm, m, in …"),
+    ] = None
+    max_deviation: Annotated[Length, Meta(description="How far any face or outline may lie from its partner.")] = (
+        "1e-6mm"
+    )
+    max_gap_growth: Annotated[Length | None, Meta(description="How much wider the gap of any seam may become.")] = None
+    max_angle_growth: Annotated[
+        Annotated[float, Meta(ge=0.0)] | None,
+        Meta(description="How much larger the angle (degrees) of any seam may become."),
+    ] = None
+    max_volume_change: Annotated[
+        Annotated[float, Meta(ge=0.0)] | None, Meta(description="How much of the volume (percent) may come or go.")
+    ] = None
+    ignore: Annotated[
+        tuple[
+            Literal[
+                "faces", "deviation", "seams", "topology", "validity", "size", "assembly", "names", "colours",
+                "layers", "materials", "annotations",
+            ],
+            ...,
+        ],
+        Meta(description="What may differ in any way; repeatable."),
+    ] = ()  # fmt: skip

@@ -1,0 +1,214 @@
+"""Options of edits that carry a feature or the detail of a face."""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import Annotated, ClassVar, Literal
+
+from msgspec import Meta
+
+from mracad.errors import UsageError
+from mracad.options.base import FeatureText, File, PlaceText, Selection, dashed
+from mracad.options.quantity import Length, band_of
+
+
+class Featured(Selection, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What edits that carry a feature share."""
+
+    edges: Annotated[
+        Literal["frozen", "coupled"],
+        Meta(
+            description="Edges between two edited faces: coupled, they move with a copy that lies over them and stay "
+            "as smooth as they were, where that is possible; frozen, none moves."
+        ),
+    ] = "coupled"
+    taper: Annotated[
+        Length | None,
+        Meta(
+            description="Width (a length) over which a window fades out beyond its rim. Default: a quarter of its "
+            "radius, or of the shorter side of a rectangle."
+        ),
+    ] = None
+    base: Annotated[
+        Literal["surroundings", "level"],
+        Meta(
+            description="What the feature stands above: surroundings, a thin plate through what lies around the "
+            "window; level, the face without its --band."
+        ),
+    ] = "surroundings"
+    band: Annotated[
+        str | None,
+        Meta(
+            description="Wavelengths that belong to a feature above a level: 0.5mm:20mm; 0mm:20mm for all up to 20 mm."
+        ),
+    ] = None
+    rotate: Annotated[float, Meta(description="Turn of each copy about the outward normal (degrees).")] = 0.0
+    size: Annotated[
+        float, Meta(description="Factor on the size of each copy along the face; its height stays.", gt=0.0)
+    ] = 1.0
+    height: Annotated[float, Meta(description="Factor on the height of each copy; negative makes a dent of it.")] = 1.0
+    mirror: Annotated[bool, Meta(description="Mirror each copy.")] = False
+    clip: Annotated[
+        bool, Meta(description="Let edges and holes that do not move take parts of copies, instead of refusing them.")
+    ] = False
+
+    @property
+    def quiet(self) -> str:
+        return "without a copy"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.band is not None:
+            band_of(self.band, 1.0)
+        if self.base == "level" and self.band is None:
+            raise UsageError("base: a level needs a band", "give --band 0.5mm:20mm")
+        if not (math.isfinite(self.size) and self.size > 0):
+            raise UsageError(f"size: {self.size} is not greater than zero", "give --size 1.5")
+        if not (math.isfinite(self.height) and self.height != 0 and math.isfinite(self.rotate)):
+            raise UsageError(f"height: {self.height} makes nothing of a feature", "give --height 0.5")
+
+
+class Single(Featured, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What edits with a feature of the model itself share."""
+
+    feature: Annotated[
+        FeatureText,
+        Meta(
+            description="The feature: near:X,Y,Z,radius:R (a disc, mm), #3@u0:u1,v0:v1 (a rectangle of parameters) or "
+            "a file made by mracad feature extract."
+        ),
+    ] = ""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not self.feature:
+            raise UsageError("feature: it is not said which", "give --feature near:X,Y,Z,radius:R")
+
+
+class Move(Single, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Move a detail feature: the coarse surface is left clean at its place, and it is present at another one."""
+
+    function: ClassVar[str] = "mracad.edit.features:move"
+
+    to: Annotated[str, Meta(description="Where to: X,Y,Z (mm) or #face@u,v.")] = ""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not self.to:
+            raise UsageError("to: it is not said where the feature is to go", "give --to X,Y,Z or --to '#3@u,v'")
+        if self.feature.endswith(".feature"):
+            raise UsageError(f"feature: a file cannot be moved: {self.feature}", "lay copies of it with mracad repeat")
+
+    @property
+    def done(self) -> str:
+        return "edited, the feature moved"
+
+
+class Repeat(Single, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Repeat a detail feature at other places of the same or other faces, over seams where they lie in its way."""
+
+    function: ClassVar[str] = "mracad.edit.features:repeat"
+
+    at: Annotated[
+        tuple[PlaceText, ...],
+        Meta(
+            description="A place: X,Y,Z (mm, brought to the nearest selected face), #face@u,v, or @places.csv with "
+            "lines x,y,z[,rotate[,size[,height]]]; repeatable."
+        ),
+    ] = ()
+    grid: Annotated[
+        str | None,
+        Meta(
+            description="NxM,DX,DY: a grid of N by M places, DX and DY (mm) apart along the feature's own axes; its "
+            "first one is the feature's place, or that of the first --at."
+        ),
+    ] = None
+    polar: Annotated[
+        str | None,
+        Meta(
+            description="N,AXIS: N places around an axis, the feature's among them: 6,z or 6,X,Y,Z,DX,DY,DZ (a point "
+            "and a direction)."
+        ),
+    ] = None
+    along: Annotated[
+        str | None,
+        Meta(description="EDGE,N[,OFFSET]: N places evenly along edge#4, OFFSET (mm) inside its first selected face."),
+    ] = None
+    overlap: Annotated[
+        Literal["add", "max", "replace"],
+        Meta(
+            description="Where copies overlap: add them, take the one that is larger there, or let the later one "
+            "replace the earlier."
+        ),
+    ] = "add"
+    jitter: Annotated[
+        Length | None, Meta(description="Move each copy at random by up to this length along the face.")
+    ] = None
+    spin: Annotated[
+        float, Meta(description="Turn each copy at random by up to so many degrees either way.", ge=0.0)
+    ] = 0.0
+    seed: Annotated[int, Meta(description="Of the random numbers.", ge=0)] = 0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not (self.at or self.grid or self.polar or self.along):
+            raise UsageError("at: it is not said where the copies are to go", "give --at, --grid, --polar or --along")
+        if sum(x is not None for x in (self.grid, self.polar, self.along)) > 1:
+            raise UsageError("grid, polar and along exclude each other", "give one of them")
+        if not math.isfinite(self.spin):
+            raise UsageError(f"spin: {self.spin} is not an angle", "give --spin 180 for any turn")
+
+    @property
+    def done(self) -> str:
+        return "edited with copies"
+
+
+class Transfer(Featured, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Carry the detail of a face, or a feature, of another file onto this one; units may differ."""
+
+    function: ClassVar[str] = "mracad.edit.features:transfer"
+
+    source: Annotated[File, Meta(description="The file that the detail is taken from.")] = ""
+    from_: Annotated[
+        FeatureText,
+        Meta(
+            description="What to take: a face (#3 or its name) with all its detail in --band, or a feature as for "
+            "mracad repeat."
+        ),
+    ] = ""
+    to: Annotated[str, Meta(description="Where to: a face for the detail of a face; a place for a feature.")] = ""
+    mode: Annotated[
+        str,
+        Meta(
+            description="For the detail of a face: add it, replace the face's own detail in the band by it, or "
+            "blend=0.3, a mix with so much of it."
+        ),
+    ] = "add"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name in ("source", "from_", "to"):
+            if not getattr(self, name):
+                raise UsageError(f"{dashed(name)}: it is missing", f"give {dashed(name)}, see mracad transfer --help")
+        self.share()
+
+    def share(self) -> tuple[float, float]:
+        """How much of the face's own detail stays, and how much of the other's comes."""
+        if self.mode in ("add", "replace"):
+            return (1.0, 1.0) if self.mode == "add" else (0.0, 1.0)
+        match = re.fullmatch(r"blend=(\d+\.?\d*|\.\d+)", self.mode)
+        if not match or not 0 <= float(match[1]) <= 1:
+            raise UsageError(f"mode: {self.mode!r} is not known", "use add, replace or blend=0.3")
+        return 1.0 - float(match[1]), float(match[1])
+
+    def models(self) -> tuple[str, ...]:
+        return (self.source,)
+
+    @property
+    def done(self) -> str:
+        return "edited with detail of another"
+
+    @property
+    def quiet(self) -> str:
+        return "left as they are"

@@ -1,0 +1,86 @@
+"""Options of edits that change whole faces."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, ClassVar, Literal
+
+from msgspec import Meta
+
+from mracad.errors import UsageError
+from mracad.options.base import Selection
+from mracad.options.quantity import Length
+
+
+class Fitting(Selection, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """How an edit that changes whole faces goes about it."""
+
+    fit_g1: Annotated[
+        Annotated[float, Meta(ge=0.0, le=45.0)] | None,
+        Meta(description="Make seams tangent that are meant to be: those between edited faces under this angle (°)."),
+    ] = None
+    close_gaps: Annotated[
+        bool,
+        Meta(description="Pull gaps along seams between edited faces shut."),
+    ] = False
+    gap_tolerance: Annotated[
+        Length,
+        Meta(description="Gap (a length) that a seam along a trim curve may have after it moved, unless it was wider."),
+    ] = "1e-4mm"
+    refine: Annotated[
+        Literal["auto", "never"],
+        Meta(
+            description="Control points where a face has too few of them for the edit: auto, knots are inserted "
+            "there, exactly; never, the face makes do with its own."
+        ),
+    ] = "auto"
+    amount: Annotated[
+        float,
+        Meta(description="How much of the edit: 1 is all of it, 0 none.", ge=0.0, le=1.0),
+    ] = 1.0
+    max_deviation: Annotated[
+        Length | None,
+        Meta(description="Bound on the deviation along the normal (a length): the edit is scaled back locally."),
+    ] = None
+
+
+class Smooth(Fitting, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Remove detail finer than a scale from the NURBS faces of a model."""
+
+    function: ClassVar[str] = "mracad.edit.smooth:smooth"
+
+    scale: Annotated[
+        Length | None,
+        Meta(
+            description="Wavelength (5mm, 0.2in, or 2% of the model's diagonal): ripples up to half of it go, "
+            "ripples of three times it stay."
+        ),
+    ] = None
+    level: Annotated[
+        Annotated[float, Meta(gt=0.0)] | None,
+        Meta(
+            description="Instead of --scale: how many levels of the face's own knot ladder to remove, 2.5 for two "
+            "and a half."
+        ),
+    ] = None
+
+    @property
+    def done(self) -> str:
+        return f"smoothed at {self._place}"
+
+    @property
+    def quiet(self) -> str:
+        return f"already fair at {self._place}" if self.amount else "left as they are: amount 0"
+
+    @property
+    def _place(self) -> str:
+        return self.scale if self.scale is not None else f"level {self.level:g}"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if (self.scale is None) == (self.level is None):
+            raise UsageError("smooth needs either a scale or a level", "give --scale 5mm, --scale 2% or --level 2.5")
+        if self.level is not None and not (math.isfinite(self.level) and self.level > 0):
+            raise UsageError(f"level: {self.level} is not greater than zero", "give --level 1, 2 or 2.5")
+        if not (math.isfinite(self.amount) and 0 <= self.amount <= 1):
+            raise UsageError(f"amount: {self.amount} is not between 0 and 1", "give --amount 0.5")
