@@ -172,7 +172,10 @@ def run(
     valid_before: Validity | None = None
     left = _Left(model.name, dict(spoiled))
     while True:
-        result = edit(model, options, *others, scope=scope.holding(left.faces), progress=stage("editing"))
+        try:
+            result = edit(model, options, *others, scope=scope.holding(left.faces), progress=stage("editing"))
+        except EditError as error:
+            raise left.explained(error) from error
         result = _named(result, {face: left.faces[face] for face in left.faces.keys() & scope.chosen})
         _refuse_if_asked(model, result, scope.named)
         stage("measuring seams")(0, 1)
@@ -214,16 +217,8 @@ def run(
             result, notes=(*result.notes, *unmended(options, model.diagonal, movable, before, after, reasons))
         )
     stage("measuring the deviation")(0, 1)
-    return Report(
-        model,
-        result,
-        deviations(model, result.displacement),
-        before,
-        after,
-        valid_before,
-        valid_after,
-        time.perf_counter() - start,
-    )
+    off = deviations(model, result.displacement)
+    return Report(model, result, off, before, after, valid_before, valid_after, time.perf_counter() - start)
 
 
 @dataclass
@@ -252,6 +247,13 @@ class _Left:
         if self.rounds > ROUNDS:
             faces = _joined(faces | self.faces.keys(), seams, {outcome.face for outcome in edit.faces("edited")})
         self.faces |= dict.fromkeys(faces - self.faces.keys(), reason)
+
+    def explained(self, error: EditError) -> EditError:
+        """An error of an edit, which cannot know of the faces that were left."""
+        if not self.faces:
+            return error
+        face, reason = next(iter(self.faces.items()))
+        return EditError(f"{self.name}: #{face + 1} cannot be edited: {reason}", "choose other faces or another place")
 
 
 def _joined(faces: set[int], seams: Sequence[SeamMeasure], edited: set[int]) -> set[int]:
@@ -293,7 +295,7 @@ def _refuse_if_asked(model: Model, result: Edit, named: Collection[int]) -> None
     left = [outcome for outcome in asked if outcome.status == "left"]
     if left and not any(outcome.status == "edited" for outcome in asked):
         names = " ".join(f"#{o.face + 1}" for o in left[:6]) + (" …" if len(left) > 6 else "")
-        raise EditError(f"{model.name}: {names} {left[0].words}", "leave out what cannot be done, or all of --faces")
+        raise EditError(f"{model.name}: {names}: {left[0].words}", "leave out what cannot be done, or all of --faces")
 
 
 def _torn(before: list[SeamMeasure], after: list[SeamMeasure], edit: Edit, keep: str) -> set[int]:

@@ -24,9 +24,10 @@ from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
-from OCP.Bnd import Bnd_Box
-from OCP.BRepBndLib import BRepBndLib
-from OCP.TopoDS import TopoDS_Face
+from OCP.BRep import BRep_Tool
+from OCP.TopAbs import TopAbs_VERTEX
+from OCP.TopExp import TopExp_Explorer
+from OCP.TopoDS import TopoDS, TopoDS_Face
 from scipy.optimize import linear_sum_assignment
 
 from mracad.bspline.knots import KnotVector
@@ -105,18 +106,26 @@ def faces(path: Path) -> list[TopoDS_Face]:
 
 
 def matched(before: Sequence[TopoDS_Face], after: Sequence[TopoDS_Face]) -> list[tuple[int, int]]:
-    """Pairs of faces of two files: those with the same number, as a rule; always those whose boxes are nearest."""
-    one, two = (np.array([_box(face) for face in each]) for each in (before, after))
+    """Pairs of faces of two files: those with the same number, as a rule; always those whose vertices are nearest.
+
+    Boxes of faces would not do: the kernel's grow and shrink with control points where nets are refined.
+    """
+    one, two = (np.array([_extent(face) for face in each]) for each in (before, after))
     apart = np.abs(one[:, None] - two).max(axis=2)
     apart += 1e-9 * np.ptp(one) * (np.arange(len(one))[:, None] != np.arange(len(two)))
     rows, columns = linear_sum_assignment(apart)
     return list(zip(rows.tolist(), columns.tolist(), strict=True))
 
 
-def _box(face: TopoDS_Face) -> list[float]:
-    box = Bnd_Box()
-    BRepBndLib.Add_s(face, box, False)
-    return list(box.Get())
+def _extent(face: TopoDS_Face) -> list[float]:
+    """The box and the mean of its vertices."""
+    found, explorer = [], TopExp_Explorer(face, TopAbs_VERTEX)
+    while explorer.More():
+        point = BRep_Tool.Pnt_s(TopoDS.Vertex_s(explorer.Current()))
+        found.append((point.X(), point.Y(), point.Z()))
+        explorer.Next()
+    places = np.array(found or [(0.0, 0.0, 0.0)])
+    return [*places.min(axis=0), *places.max(axis=0), *places.mean(axis=0)]
 
 
 def compared(before: Path, after: Path, scale: float | None = None) -> list[Face]:
