@@ -83,9 +83,9 @@ def assert_as_good(
     """The output is as good as the kernel's own copy of the input.
 
     ``coupled`` are pairs of faces whose seams moved exactly, ``loose`` those whose seams moved to the tolerance: these
-    are as good as those of the ``source`` (the reader heals some seams of its own copy).  On ``refined`` faces the reader
-    lays new curves (within the old tolerance), and where the normal turns quickly it turns a few thousandths of a degree
-    at those.
+    are as good as those of the ``source`` (the reader heals some seams of its own copy).  On ``refined`` faces the
+    reader lays new curves (within the old tolerance), and where the normal turns quickly it turns a few thousandths of
+    a degree at those.
     """
     new, old = result.validity, yardstick.validity
     assert new.valid or not old.valid, new.failures[:5]

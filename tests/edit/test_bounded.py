@@ -102,6 +102,21 @@ def test_an_edit_that_never_comes_out_is_refused_after_these_rounds(monkeypatch)
     assert caught.value.code == Code.CANNOT_EDIT and stub.rounds == job.ROUNDS + 2
 
 
+def test_an_edit_that_fails_for_a_face_that_had_to_stay_says_so(monkeypatch):
+    """The edit itself only sees that it may not touch the face."""
+
+    def edit(model, options, *, scope, progress):
+        if 1 not in scope.chosen:
+            raise EditError("the place is off the faces to edit", "give a point on one of them")
+        return Stub()(model, options, scope=scope, progress=progress)
+
+    monkeypatch.setattr(job, "_torn", first_edited([1]))
+    with pytest.raises(EditError, match="#2 cannot be edited: its seams would not hold; choose other faces"):
+        job.run(chains(3), edit, Smooth(level=1))
+    with pytest.raises(EditError, match="off the faces to edit"):
+        job.run(chains(3), edit, Smooth(level=1, faces=("#1",)))
+
+
 def test_files_are_made_again_a_bounded_number_of_times(monkeypatch):
     """Every file is worse at one more face; the last is named."""
     stub, document = Stub(), chains(*[1] * (produce.ROUNDS + 4))
