@@ -12,6 +12,9 @@ Array = np.ndarray
 THIN = 1e-6
 """Sine of the angle between S_u and S_v below which a surface counts as degenerate."""
 
+VOID = 1e-40
+"""|S_u × S_v| up to which it does, too: powers of less are no numbers."""
+
 
 @dataclass(frozen=True, eq=False)
 class Forms:
@@ -67,7 +70,7 @@ def forms(jet: Array) -> Forms:
     ee, ff, gg = _dot(su, su), _dot(su, sv), _dot(sv, sv)
     normal = _cross(su, sv)
     density = np.sqrt(_dot(normal, normal))
-    regular = density > THIN * np.sqrt(ee * gg)
+    regular = density > np.maximum(THIN * np.sqrt(ee * gg), VOID)
     safe = np.where(regular, density, 1.0)
     normal = normal * np.where(regular, 1 / safe, 0.0)
     area2 = safe * safe

@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.net import Net
+from mracad.inspect.curvature import forms
 from mracad.inspect.roughness import Change, Growth, Rougher, Roughness, worse
 from mracad.inspect.survey import POINTS, RIPPLE, STEEP, changes, surveys
 from tests.inspect.shapes import circle, cylinder, face, graph, plane, rectangle, roof, sphere, torus
@@ -51,6 +52,16 @@ def test_a_sphere(radius):
     assert found.curvature == pytest.approx(1 / radius, rel=1e-7)
     assert found.variation < 1e-12 / radius**2
     assert found.kink < 1e-5
+
+
+@pytest.mark.parametrize("size", [0.0, 1e-300, 1e-120, 1e-60])
+def test_what_rounding_leaves_of_a_pole_is_no_curvature(size):
+    """S_u as good as nothing at right angles to S_v: powers of it would be no numbers, which nothing compares with."""
+    jet = np.random.default_rng(0).standard_normal((10, 3, 1))
+    jet[1, :, 0], jet[2, :, 0] = (size, 0, 0), (0, 1, 0)
+    found = forms(jet)
+    assert not found.regular.any()
+    assert (found.bending, found.variation, found.largest) == (0, 0, 0)
 
 
 def test_a_cylinder():
