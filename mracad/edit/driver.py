@@ -18,7 +18,7 @@ from mracad.constraint.seam import Seam
 from mracad.constraint.trimmed import TrimmedSeam
 from mracad.edit.pose import Scene
 from mracad.edit.target import Sheet, Wish
-from mracad.edit.trial import ENOUGH, Trial, Verdict, Watch, displaced
+from mracad.edit.trial import CLOSER, ENOUGH, Trial, Verdict, Watch, displaced
 from mracad.inspect.roughness import Change, Worse
 from mracad.model import Displacement, Offset
 from mracad.seam.interface import Joints
@@ -88,7 +88,7 @@ class Moved:
         if amount == self.amount:
             return self
         offset = self.offset * (amount / self.amount)
-        now = Watch.of([(self.net, self.sheet.faces)]).changes({0: displaced(self.net, offset)})[0]
+        now = Watch.of([(self.net, self.sheet.faces)], CLOSER).changes({0: displaced(self.net, offset)})[0]
         return replace(self, offset=offset, amount=amount, changes=now)
 
     def displacement(self) -> Offset:

@@ -1,8 +1,8 @@
 """What an edit may move: faces and edges that options name, on a model alone as on a document."""
 
 import io
-from dataclasses import fields
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -17,7 +17,7 @@ from tests.occ import shapes
 
 def panel(**how):
     """Two patches of one noisy surface."""
-    _, noisy = panels.whole(12, 0.3, patches=(1, 2))
+    _, noisy = panels.whole(8, 0.3, patches=(1, 2))
     return panels.document(panels.cut(noisy, (1, 2)), **how)
 
 
@@ -112,8 +112,9 @@ def test_an_edge_of_one_instance_is_held_by_the_number_of_the_part(tmp_path):
 def test_outcomes_are_plain_numbers(options):
     """Not numpy's, which no encoder of reports takes."""
     edit = mracad.smooth(mracad.snapshot(panel()), mracad.Smooth(**options))
-    for record in (*edit.outcomes, *edit.edges):
-        for field in fields(record):
-            value = getattr(record, field.name)
-            for each in value if isinstance(value, tuple) else (value,):
-                assert type(each) in (int, float, str, bool), (field.name, type(each))
+    records = (edit.outcomes, edit.edges)
+    assert msgspec.json.encode(records)
+
+
+def _refused(value):
+    raise AssertionError(f"{type(value)} is not plain")
