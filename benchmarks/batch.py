@@ -22,9 +22,10 @@ import psutil
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
+from mracad.batch.find import find  # noqa: E402
 from mracad.batch.manifest import Manifest  # noqa: E402
 from mracad.batch.pool import Limits, Pool  # noqa: E402
-from mracad.batch.run import Settings, find, run  # noqa: E402
+from mracad.batch.run import Settings, run  # noqa: E402
 from mracad.batch.work import warm  # noqa: E402
 from mracad.recipe import load  # noqa: E402
 from tests.batch.runs import batch, environment, kills, outputs, recipe, shams  # noqa: E402

@@ -11,7 +11,8 @@ from functools import cached_property
 
 import numpy as np
 
-from mracad.bspline.net import Curve, Net
+from mracad.bspline.curve import Curve
+from mracad.bspline.net import Net
 
 Array = np.ndarray
 

@@ -15,9 +15,10 @@ from xml.etree import ElementTree
 import msgspec
 
 from mracad.batch.cluster import Cluster
+from mracad.batch.find import Item, find
 from mracad.batch.manifest import Manifest
 from mracad.batch.pool import Limits, Pool
-from mracad.batch.run import Item, Outcome, Settings, find, run
+from mracad.batch.run import Outcome, Settings, run
 from mracad.batch.work import warm
 from mracad.errors import Code, MracadError
 from mracad.guard import size

@@ -1,9 +1,7 @@
-"""A batch: inputs found, done by an executor, written one by one as they come."""
+"""A batch: its files done by an executor, written one by one as they come."""
 
 from __future__ import annotations
 
-import glob
-import itertools
 import json
 import os
 import time
@@ -17,10 +15,10 @@ from msgspec import structs
 
 from mracad.audit.faults import ReadBack
 from mracad.batch.cluster import lost
+from mracad.batch.find import Item
 from mracad.batch.manifest import Manifest, digest
 from mracad.batch.work import Product, Work, do
 from mracad.errors import Code, FileError, MracadError, UsageError
-from mracad.formats import FORMATS, READABLE, by_ending
 from mracad.recipe import Recipe, record_of
 
 AHEAD = 2
@@ -30,15 +28,6 @@ RETRIED = frozenset({Code.LIMIT, Code.INTERNAL})
 """What may go better the next time: limits and crashes."""
 
 Status = Literal["done", "unchanged", "failed", "not tried"]
-
-
-@dataclass(frozen=True)
-class Item:
-    """One file of a batch, its output relative to the output folder, and the format of that."""
-
-    source: str
-    output: str
-    format: str = "step"
 
 
 @dataclass(frozen=True)
@@ -121,67 +110,6 @@ class Workers(Protocol):
     def submit(self, fn: Any, /, *args: Any) -> Future[Any]: ...
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None: ...
-
-
-def find(words: Iterable[str], folder: Path, format: str = "") -> list[Item]:
-    """The files of a batch from paths, folders (all models below them) and patterns.
-
-    Outputs have the names of their inputs, with the ending of ``format`` where that is given; those of a folder keep
-    their place below it, those of a pattern their place below the folder before its first wildcard.  Hidden files are
-    left out, and so is the output folder where it lies below.
-
-    Raises
-    ------
-    FileError
-        When there is no file, or a folder or pattern holds no model.
-    UsageError
-        When two inputs would be written to the same output, or one to itself.
-    """
-    found: dict[str, str] = {}
-    own = folder.resolve()
-    for word in words:
-        for source, output in _expanded(word, own):
-            if format:
-                output = str(Path(output).with_suffix(FORMATS[format].endings[0]))
-            other = found.setdefault(output, source)
-            if Path(other).resolve() != Path(source).resolve():
-                raise UsageError(
-                    f"'{other}' and '{source}' would both be written to '{folder / output}'",
-                    "give the folder that holds both, or one batch each",
-                )
-            if Path(source).resolve() == own / output:
-                raise UsageError(f"'{source}' would be replaced by its own output", "choose another folder with -O")
-    if not found:
-        raise FileError("there is nothing to do: no files are named", "give files, folders or patterns")
-    return [Item(source, output, format or _format(output)) for output, source in found.items()]
-
-
-def _format(output: str) -> str:
-    """What a file is written as: what it was read from, as far as its name tells."""
-    return by_ending(output).name if Path(output).suffix.lower() in READABLE else "step"
-
-
-def _expanded(word: str, own: Path) -> list[tuple[str, str]]:
-    """The files that a word on the command line means, but those in the output folder, each with its output."""
-    base = Path(word)
-    if base.is_dir():
-        files = [path for path in base.rglob("*") if path.suffix.lower() in READABLE]
-    elif glob.has_magic(word) and not base.exists():
-        base = Path(*itertools.takewhile(lambda part: not glob.has_magic(part), base.parts))
-        files = [Path(path) for path in glob.glob(word, recursive=True)]
-    else:
-        return [(word, base.name)]
-    inside = base.resolve() in own.parents
-    pairs = [
-        (str(path), str(place))
-        for path, place in ((path, path.relative_to(base)) for path in sorted(files))
-        if not any(part.startswith(".") for part in place.parts)
-        and not (inside and path.resolve().is_relative_to(own))
-        and not path.is_dir()
-    ]
-    if not pairs:
-        raise FileError(f"no models in '{word}'", f"they end in {', '.join(sorted(READABLE))}")
-    return pairs
 
 
 def run(

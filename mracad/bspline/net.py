@@ -1,101 +1,21 @@
-"""NURBS curves and surfaces as plain arrays: evaluation, normals, exact knot insertion and degree elevation."""
+"""NURBS surfaces as plain arrays: evaluation, normals, exact knot insertion and degree elevation."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from math import comb
 
 import numpy as np
 
-from mracad.bspline.basis import basis, jet
+from mracad.bspline.basis import jet
+from mracad.bspline.curve import check_weights, euclidean, homogeneous
 from mracad.bspline.knots import Array, KnotVector, Side
 from mracad.bspline.refine import refinement
 from mracad.bspline.rows import Rows
 from mracad.errors import UsageError
 
 _BLOCK = 1 << 19
-
-
-@dataclass(frozen=True, eq=False)
-class Curve:
-    """A NURBS curve.
-
-    Attributes
-    ----------
-    knots : KnotVector
-    poles : ndarray (n, k)
-        Euclidean control points.
-    weights : ndarray (n,) or None
-        None where the curve is polynomial.
-    """
-
-    knots: KnotVector
-    poles: Array
-    weights: Array | None = None
-
-    def __post_init__(self) -> None:
-        if self.poles.ndim != 2 or len(self.poles) != self.knots.count:
-            raise UsageError(
-                f"control points of shape {self.poles.shape} where the knot vector wants {self.knots.count}"
-            )
-        _check_weights(self.weights, self.poles.shape[:1])
-
-    def evaluate(self, t: Array, derivatives: int = 0, side: Side = "right") -> Array:
-        """Points and derivatives.
-
-        Parameters
-        ----------
-        t : array_like (q,)
-            Parameters; wrapped where periodic, otherwise the end polynomials serve beyond the domain.
-        derivatives : int
-            Highest derivative wanted.
-        side : {"right", "left"}
-            Which limit is taken at a knot.
-
-        Returns
-        -------
-        ndarray (derivatives + 1, q, k)
-            ``[r]`` is the r-th derivative with respect to the parameter.
-        """
-        poles = _homogeneous(self.poles, self.weights)
-        stack = []
-        for r in range(derivatives + 1):
-            first, values = basis(self.knots, t, r, side)
-            index = (first[:, None] + np.arange(self.knots.degree + 1)) % self.knots.count
-            stack.append(np.einsum("qa,qak->qk", values, poles[index]))
-        return np.array(stack) if self.weights is None else _curve_quotient(np.array(stack))
-
-    def refined(self, extra_knots: Array | Sequence[float]) -> Curve:
-        """The same curve with more knots, exactly; itself when there is nothing to insert."""
-        fine = self.knots.refined(extra_knots)
-        return self if fine == self.knots else self.over(fine)
-
-    def over(self, fine: KnotVector) -> Curve:
-        """The same curve over a finer knot vector, or one of higher degree."""
-        poles = refinement(self.knots, fine).apply(_homogeneous(self.poles, self.weights))
-        return Curve(fine, *_euclidean(poles, self.weights is not None))
-
-    def bezier(self) -> tuple[Array, Array, Array | None]:
-        """The curve's polynomial (or rational) pieces in Bézier form.
-
-        Returns
-        -------
-        breaks : ndarray (s + 1,)
-        poles : ndarray (s, d + 1, k)
-        weights : ndarray (s, d + 1) or None
-        """
-        knots, d = self.knots.unrolled(), self.knots.degree
-        index = np.arange(knots.count) % self.knots.count
-        open_curve = Curve(knots, self.poles[index], None if self.weights is None else self.weights[index])
-        pieces = open_curve.over(KnotVector(np.repeat(self.knots.breaks, d + 1), d))
-        shape = (self.knots.spans, d + 1)
-        return (
-            self.knots.breaks,
-            pieces.poles.reshape(*shape, -1),
-            None if pieces.weights is None else pieces.weights.reshape(shape),
-        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,7 +41,7 @@ class Net:
             raise UsageError(
                 f"control points of shape {self.poles.shape} where the knots want {self.u.count} × {self.v.count}"
             )
-        _check_weights(self.weights, self.poles.shape[:2])
+        check_weights(self.weights, self.poles.shape[:2])
 
     def evaluate(
         self, uv: Array, derivatives: int = 0, side: tuple[Side, Side] = ("right", "right")
@@ -142,7 +62,7 @@ class Net:
             ``S``; ``(S, Su, Sv)``; or ``(S, Su, Sv, Suu, Suv, Svv)``.
         """
         uv = np.asarray(uv, dtype=float).reshape(-1, 2)
-        poles = _homogeneous(self.poles, self.weights)
+        poles = homogeneous(self.poles, self.weights)
         orders = [(a, b) for total in range(derivatives + 1) for a, b in _pairs(total)]
         out = np.empty((len(orders), len(uv), poles.shape[2]))
         step = max(_BLOCK // ((self.u.degree + 1) * (self.v.degree + 1) * poles.shape[2]), 1)
@@ -177,7 +97,7 @@ class Net:
         ndarray (qu, qv, k), or a tuple of such
             ``S``; or ``(S, Su, Sv)`` for ``derivatives=1``.
         """
-        poles = _homogeneous(self.poles, self.weights)
+        poles = homogeneous(self.poles, self.weights)
         in_u = _collocation(self.u, us, derivatives, side[0])
         in_v = _collocation(self.v, vs, derivatives, side[1])
         along_u = [rows.apply(poles, 0) for rows in in_u]
@@ -247,12 +167,12 @@ class Net:
         """The same surface over finer knot vectors, or such of higher degree, exactly; itself over its own."""
         if (u, v) == (self.u, self.v):
             return self
-        poles = _homogeneous(self.poles, self.weights)
+        poles = homogeneous(self.poles, self.weights)
         if u != self.u:
             poles = refinement(self.u, u).apply(poles, 0)
         if v != self.v:
             poles = refinement(self.v, v).apply(poles, 1)
-        return Net(u, v, *_euclidean(poles, self.weights is not None))
+        return Net(u, v, *euclidean(poles, self.weights is not None))
 
 
 def cross(a: Array, b: Array) -> Array:
@@ -288,15 +208,6 @@ def curvature(derivatives: tuple[Array, ...], direction: Array) -> Array:
         return bend / np.sqrt(determinant) / (e * a * a + 2 * f * a * b + g * b * b)
 
 
-def _check_weights(weights: Array | None, shape: tuple[int, ...]) -> None:
-    if weights is None:
-        return
-    if weights.shape != shape:
-        raise UsageError(f"weights of shape {weights.shape} for control points of shape {shape}")
-    if not (weights > 0).all():
-        raise UsageError("a weight is not positive")
-
-
 def _pairs(total: int) -> list[tuple[int, int]]:
     """Derivative orders (in u, in v) of the given sum, u first."""
     return [(total - b, b) for b in range(total + 1)]
@@ -306,30 +217,6 @@ def _collocation(kv: KnotVector, x: Array, derivatives: int, side: Side) -> list
     """Collocation matrices of the derivatives up to the given one."""
     first, values = jet(kv, x, range(derivatives + 1), side)
     return [Rows(first, np.ascontiguousarray(part), kv.count, kv.periodic) for part in values.swapaxes(0, 1)]
-
-
-def _homogeneous(poles: Array, weights: Array | None) -> Array:
-    """``(w P, w)``, or the poles themselves."""
-    if weights is None:
-        return poles
-    return np.concatenate([poles * weights[..., None], weights[..., None]], axis=-1)
-
-
-def _euclidean(poles: Array, rational: bool) -> tuple[Array, Array | None]:
-    if not rational:
-        return poles, None
-    weights = poles[..., -1]
-    return poles[..., :-1] / weights[..., None], np.ascontiguousarray(weights)
-
-
-def _curve_quotient(stack: Array) -> Array:
-    """Derivatives of ``A / w`` from those of ``(A, w)``, by Leibniz' rule."""
-    top, w = stack[..., :-1].copy(), stack[..., -1:]
-    for r in range(len(stack)):
-        for i in range(1, r + 1):
-            top[r] -= comb(r, i) * w[i] * top[r - i]
-        top[r] /= w[0]
-    return top
 
 
 def surface_quotient(stack: tuple[Array, ...]) -> tuple[Array, ...]:

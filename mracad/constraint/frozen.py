@@ -16,8 +16,9 @@ from functools import lru_cache
 import numpy as np
 
 from mracad.bspline.basis import basis
+from mracad.bspline.curve import Curve
 from mracad.bspline.knots import KnotVector, Side
-from mracad.bspline.net import Curve, Net
+from mracad.bspline.net import Net
 from mracad.constraint.region import Region, face_region, supported
 from mracad.model import Face
 from mracad.wavelet.ladder import arc_lengths

@@ -9,8 +9,9 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from mracad.bspline.curve import Curve
 from mracad.bspline.knots import KnotVector
-from mracad.bspline.net import Curve, Net
+from mracad.bspline.net import Net
 from mracad.model import Face
 
 Array = np.ndarray

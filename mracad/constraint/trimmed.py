@@ -19,10 +19,11 @@ from typing import Any
 
 import numpy as np
 
+from mracad.bspline.curve import Curve
 from mracad.bspline.functions import functions
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.knots import Side as Limit
-from mracad.bspline.net import Curve, Net, curvature
+from mracad.bspline.net import Net, curvature
 from mracad.constraint.frozen import local_span
 from mracad.constraint.region import meeting
 from mracad.constraint.seam import UNEVEN, Border, Seam, Wishes, runs_back

@@ -18,8 +18,9 @@ from OCP.gp import gp_Pnt
 from OCP.TColgp import TColgp_Array2OfPnt
 from OCP.TColStd import TColStd_Array1OfInteger, TColStd_Array1OfReal, TColStd_Array2OfReal
 
+from mracad.bspline.curve import Curve
 from mracad.bspline.knots import KnotVector
-from mracad.bspline.net import Curve, Net
+from mracad.bspline.net import Net
 
 Array = np.ndarray
 _KNOTS = np.dtype([("knot", "<f8"), ("mult", "<i4")])

@@ -10,166 +10,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
 from itertools import pairwise, zip_longest
 
 import numpy as np
 
 from mracad.bspline.knots import Array, KnotVector
-from mracad.bspline.refine import refinement
-from mracad.bspline.rows import LARGE, Rows
-from mracad.bspline.solve import BandSolver, folded
 from mracad.errors import UsageError
-from mracad.wavelet.filters import wavelets
-from mracad.wavelet.project import projection
-
-_EXACT = 1e-13
-
-
-class Step:
-    """One analysis and synthesis step between two nested spaces: ``c = P c' + Q d``.  Get it from :func:`step`.
-
-    Attributes
-    ----------
-    coarse, fine : KnotVector
-    exact : bool
-        Whether solving for poles and details gives a signal back to rounding.  Where it does not, the coarse poles come
-        from the projection, which is the better conditioned, details that would make things worse are left out, and
-        :func:`decompose` keeps a residual.
-    """
-
-    def __init__(self, coarse: KnotVector, fine: KnotVector) -> None:
-        self.coarse, self.fine = coarse, fine
-        self._m, n = coarse.count, fine.count
-        # Some functions of an unclamped vector may be all but zero within the domain: take their whole support.
-        q_matrix = wavelets(coarse.closed()[0], *fine.closed())
-        p, q = refinement(coarse, fine).coo(), q_matrix.coo()
-        row, column, value = (np.concatenate(pair) for pair in zip(p, q, strict=True))
-        column[len(p[0]) :] += self._m
-        row_order, column_order = _orders(row, column, n, fine.periodic)
-        self._row_order, self._column_order = row_order, column_order
-        self._entries = row, column, value
-
-    @cached_property
-    def _solver(self) -> BandSolver:
-        return BandSolver(*self._entries, self._row_order, self._column_order)
-
-    @cached_property
-    def _matrix(self) -> Rows:
-        """[P|Q] with rows and columns in band order."""
-        row, column, value = self._entries
-        n = len(self._row_order)
-        return Rows.from_coo(_inverse(self._row_order)[row], _inverse(self._column_order)[column], value, (n, n))
-
-    @cached_property
-    def exact(self) -> bool:
-        probe = np.cos(np.arange(len(self._row_order)) ** 2.0)
-        both = self._solver.solve(probe)
-        return bool(np.abs(probe - self.synthesise(both[: self._m], both[self._m :])).max() < 0.1 * _EXACT)
-
-    def analyse(self, c: Array, axis: int = 0, overwrite: bool = False) -> tuple[Array, Array]:
-        """Coarse poles and details of poles ``c`` along ``axis``; they may take its place if ``overwrite`` says so."""
-        c = np.asarray(c, dtype=float)
-        if c.shape[axis] != self.fine.count:
-            raise UsageError(f"{c.shape[axis]} control points along axis {axis} where the knots want {self.fine.count}")
-        coarse, detail = slice(None, self._m), slice(self._m, None)
-        if self.exact:
-            both = self._solver.solve(c, axis, overwrite)
-            return _part(both, axis, coarse), _part(both, axis, detail)
-        best = projection(self.coarse, self.fine).coarse(c, axis)
-        rest = c - refinement(self.coarse, self.fine).apply(best, axis)
-        found = _part(self._solver.solve(rest, axis), axis, detail)
-        left = rest - self.synthesise(np.zeros_like(best), found, axis)
-        helps = np.abs(left).max(initial=0) < 0.1 * np.abs(rest).max(initial=0)
-        return best, found if helps else np.zeros_like(found)
-
-    def synthesise(self, coarse: Array, detail: Array, axis: int = 0, out: Array | None = None) -> Array:
-        """The poles with the given coarse poles and details along ``axis``.
-
-        They are written to ``out`` if it is given, which may be the array of which the two are the parts.
-        """
-        if (coarse.shape[axis], detail.shape[axis]) != (self._m, self.fine.count - self._m):
-            raise UsageError(
-                f"{coarse.shape[axis]} coarse control points and {detail.shape[axis]} details along axis {axis} where "
-                f"the knots want {self._m} and {self.fine.count - self._m}"
-            )
-        axis %= coarse.ndim
-        if out is None:
-            out = np.empty((*coarse.shape[:axis], self.fine.count, *coarse.shape[axis + 1 :]))
-        if out.size >= LARGE:
-            from mracad.bspline import sweeps
-
-            sweeps.combine(self._matrix, self._column_order, self._row_order, coarse, detail, axis, out)
-        else:
-            both = np.concatenate([coarse, detail], axis=axis)
-            mixed = self._matrix.apply(np.take(both, self._column_order, axis=axis), axis)
-            np.take(mixed, _inverse(self._row_order), axis=axis, out=out)
-        return out
-
-
-class Chain:
-    """Several steps in a row, presented as one: ``details`` of the steps follow each other, the finest first."""
-
-    def __init__(self, steps: Sequence[Step]) -> None:
-        self.steps = tuple(steps)
-        self.fine, self.coarse = self.steps[0].fine, self.steps[-1].coarse
-
-    @property
-    def exact(self) -> bool:
-        return all(each.exact for each in self.steps)
-
-    def analyse(self, c: Array, axis: int = 0, overwrite: bool = False) -> tuple[Array, Array]:
-        """Coarse poles and details of poles ``c`` along ``axis``; they may take its place if ``overwrite`` says so."""
-        details = []
-        for each in self.steps:
-            c, detail = each.analyse(c, axis, overwrite)
-            details.append(detail)
-        return c, np.concatenate(details, axis=axis)
-
-    def synthesise(self, coarse: Array, detail: Array, axis: int = 0, out: Array | None = None) -> Array:
-        """The poles with the given coarse poles and details along ``axis``, written to ``out`` if it is given."""
-        end = detail.shape[axis]
-        for each in reversed(self.steps):
-            begin = end - (each.fine.count - each.coarse.count)
-            here = out if each is self.steps[0] else None
-            coarse = each.synthesise(coarse, _part(detail, axis, slice(begin, end)), axis, here)
-            end = begin
-        return coarse
-
-
-@lru_cache(maxsize=128)
-def step(coarse: KnotVector, fine: KnotVector) -> Step | Chain:
-    """The step between two nested spaces, factored once.
-
-    Where neighbouring knots are to go, or several copies of one, the step is a chain of steps that each remove
-    alternate ones: a single step would be badly conditioned.
-    """
-    between = _between(coarse, fine)
-    return Chain([Step(b, a) for a, b in pairwise(between)]) if len(between) > 2 else Step(coarse, fine)
-
-
-def _between(coarse: KnotVector, fine: KnotVector) -> list[KnotVector]:
-    """Knot vectors from fine to coarse, each without alternate ones of the knots that are still to go."""
-    refinement(coarse, fine)  # raises where not nested
-    wanted = np.zeros(len(fine.breaks), dtype=int)
-    wanted[np.searchsorted(fine.breaks, coarse.breaks)] = coarse.multiplicities
-    chain = [fine]
-    left = fine.multiplicities.copy()
-    last = len(left) - 1
-    while True:
-        owner = np.repeat(np.arange(last if fine.periodic else last - 1), left[:-1] if fine.periodic else left[1:-1])
-        owner += 0 if fine.periodic else 1
-        copy = np.arange(len(owner)) - np.searchsorted(owner, owner)
-        doomed = copy >= wanted[owner]
-        if not doomed.any():
-            return chain if len(chain) > 1 else [fine, coarse]
-        count = np.cumsum(doomed)
-        before = np.maximum.accumulate(np.where(doomed, 0, count))
-        gone = doomed & ((count - before) % 2 == 1)
-        left -= np.bincount(owner[gone], minlength=last + 1)
-        if fine.periodic:
-            left[-1] = left[0]
-        chain.append(fine.with_multiplicities(left))
+from mracad.wavelet.step import EXACT, Chain, Step, step
 
 
 @dataclass(frozen=True, eq=False)
@@ -307,7 +154,7 @@ def _analysed(c: Array, pairs: list[tuple[Step | Chain | None, Step | Chain | No
     poles of an ill-conditioned coarse net cost nothing.
     """
     exact = all(each is None or each.exact for pair in pairs for each in pair)
-    small = 0.0 if exact else _EXACT * np.abs(c).max(initial=0)
+    small = 0.0 if exact else EXACT * np.abs(c).max(initial=0)
     nets, levels = [], []
     for u, v in pairs:
         coarse, bands = _bands(c, u, v, overwrite=exact)
@@ -341,27 +188,3 @@ def _bands(
         if u is not None:
             bands["HL"], bands["HH"] = v.analyse(bands["HL"], 1, overwrite)
     return c, bands
-
-
-def _orders(row: Array, column: Array, n: int, periodic: bool) -> tuple[Array, Array]:
-    """Orders of rows and columns in which the matrix has a narrow band: columns by the middle of their supports."""
-    if not periodic:
-        first, last = np.full(n, n), np.zeros(n, dtype=int)
-        np.minimum.at(first, column, row)
-        np.maximum.at(last, column, row)
-        return np.arange(n), np.lexsort((np.arange(n), first + last))
-    angle = np.exp(2j * np.pi * row / n)
-    middle = np.zeros(n, dtype=complex)
-    np.add.at(middle, column, angle)
-    around = np.argsort(np.round(np.angle(middle) % (2 * np.pi), 9), kind="stable")
-    return folded(n), around[folded(n)]
-
-
-def _inverse(order: Array) -> Array:
-    inverse = np.empty_like(order)
-    inverse[order] = np.arange(len(order))
-    return inverse
-
-
-def _part(c: Array, axis: int, part: slice) -> Array:
-    return np.moveaxis(np.moveaxis(c, axis, 0)[part], 0, axis)

@@ -13,8 +13,8 @@ from xml.etree import ElementTree
 import psutil
 import pytest
 
+from mracad.batch.find import find
 from mracad.batch.manifest import NAME, Manifest
-from mracad.batch.run import find
 from mracad.errors import FileError, UsageError
 from mracad.recipe import load
 from tests.batch.runs import RECIPE, batch, environment, kills, models, outputs, recipe, shams, start

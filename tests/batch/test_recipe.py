@@ -15,6 +15,7 @@ from msgspec import Meta
 
 from mracad import options, recipe
 from mracad.errors import UsageError
+from mracad.recipe.values import toml
 from tests.batch.runs import models
 
 TEXT = """# a recipe
@@ -216,7 +217,7 @@ def test_a_record_is_a_recipe_whatever_the_options(tmp_path_factory, smooth, che
 @calm
 @given(st.recursive(TEXTS | FLOATS | st.booleans() | st.integers(), lambda x: st.lists(x, max_size=3), max_leaves=5))
 def test_values_are_toml(value):
-    assert tomllib.loads(f"value = {recipe._toml(value)}")["value"] == value
+    assert tomllib.loads(f"value = {toml(value)}")["value"] == value
 
 
 def test_a_record_in_another_folder_finds_its_files(tmp_path, monkeypatch):

@@ -100,7 +100,7 @@ def test_parameters_are_found_in_their_span(kind, side):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_greville_abscissae_reproduce_the_parameter(kind):
-    from mracad.bspline.net import Curve
+    from mracad.bspline.curve import Curve
 
     kv = random_knots(4, kind, 7, 2)
     if kind == "periodic":

@@ -1,8 +1,9 @@
 import numpy as np
 import pytest
 
+from mracad.bspline.curve import Curve
 from mracad.bspline.knots import KnotVector
-from mracad.bspline.net import Curve, Net
+from mracad.bspline.net import Net
 from mracad.errors import UsageError
 from tests.bspline.spaces import KINDS, random_knots
 

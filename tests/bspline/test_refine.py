@@ -4,9 +4,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mracad.bspline import rows as rows_module
+from mracad.bspline.curve import Curve
 from mracad.bspline.gram import gram
 from mracad.bspline.knots import KnotVector
-from mracad.bspline.net import Curve
 from mracad.bspline.refine import refinement
 from mracad.bspline.rows import Rows
 from mracad.bspline.solve import BandSolver, folded

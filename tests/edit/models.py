@@ -2,8 +2,9 @@
 
 import numpy as np
 
+from mracad.bspline.curve import Curve
 from mracad.bspline.knots import KnotVector
-from mracad.bspline.net import Curve, Net
+from mracad.bspline.net import Net
 from mracad.model import Edge, Face, Model, Side, Surface, Trim
 
 

@@ -2,9 +2,10 @@
 
 import numpy as np
 
+from mracad.bspline.curve import Curve
 from mracad.bspline.interpolate import interpolated
 from mracad.bspline.knots import KnotVector
-from mracad.bspline.net import Curve, Net
+from mracad.bspline.net import Net
 from mracad.model import Face, Trim
 
 CORNERS = np.array([[1, 0], [1, 1], [0, 1], [-1, 1], [-1, 0], [-1, -1], [0, -1], [1, -1], [1, 0]], float)

@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mracad.bspline.basis import basis
+from mracad.bspline.curve import Curve
 from mracad.bspline.knots import KnotVector
-from mracad.bspline.net import Curve
 from mracad.inspect.cells import inside_grid, quadrature
 from tests.inspect.shapes import circle, cylinder, face, plane, polygon, rectangle, segment
 

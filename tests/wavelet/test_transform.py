@@ -7,10 +7,11 @@ from mracad.bspline.gram import gram
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.refine import refinement
 from mracad.errors import UsageError
-from mracad.wavelet import transform as module
+from mracad.wavelet import step as step_module
 from mracad.wavelet.ladder import ladder_for_scale, rungs_by_level
 from mracad.wavelet.project import projection
-from mracad.wavelet.transform import Chain, decompose, reconstruct, step
+from mracad.wavelet.step import Chain, step
+from mracad.wavelet.transform import decompose, reconstruct
 from tests.bspline.spaces import KINDS, random_knots
 from tests.wavelet.pairs import pairs, uniform
 
@@ -150,7 +151,7 @@ def test_compiled_sweeps_agree(kind, degree, monkeypatch):
     ladders = rungs_by_level(u), rungs_by_level(v)
     c = np.random.default_rng(0).standard_normal((u.count, v.count, 3))
     plain = decompose(c, *ladders)
-    monkeypatch.setattr(module, "LARGE", 1)
+    monkeypatch.setattr(step_module, "LARGE", 1)
     monkeypatch.setattr(solve_module, "LARGE", 1)
     swept = decompose(c, *ladders)
     np.testing.assert_allclose(swept.coarse, plain.coarse, atol=1e-10)
