@@ -16,9 +16,9 @@ import numpy as np
 from mracad.bspline.net import Net
 from mracad.constraint.seam import Seam
 from mracad.constraint.trimmed import TrimmedSeam
-from mracad.edit.pose import Scene
+from mracad.edit.pose import Scene, Tolerances
 from mracad.edit.target import Sheet, Wish
-from mracad.edit.trial import CLOSER, ENOUGH, Trial, Verdict, Watch, displaced
+from mracad.edit.trial import ENOUGH, Trial, Verdict, Watch, amounts, displaced, strict
 from mracad.inspect.roughness import Change, Worse
 from mracad.model import Displacement, Offset
 from mracad.seam.interface import Joints
@@ -33,6 +33,9 @@ LEAST = 0.25
 
 APART, STAYS = "its faces get fairer each by itself", "a face there stays"
 """Reasons for which a seam that could move does not."""
+
+CLOSER = 9
+"""Points a span at which a result is looked at again."""
 
 BLENDS, PROMISE = 2, 1.05
 """Most times that what is best for each of joined surfaces is put together, and by how much it has to come nearer."""
@@ -91,6 +94,15 @@ class Moved:
         now = Watch.of([(self.net, self.sheet.faces)], CLOSER).changes({0: displaced(self.net, offset)})[0]
         return replace(self, offset=offset, amount=amount, changes=now)
 
+    def confirmed(self, tolerances: Tolerances) -> Moved:
+        """What a closer look leaves of it: what grows between the points of the first is taken back."""
+        if not self.amount:
+            return self
+        watch, whole = Watch.of([(self.net, self.sheet.faces)], CLOSER), self.offset / self.amount
+        most = strict(tolerances, self.sheet.wavelength)
+        (amount,), (changes,), (limits,) = amounts(watch, [self.net], [whole], np.array([self.amount]), most)
+        return replace(self, offset=amount * whole, amount=amount, changes=changes, limits=limits or self.limits)
+
     def displacement(self) -> Offset:
         """The displacement over the surface as it is."""
         own, degrees = self.sheet.origin, (self.net.u.degree, self.net.v.degree)
@@ -123,17 +135,20 @@ def drive(scene: Scene, wish: Wish, progress: Callable[[int, int], None] | None 
     for done, (i, sheet) in enumerate(scene.sheets.items()):
         tell(done, 2 * len(scene.sheets))
         result |= _attempt(scene, wish, {i: sheet}, scene.joints.among({i}))
-    rest = [i for i, moved in result.items() if moved.amount >= LEAST]
+    rest = list(result)
     exact = [seam for seam in scene.joints.exact if seam.a.surface == seam.b.surface and seam.a.surface in result]
     loose: list[TrimmedSeam] = []
     done = len(scene.sheets)
-    for group in groups(rest, scene.joints.among(rest)):
+    able = [i for i, moved in result.items() if moved.amount >= LEAST]
+    for group in groups(able, scene.joints.among(able)):
         tell(done, 2 * len(scene.sheets))
         done += len(group)
         for part, joined in _together(scene, wish, group, result):
             exact += [seam for seam in joined.exact if seam.a.surface != seam.b.surface]
             loose += joined.loose
             result |= part
+            rest = [i for i in rest if i not in part]
+    result |= {i: result[i].confirmed(scene.tolerances) for i in rest}
     used = replace(scene.joints, exact=tuple(exact), loose=tuple(loose))
     return Result(result, replace(used, frozen={**scene.joints.frozen, **_dropped(scene.joints, used, result)}))
 
@@ -168,6 +183,7 @@ def _together(
         gain, wanted = (sum(getattr(alone[i], name) for i in part) for name in ("gain", "wanted"))
         if found[part[0]].gain * wanted < gain * found[part[0]].wanted:
             continue
+        found = {i: moved.confirmed(scene.tolerances) for i, moved in found.items()}
         least = min(moved.amount for moved in found.values())
         yield {i: moved.scaled(least) for i, moved in found.items()}, joined
 
@@ -209,7 +225,7 @@ def _attempt(scene: Scene, wish: Wish, members: Mapping[int, Sheet], joined: Joi
         if found[-1].worth <= best.worth:
             break
         best = found[-1]
-    best = trial.confirmed(max([*found, trial.nothing()], key=_worth))
+    best = max([*found, trial.nothing()], key=_worth)
     fairer = [True] * len(members) if best.least else trial.fairer(target)
     wished = float((target * (trial.problem.mass @ target)).sum())
     return {

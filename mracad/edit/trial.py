@@ -14,15 +14,11 @@ from mracad.inspect.roughness import Change, Worse, better, worse
 from mracad.inspect.survey import POINTS, Survey, changes, surveys
 from mracad.model import Face
 from mracad.seam.interface import Joints
-from mracad.seam.solve import Space
 
 Array = np.ndarray
 
 BISECTIONS = 5
 """Steps in which the amount is found."""
-
-CLOSER = 9
-"""Points a span at which a result is looked at again."""
 
 GAIN = 0.005
 """Least share of its bending or curvature variation that a face must lose to be touched at all."""
@@ -84,14 +80,10 @@ class Trial:
 
     def __init__(self, scene: Scene, members: Mapping[int, Sheet], joined: Joints) -> None:
         self.width = max(sheet.wavelength for sheet in members.values())
-        growth = replace(scene.tolerances.growth, singular=SINGULAR / self.width)
-        self.tolerances = replace(scene.tolerances, growth=growth)
+        self.tolerances = strict(scene.tolerances, self.width)
         self.pose = pose(scene, members, joined, self.width, max(sheet.detail for sheet in members.values()))
         self.problem = self.pose.problem
-        self.faces = [members[i].faces for i in self.problem.spaces]
-        self.watch = Watch.of(
-            [(s.net, faces) for s, faces in zip(self.problem.spaces.values(), self.faces, strict=True)]
-        )
+        self.watch = Watch.of([(space.net, members[i].faces) for i, space in self.problem.spaces.items()])
 
     def nothing(self) -> Verdict:
         """What the judge makes of leaving everything as it is."""
@@ -108,31 +100,19 @@ class Trial:
             delta = problem.nearest(np.concatenate(within))
         parts = list(problem.split(delta).values())
         ceiling = self._ceilings(delta)
-        amounts, found, limits = _amounts(self.watch, list(problem.spaces.values()), parts, ceiling, self.tolerances)
+        nets = [space.net for space in problem.spaces.values()]
+        shares, found, limits = amounts(self.watch, nets, parts, ceiling, self.tolerances)
         for i, faces in enumerate(found):
             if not any(better(change, GAIN) for change in faces.values()):
-                amounts[i], found[i] = 0.0, {face: change.undone() for face, change in faces.items()}
-        gains = problem.gains(delta, target, amounts)
-        gain = sum(problem.gains(delta, target, [min(amounts)] * len(parts)))
-        return Verdict(parts, amounts, found, limits, gains, gain)
+                shares[i], found[i] = 0.0, {face: change.undone() for face, change in faces.items()}
+        gains = problem.gains(delta, target, shares)
+        gain = sum(problem.gains(delta, target, [min(shares)] * len(parts)))
+        return Verdict(parts, shares, found, limits, gains, gain)
 
     def blended(self, chosen: Sequence[tuple[Verdict, int]], target: Array) -> Verdict:
         """For each surface another verdict on it, by place, made to meet as smoothly as can be."""
         wanted = np.concatenate([each.amounts[i] * each.parts[i].reshape(-1, 3) for each, i in chosen])
         return self.judged(self.problem.nearest(wanted, stiffness(self.width)), target)
-
-    def confirmed(self, verdict: Verdict) -> Verdict:
-        """The verdict as a closer look leaves it: what grows between the points of the first is taken back."""
-        spaces, amounts, found, why = list(self.problem.spaces.values()), [], [], []
-        for i, (space, faces) in enumerate(
-            zip(spaces, self.faces, strict=True)
-        ):  # one by one: so many points are large
-            watch, most = Watch.of([(space.net, faces)], CLOSER), np.array(verdict.amounts[i : i + 1])
-            amount, change, limits = _amounts(watch, [space], verdict.parts[i : i + 1], most, self.tolerances)
-            amounts += amount
-            found += change
-            why.append(limits[0] or verdict.limits[i])
-        return replace(verdict, amounts=amounts, changes=found, limits=why)
 
     def fairer(self, delta: Array) -> list[bool]:
         """Whether a displacement would take anything off the roughness of each surface, whatever it adds to others."""
@@ -223,20 +203,21 @@ class Watch:
         return found
 
 
-def _amounts(
-    watch: Watch,
-    spaces: Sequence[Space],
-    parts: Sequence[Array],
-    ceiling: Array,
-    tolerances: Tolerances,
+def strict(tolerances: Tolerances, width: float) -> Tolerances:
+    """The tolerances, with the curvature from which on a face is singular where waves up to a width (mm) are taken."""
+    return replace(tolerances, growth=replace(tolerances.growth, singular=SINGULAR / width))
+
+
+def amounts(
+    watch: Watch, nets: Sequence[Net], parts: Sequence[Array], ceiling: Array, tolerances: Tolerances
 ) -> tuple[list[float], list[dict[int, Change]], list[tuple[Worse, ...]]]:
     """For each surface the largest amount of its displacement that makes no face rougher, by bisection."""
     low, high, best = np.zeros(len(parts)), ceiling.copy(), watch.still()
     why: list[tuple[Worse, ...]] = [()] * len(parts)
     for step in range(BISECTIONS + 1):
         test = (low + high) / 2 if step else high.copy()
-        nets = {i: displaced(spaces[i].net, test[i] * parts[i]) for i in np.flatnonzero(low < high).tolist()}
-        for i, faces in watch.changes(nets).items():
+        tried = {i: displaced(nets[i], test[i] * parts[i]) for i in np.flatnonzero(low < high).tolist()}
+        for i, faces in watch.changes(tried).items():
             wrong = tuple(w for each in faces.values() for w in worse(each, tolerances.growth))
             far = any(each.deviation > tolerances.deviation * (1 + 1e-9) for each in faces.values())
             if wrong or far:
