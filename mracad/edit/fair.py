@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mracad.bspline.net import Net
-from mracad.constraint.seam import Wishes
+from mracad.constraint.wishes import Wishes
 from mracad.edit.driver import Result, drive
 from mracad.edit.mend import Mended, mended
 from mracad.edit.pose import Scene, Tolerances

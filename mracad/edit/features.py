@@ -12,7 +12,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from mracad.constraint.seam import Treatment, Wishes
+from mracad.constraint.seam import Treatment
+from mracad.constraint.wishes import Wishes
 from mracad.edit.result import Edit, FaceOutcome, Reason
 from mracad.errors import EditError, UsageError
 from mracad.feature.character import at_scale, laid_on

@@ -14,7 +14,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from mracad.bspline.net import Net
-from mracad.constraint.trimmed import TrimmedSeam, along
+from mracad.constraint.trace import along
+from mracad.constraint.trimmed import TrimmedSeam
 from mracad.edit.driver import Moved, Result, groups
 from mracad.edit.pose import Pose, Scene, pose
 from mracad.edit.target import Sheet, stiffness

@@ -6,7 +6,8 @@ import math
 from collections.abc import Callable, Collection
 from dataclasses import replace
 
-from mracad.constraint.seam import HELD, Treatment, Wishes
+from mracad.constraint.seam import HELD, Treatment
+from mracad.constraint.wishes import Wishes
 from mracad.edit.driver import Moved, Result
 from mracad.edit.fair import Filter, faired
 from mracad.edit.level import Level

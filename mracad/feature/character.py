@@ -15,7 +15,8 @@ import numpy as np
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.net import Net
 from mracad.constraint.frozen import separate
-from mracad.constraint.seam import Wishes, seams
+from mracad.constraint.seam import seams
+from mracad.constraint.wishes import Wishes
 from mracad.errors import EditError
 from mracad.feature.compared import Copy
 from mracad.feature.copies import Laid, offset, over

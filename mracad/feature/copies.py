@@ -14,9 +14,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from mracad.bspline.net import Net
+from mracad.constraint.border import opening
 from mracad.constraint.frozen import separate
-from mracad.constraint.seam import Seam, Wishes, opening
+from mracad.constraint.seam import Seam
 from mracad.constraint.trimmed import TrimmedSeam
+from mracad.constraint.wishes import Wishes
 from mracad.feature.compared import Copy, Outcome, compared, refuse_clipped
 from mracad.feature.crossing import Crossing, crossing, reached, refined
 from mracad.feature.fine import MISSED, Fit

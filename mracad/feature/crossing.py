@@ -8,8 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from mracad.bspline.net import Net
-from mracad.constraint.seam import Border, Seam
-from mracad.constraint.trimmed import Trace, TrimmedSeam, along, crossings
+from mracad.constraint.border import Border
+from mracad.constraint.seam import Seam
+from mracad.constraint.trace import Trace, along, crossings
+from mracad.constraint.trimmed import TrimmedSeam
 from mracad.feature.fine import grown
 from mracad.feature.ideal import Copies
 from mracad.seam.conditions import SAME, doubled, matched

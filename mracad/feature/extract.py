@@ -9,7 +9,8 @@ import numpy as np
 from mracad.bspline.interpolate import interpolated
 from mracad.bspline.net import Net
 from mracad.constraint.frozen import separate
-from mracad.constraint.seam import Wishes, seams
+from mracad.constraint.seam import seams
+from mracad.constraint.wishes import Wishes
 from mracad.errors import EditError
 from mracad.feature.chart import Charts
 from mracad.feature.detail import LOST, Feature, Origin, taper

@@ -13,9 +13,10 @@ import numpy as np
 
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.net import Net
+from mracad.constraint.border import Border
 from mracad.constraint.frozen import jet_support, meeting
 from mracad.constraint.region import supported
-from mracad.constraint.seam import Border, Seam
+from mracad.constraint.seam import Seam
 from mracad.constraint.trimmed import TrimmedSeam
 from mracad.feature.crossing import Crossing, Stretch, exact_parts, met, trace
 from mracad.feature.fine import grown

@@ -20,7 +20,7 @@ import numpy as np
 
 from mracad.bspline.functions import functions
 from mracad.bspline.net import Net
-from mracad.constraint.trimmed import Trace, conormals, crossings, derived
+from mracad.constraint.trace import Trace, conormals, crossings, derived
 from mracad.seam.conditions import laid_out
 
 Array = np.ndarray

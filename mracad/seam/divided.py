@@ -16,6 +16,7 @@ import numpy as np
 
 from mracad.seam.constrained import LEAST, MET, MOST
 from mracad.seam.factor import Definite
+from mracad.seam.strips import Layout, coloured
 
 Array = np.ndarray
 
@@ -27,77 +28,6 @@ SWEEPS = 20
 
 PENALTY = 1e7
 """Weight of conditions against a form whose diagonal is one; each pass divides what they lack by about as much."""
-
-
-@dataclass(frozen=True, eq=False)
-class Layout:
-    """Control points of surfaces, laid out one after another.
-
-    Attributes
-    ----------
-    ends : ndarray (surfaces + 1,) of int
-        Where each begins.
-    places : ndarray (points, 3)
-    reach : ndarray (surfaces,)
-        Width of strips on each, mm.
-    """
-
-    ends: Array
-    places: Array
-    reach: Array
-
-    @property
-    def owner(self) -> Array:
-        """Number of the surface of each point, ``(points,)``."""
-        return np.repeat(np.arange(len(self.reach)), np.diff(self.ends))
-
-
-def joints(layout: Layout, rows: Any, soft: Any, free: Array) -> dict[tuple[int, int], Array]:
-    """The free points of two surfaces (or of one) that conditions or contacts join, by the pair of surfaces."""
-    owner, rows = layout.owner, rows.tocsr()
-    row = np.repeat(np.arange(rows.shape[0]), np.diff(rows.indptr))
-    low, high = np.full(rows.shape[0], len(layout.reach)), np.zeros(rows.shape[0], int)
-    np.minimum.at(low, row, owner[rows.indices])
-    np.maximum.at(high, row, owner[rows.indices])
-    pairs, points = [(low * len(layout.reach) + high)[row]], [rows.indices]
-    if soft is not None:
-        both = soft.tocoo()
-        a, b = owner[both.row], owner[both.col]
-        apart = a != b
-        pairs.append((np.minimum(a, b) * len(layout.reach) + np.maximum(a, b))[apart])
-        points.append(both.row[apart])
-    pair, point = np.concatenate(pairs), np.concatenate(points)
-    pair, point = pair[free[point]], point[free[point]]
-    return {divmod(int(key), len(layout.reach)): np.unique(point[pair == key]) for key in np.unique(pair)}
-
-
-def strips(layout: Layout, joined: dict[tuple[int, int], Array], free: Array) -> list[Array]:
-    """The free points near the points of each joint, of its surfaces and of those that others join to them."""
-    from scipy.spatial import cKDTree
-
-    beside: dict[int, set[int]] = {}
-    for a, b in joined:
-        beside.setdefault(a, {a}).add(b)
-        beside.setdefault(b, {b}).add(a)
-    found = []
-    for (a, b), points in joined.items():
-        near = []
-        for surface in sorted(beside[a] | beside[b]):
-            own = slice(layout.ends[surface], layout.ends[surface + 1])
-            reach, places = layout.reach[surface], layout.places[own]
-            low, high = (each(layout.places[points], axis=0) for each in (np.min, np.max))
-            close = np.flatnonzero(free[own] & ((places >= low - reach) & (places <= high + reach)).all(axis=1))
-            near.append((own.start + close, np.full(len(close), reach)))
-        point, reach = (np.concatenate(each) for each in zip(*near, strict=True))
-        away = cKDTree(layout.places[points]).query(layout.places[point])[0]
-        found.append(_along(layout.places, point[away <= reach]))
-    return found
-
-
-def _along(places: Array, points: Array) -> Array:
-    """Points in their order along the direction in which they extend most: a narrow band in a strip."""
-    off = places[points] - places[points].mean(axis=0)
-    return points[np.argsort(off @ np.linalg.eigh(off.T @ off)[1][:, -1], kind="stable")]
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,9 +74,9 @@ class Divided:
     free : ndarray of bool (points,)
     layout : Layout
     joined : mapping
-        See :func:`joints`.
+        See :func:`mracad.seam.strips.joints`.
     strips : sequence of ndarray of int
-        See :func:`strips`.
+        See :func:`mracad.seam.strips.strips`.
     """
 
     def __init__(
@@ -211,7 +141,7 @@ class Divided:
         self.conditions = columns[:, self.about].tocsr()
         conditions = [np.unique(columns[:, points].indices) for points in strips]
         self.colours = []
-        for members in _coloured(strips, conditions, self.size):
+        for members in coloured(strips, conditions, self.size):
             points = np.concatenate([strips[i] for i in members])
             own = columns[:, points].tocsr()
             part = (form[row[points]] + PENALTY * (own.T @ self.conditions)).tocsr()
@@ -334,20 +264,3 @@ def _apart(form: Any, layout: Layout) -> Any:
     form, owner = form.tocoo(), layout.owner
     apart = owner[form.row] != owner[form.col]
     return csr_array((form.data[apart], (form.row[apart], form.col[apart])), shape=form.shape)
-
-
-def _coloured(strips: Sequence[Array], conditions: Sequence[Array], size: int) -> list[list[int]]:
-    """Strips in sets of such as share neither points nor conditions."""
-    from scipy.sparse import csr_array
-
-    if not strips:
-        return []
-    every = [np.concatenate([points, size + own]) for points, own in zip(strips, conditions, strict=True)]
-    ends = np.cumsum([0, *map(len, every)])
-    of = csr_array((np.ones(ends[-1]), np.concatenate(every), ends))
-    shared = (of @ of.T).tocsr()
-    colour = np.full(len(strips), -1)
-    for i in range(len(strips)):
-        taken = set(colour[shared.indices[shared.indptr[i] : shared.indptr[i + 1]]].tolist())
-        colour[i] = next(c for c in range(len(strips) + 1) if c not in taken)
-    return [np.flatnonzero(colour == c).tolist() for c in range(colour.max(initial=-1) + 1)]

@@ -13,9 +13,13 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from mracad.bspline.net import Net
+from mracad.constraint.border import Border
 from mracad.constraint.frozen import meeting, reached
-from mracad.constraint.seam import TRIMMED, UNEVEN, Border, Seam, Wishes, seams
-from mracad.constraint.trimmed import TrimmedSeam, beside, trace_of, trimmed
+from mracad.constraint.joint import UNEVEN
+from mracad.constraint.seam import TRIMMED, Seam, seams
+from mracad.constraint.trace import trace_of
+from mracad.constraint.trimmed import TrimmedSeam, beside, trimmed
+from mracad.constraint.wishes import Wishes
 from mracad.model import Face, Model, Trim
 from mracad.seam.contact import Contact
 from mracad.seam.space import line

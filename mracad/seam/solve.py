@@ -25,8 +25,9 @@ from numpy.polynomial.chebyshev import chebvander
 
 from mracad.bspline.net import Net
 from mracad.seam.constrained import Constrained
-from mracad.seam.divided import Divided, Layout, joints, strips
+from mracad.seam.divided import Divided
 from mracad.seam.energy import Forms
+from mracad.seam.strips import Layout, joints, strips
 
 Array = np.ndarray
 

@@ -8,7 +8,7 @@ import pytest
 from mracad.audit.continuity import seams
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.net import Net
-from mracad.constraint.seam import Wishes
+from mracad.constraint.wishes import Wishes
 from mracad.edit.driver import groups
 from mracad.edit.fair import Filter, faired
 from mracad.edit.pose import Tolerances

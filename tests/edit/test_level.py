@@ -5,7 +5,7 @@ import pytest
 
 from mracad.audit.continuity import seams
 from mracad.bspline.net import Net
-from mracad.constraint.seam import Wishes
+from mracad.constraint.wishes import Wishes
 from mracad.edit.fair import faired
 from mracad.edit.level import Level
 from mracad.edit.pose import Tolerances

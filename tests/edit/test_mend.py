@@ -7,7 +7,7 @@ import pytest
 
 from mracad.audit.continuity import seams
 from mracad.bspline.net import Net
-from mracad.constraint.seam import Wishes
+from mracad.constraint.wishes import Wishes
 from mracad.edit.fair import Filter, faired
 from mracad.edit.mend import mended
 from mracad.edit.pose import Scene, Tolerances

@@ -6,7 +6,9 @@ from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
 
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.net import Net
-from mracad.constraint.seam import Border, Joint, Seam
+from mracad.constraint.border import Border
+from mracad.constraint.joint import Joint
+from mracad.constraint.seam import Seam
 from mracad.edit.features import extract, repeat
 from mracad.errors import EditError
 from mracad.feature.crossing import crossing

@@ -7,7 +7,7 @@ import pytest
 
 from mracad import job
 from mracad.audit.continuity import seams
-from mracad.constraint.seam import Wishes
+from mracad.constraint.wishes import Wishes
 from mracad.edit.features import extract, move, repeat
 from mracad.errors import EditError
 from mracad.feature.detail import save

@@ -7,7 +7,9 @@ from scipy.sparse import eye_array
 from mracad.bspline.interpolate import interpolated
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.net import Net
-from mracad.constraint.seam import Border, Joint, Seam
+from mracad.constraint.border import Border
+from mracad.constraint.joint import Joint
+from mracad.constraint.seam import Seam
 from mracad.seam.conditions import doubled, laid_out, matched, rows
 from mracad.seam.solve import Constrained
 

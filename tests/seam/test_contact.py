@@ -8,7 +8,7 @@ from mracad.bspline.curve import Curve
 from mracad.bspline.interpolate import interpolated
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.net import Net
-from mracad.constraint.trimmed import Trace
+from mracad.constraint.trace import Trace
 from mracad.seam.contact import Contact, rows
 from tests.inspect.shapes import graph, plane, segment
 

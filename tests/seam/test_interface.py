@@ -7,7 +7,7 @@ import pytest
 
 from mracad.bspline.interpolate import interpolated
 from mracad.bspline.net import Net
-from mracad.constraint.seam import Wishes
+from mracad.constraint.wishes import Wishes
 from mracad.inspect.cells import quadrature
 from mracad.model import Edge, Face, Model, Side, Surface, Trim
 from mracad.occ.view import view

@@ -5,7 +5,9 @@ import pytest
 
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.net import Net
-from mracad.constraint.seam import Border, Joint, Seam
+from mracad.constraint.border import Border
+from mracad.constraint.joint import Joint
+from mracad.constraint.seam import Seam
 from mracad.seam.ladders import ladders
 from mracad.wavelet.ladder import arc_lengths, rungs_by_level
 

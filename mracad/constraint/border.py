@@ -1,0 +1,128 @@
+"""Borders: isoparametric curves by which faces meet edges, and how two of them meet."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mracad.bspline.knots import Side as Limit
+from mracad.bspline.net import cross
+from mracad.constraint.frozen import ISO, local_span
+from mracad.constraint.sides import between, inner_side
+from mracad.model import Edge, Model, Side
+
+Array = np.ndarray
+Jet = tuple[Array, ...]
+"""``S, S_n, S_t`` and perhaps ``S_nn`` along a border, as :func:`jets` gives them."""
+
+AFFINE = 1e-7
+"""Largest deviation, as a fraction of the seam, from an affine map between the parameters along it."""
+
+SHARES = 0.5 - 0.5 * np.cos(np.pi * (np.arange(33) + 0.5) / 33)
+"""Fractions of an edge at which two borders are compared."""
+
+
+@dataclass(frozen=True, eq=False)
+class Border:
+    """One side of a seam: an isoparametric curve of a surface.
+
+    Attributes
+    ----------
+    face, surface : int
+    axis : {0, 1}
+        The direction across the seam: 0 where it lies on a line u = const.
+    at : float
+        Parameter of the line.
+    limit : {"right", "left"}
+        The side of the line on which the face lies.
+    start, stop : float
+        Parameters along the line where the edge begins and ends.
+    """
+
+    face: int
+    surface: int
+    axis: int
+    at: float
+    limit: Limit
+    start: float
+    stop: float
+
+    def places(self, share: Array) -> Array:
+        """Parameters ``(q, 2)`` at fractions of the edge."""
+        along = (1.0 - share) * self.start + share * self.stop
+        return np.stack([np.full_like(along, self.at), along][:: 1 - 2 * self.axis], axis=-1)
+
+    def limits(self, along: Limit) -> tuple[Limit, Limit]:
+        """Limits in u and in v."""
+        return (self.limit, along) if self.axis == 0 else (along, self.limit)
+
+    def part(self, low: float, high: float) -> Border:
+        """What lies between two fractions of it."""
+        start, stop = ((1.0 - share) * self.start + share * self.stop for share in (low, high))
+        return replace(self, start=start, stop=stop)
+
+
+def border(model: Model, edge: Edge, side: Side, use: int) -> Border | None:
+    """The isoparametric curve by which a face meets an edge, run through at a steady pace; None for any other."""
+    face = model.faces[side.face]
+    assert face.surface is not None and side.uv is not None
+    net = model.surfaces[face.surface].net
+    trims = [trim for trim in face.trims if trim.edge == edge.index]
+    trim = trims[use if len(trims) > 1 else 0]
+    ends = trim.curve.evaluate(np.array(trim.curve.knots.domain))[0]
+    for axis, knots in enumerate((net.u, net.v)):
+        at = trim.curve.poles[:, axis]
+        place = float(at.mean())
+        if np.ptp(at) > 2 * ISO * local_span(knots, place):
+            continue
+        low, high = knots.domain
+        nearest = float(knots.breaks[np.argmin(np.abs(knots.breaks - place))])
+        place = nearest if abs(nearest - place) <= ISO * local_span(knots, place) else place
+        along = (net.u, net.v)[1 - axis]
+        start, stop = (_snapped(along.breaks, float(x)) for x in ends[:, 1 - axis])
+        share = (side.uv[:, 1 - axis] - ends[0, 1 - axis]) / (ends[1, 1 - axis] - ends[0, 1 - axis])
+        if abs(share - _pace(len(share))).max() > AFFINE:
+            return None
+        limit: Limit = "right" if place <= low else "left"
+        if low < place < high:
+            limit = inner_side(face, trim.edge, axis, place)
+        return Border(face.index, face.surface, axis, place, limit, start, stop)
+    return None
+
+
+def _pace(count: int) -> Array:
+    """Fractions of an edge at which the model samples it."""
+    return 0.5 - 0.5 * np.cos(np.pi * (np.arange(count) + 0.5) / count)
+
+
+def _snapped(breaks: Array, x: float) -> float:
+    nearest = float(breaks[np.argmin(np.abs(breaks - x))])
+    return nearest if abs(nearest - x) <= 1e-9 * (breaks[-1] - breaks[0]) else x
+
+
+def jets(model: Model, border: Border, share: Array, order: int) -> tuple[Array, ...]:
+    """``S, S_n, S_t`` and for order 2 ``S_nn`` at fractions of the edge in the part's frame; t is the fraction."""
+    face, net = model.faces[border.face], model.surfaces[border.surface].net
+    values = net.evaluate(border.places(share), order, border.limits("right"))
+    s, su, sv, *second = (x @ face.frame[:3, :3].T for x in values)
+    pace = border.stop - border.start
+    first = (su, sv * pace) if border.axis == 0 else (sv, su * pace)
+    return (s + face.frame[:3, 3], *first, *second[:: 2 if border.axis == 0 else -2][:1])
+
+
+def opening(model: Model, a: Border, b: Border) -> tuple[float, float]:
+    """Largest distance (mm) and angle between the outward normals of two borders at equal fractions."""
+    return opened(model, (a, b), (jets(model, a, SHARES, 1), jets(model, b, SHARES, 1)))
+
+
+def opened(model: Model, borders: tuple[Border, Border], found: tuple[Jet, Jet]) -> tuple[float, float]:
+    normals = [outward(model, border, *jet[1:3]) for border, jet in zip(borders, found, strict=True)]
+    apart = np.linalg.norm(found[0][0] - found[1][0], axis=1)
+    return float(apart.max()), float(between(*normals).max())
+
+
+def outward(model: Model, border: Border, across: Array, along: Array) -> Array:
+    """Outward normals, not of unit length, from the derivatives across and along a border."""
+    turned = model.faces[border.face].reversed != (border.stop < border.start)
+    return (-1 if turned else 1) * cross(*((across, along) if border.axis == 0 else (along, across)))

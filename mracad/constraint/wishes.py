@@ -1,0 +1,58 @@
+"""What an edit is to keep of seams, and what it is to mend."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mracad.constraint.frozen import CONTINUITY
+
+Array = np.ndarray
+
+CREASE = np.radians(1.0)
+"""A seam along which the normals differ by more anywhere is a crease: it keeps G0 only."""
+
+BENT = 0.01
+"""Share of the curvature by which it may jump along a seam that counts as continuous in curvature."""
+
+
+@dataclass(frozen=True)
+class Wishes:
+    """What seams are to keep, and what is to be mended.
+
+    Attributes
+    ----------
+    keep : {"g0", "g1", "g2", "as-is"}
+        As it is: as much as each of them has.
+    fit : float
+        Seams whose normals differ by up to this angle anywhere are made tangent.
+    close_gaps : bool
+    hold : frozenset of int
+        Edges that must not move.
+    bend : float
+        Jump of the curvature, 1/mm, that counts for nothing beside :data:`BENT` of the curvature itself.
+    """
+
+    keep: str = "g1"
+    fit: float = 0.0
+    close_gaps: bool = False
+    hold: frozenset[int] = frozenset()
+    bend: float = 1e-9
+
+    def order(self, angles: Array, one: Array, other: Array) -> int:
+        """Derivatives across an edge that are kept, from what there is along it.
+
+        Parameters
+        ----------
+        angles : ndarray (q,)
+            Between the normals of its two faces.
+        one, other : ndarray (q,)
+            Curvatures of the two across it, 1/mm; NaN where there is none.
+        """
+        if not np.nanmax(angles, initial=0.0) <= max(CREASE, self.fit):
+            return 0
+        if self.keep in CONTINUITY:
+            return CONTINUITY[self.keep]
+        allowed = self.bend + BENT * np.maximum(np.abs(one), np.abs(other))
+        return 2 if bool((np.abs(one - other) <= allowed).all()) else 1
