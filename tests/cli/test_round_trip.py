@@ -94,9 +94,9 @@ def test_one_instance_is_edited_alone(mracad, samples, tmp_path):
     }
     pads = [part for part in new.parts if part.product == "pad"]
     assert sorted(len(part.placements) for part in pads) == [1, 3]
-    nets = {len(part.placements): occ.view(new).surfaces[i].net.poles for i, part in enumerate(pads)}
-    assert np.array_equal(nets[3], occ.view(old).surfaces[0].net.poles)
-    assert np.abs(nets[1] - nets[3]).max() > 1e-3
+    nets = {len(part.placements): occ.view(new).surfaces[i].net for i, part in enumerate(pads)}
+    assert np.array_equal(nets[3].poles, occ.view(old).surfaces[0].net.poles)
+    assert np.abs(nets[1].poles - nets[3].over(nets[1].u, nets[1].v).poles).max() > 1e-3
     assert all(set(part.face_colours.values()) == {"#ff0000"} for part in pads)
 
 

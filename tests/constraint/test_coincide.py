@@ -88,14 +88,18 @@ def test_products_that_touch_are_as_one_part(format):
 
 
 def test_instances_that_touch_are_said_to_be_separate():
-    _, noisy = panels.whole(6, 0.0, patches=(1, 1))
-    flat = Net(noisy.u, noisy.v, noisy.poles * [1, 1, 0])
-    (face,) = panels.document({(0, 0): panels.Patch(flat, "", ((0, panels.SIZE), (0, panels.SIZE)))}, sewn=False).faces
+    """A flat face, but for noise inside, and another of it beside it."""
+    _, clean = panels.whole(16, 0.0, patches=(1, 1))
+    poles = clean.poles * [1, 1, 0]
+    poles[3:-3, 3:-3, 2] = np.random.default_rng(1).normal(0, 0.1, (poles.shape[0] - 6, poles.shape[1] - 6))
+    rough = Net(clean.u, clean.v, poles)
+    (face,) = panels.document({(0, 0): panels.Patch(rough, "", ((0, panels.SIZE), (0, panels.SIZE)))}, sewn=False).faces
     for places, count in (((at(), at(100.0)), 2), ((at(), at(100.5)), 0)):
         document = shapes.assembly(face, *places)
         model = view(document)
         assert len(touching(model)) == count and not seams(model)
         edit = smooth(model, Smooth(level=1))
+        assert edit.faces("edited")
         assert sum(t.reason == ELSEWHERE for t in edit.edges) == count
 
 
