@@ -23,6 +23,9 @@ DEGREE = 6
 RAYS, STEPS = 16, 8
 """The fan of geodesics."""
 
+AWAY = 1.5
+"""No geodesic of unit length goes farther than 1, nor faster: what does overstepped a place that is too steep."""
+
 RIDGE = 1e-9
 """Keeps fits with few points from swinging."""
 
@@ -205,7 +208,7 @@ def _fan(graph: Array) -> tuple[Array, Array, Array, Array]:
     wanted = np.stack([*first, first[0] @ by_a.T, first[0] @ by_b.T, first[1] @ by_b.T], axis=1)
 
     def rate(state: Array) -> Array:
-        a, b, va, vb = state
+        a, b, va, vb = np.clip(state, -AWAY, AWAY)
         rows = _products(np.stack([a.ravel(), b.ravel()])).reshape(-1, *a.shape)
         ca, cb, caa, cab, cbb = np.moveaxis(wanted @ np.moveaxis(rows, 0, 1), 1, 0)
         pull = -(caa * va**2 + 2 * cab * va * vb + cbb * vb**2) / (1 + ca**2 + cb**2)

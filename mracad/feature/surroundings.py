@@ -70,6 +70,8 @@ class Surroundings:
         order = np.random.default_rng(0).permutation(len(own))
         far = np.linalg.norm(own[order, :2], axis=1) > CLOSE
         rim = order[np.argsort(far, kind="stable")][:PLATE]
+        # samples of two faces coincide along their seam
+        rim = rim[np.sort(np.unique(own[rim, :2].round(9), axis=0, return_index=True)[1])]
         rest = own[rim, 2] - rows[rim] @ graph
         plate = RBFInterpolator(own[rim, :2], rest, kernel="thin_plate_spline", degree=1)
         side = np.linspace(-CLOSE, CLOSE, CELLS + 1)

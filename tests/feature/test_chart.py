@@ -44,3 +44,12 @@ def test_normal_coordinates_and_frames(ground, limit):
     assert np.abs(found - xy).max() <= limit
     assert np.abs(chart.places(xy, zero) - local[:, :2]).max() <= limit
     assert np.abs(carried - frames).max() <= limit
+
+
+@pytest.mark.parametrize("steep", [30.0, 100.0, 1e4])
+def test_a_ground_that_is_too_steep_for_a_chart_gives_numbers(steep):
+    side = np.linspace(-1.0, 1.0, 21)
+    x, y = (z.ravel() for z in np.meshgrid(side, side))
+    points = np.stack([x, y, steep * x**2], axis=-1)
+    chart = charts(np.zeros((1, 3)), np.eye(3)[None], np.ones(1), points[None], np.ones((1, len(x)), bool))
+    assert np.isfinite(chart.log).all() and np.isfinite(chart.exp).all()

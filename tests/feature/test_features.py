@@ -17,6 +17,7 @@ from mracad.occ.step import read_step, write_step
 from mracad.occ.view import view
 from mracad.options import Repeat
 from samples import make
+from tests.conftest import CORPUS
 from tests.edit import panels
 from tests.edit.models import fitted
 from tests.feature import grounds
@@ -422,6 +423,15 @@ def test_transfer_of_the_character_of_a_face(tmp_path):
     run("transfer", texture, texture, "-o", same, "--from", "#1", "--to", "#1", *band, "--mode", "blend=0.4")
     one, two = model(texture).surfaces[0].net, model(same).surfaces[0].net
     assert np.abs(one.poles - two.poles).max() <= 1e-12
+
+
+@pytest.mark.skipif(CORPUS is None, reason="MRACAD_CORPUS does not name a folder of STEP models")
+def test_samples_that_coincide_along_a_seam_count_once():
+    """Else the plate through them has no solution."""
+    model = view(read_step(CORPUS / "engine_nacelle_openshell_tigl.step"))
+    window = "near:2188.86,-382.397,-287.284,radius:300"
+    edit = repeat(model, Repeat(feature=window, at=("1948.27,-466.698,-330.851",)))
+    assert edit.faces("edited")
 
 
 @pytest.mark.parametrize("angle", [0.0, 1.0])
