@@ -16,12 +16,10 @@ from mracad.audit.continuity import SeamMeasure, key, remeasured, seams
 from mracad.audit.deviation import Deviation, deviations
 from mracad.audit.mended import unmended
 from mracad.edit.result import Edit, Reason
-from mracad.errors import EditError, UsageError
+from mracad.errors import EditError
 from mracad.judge import Judged, Original
 from mracad.model import Model
 from mracad.options import Fitting, Selection
-from mracad.select import Scope, every_nurbs
-from mracad.select import scope as select_scope
 
 if TYPE_CHECKING:
     from mracad.occ.check import Validity
@@ -150,22 +148,14 @@ def run(
         When faces were asked for one by one and none can move, or the result would be less valid than the input,
         whatever faces are left.  The document must then not be written.
     """
-    from mracad.occ.apply import apply as put
-    from mracad.occ.apply import restore
     from mracad.occ.check import check
     from mracad.occ.files import read
+    from mracad.occ.look import looked_at
     from mracad.occ.view import view
 
-    def stage(name: str) -> Callable[[int, int], None]:
-        def tell(done: int, total: int) -> None:
-            guard.doing(name)
-            if progress:
-                progress(name, done, total)
-
-        return tell
-
+    stage = partial(_told, progress)
     start = time.perf_counter()
-    stage("looking at faces")(0, 1)
+    stage("looking at faces")
     model, scope = looked_at(document, options)
     others = [view(read(file)) for file in options.models()]
     before: list[SeamMeasure] = []
@@ -173,17 +163,17 @@ def run(
     left = _Left(model.name, dict(spoiled))
     while True:
         try:
-            result = edit(model, options, *others, scope=scope.holding(left.faces), progress=stage("editing"))
+            result = edit(model, options, *others, scope=scope.holding(left.faces), progress=partial(stage, "editing"))
         except EditError as error:
             raise left.explained(error) from error
         result = _named(result, {face: left.faces[face] for face in left.faces.keys() & scope.chosen})
         _refuse_if_asked(model, result, scope.named)
-        stage("measuring seams")(0, 1)
+        stage("measuring seams")
         if valid_before is None:
             before = seams(model)
-            stage("checking the input")(0, 1)
+            stage("checking the input")
             valid_before = check(document)
-            stage("measuring seams")(0, 1)
+            stage("measuring seams")
         valid_after = valid_before
         offsets = result.displacement.offsets
         after = remeasured(result.displacement.applied(model), before, offsets) if offsets else before
@@ -194,31 +184,22 @@ def run(
             continue
         if not (apply and offsets):
             break
-        stage("changing the model")(0, 1)
-        put(document, model, result.displacement)
-        stage("checking the result")(0, 1)
-        touched = {f for i in offsets for f in model.surfaces[i].faces}
-        moved = check(document, faces=touched)
-        worse = _worse(valid_before, moved)
+        worse, valid_after = _put(document, model, result, left, valid_before, stage)
         if not worse:
-            valid_after = _verdict(valid_before, moved, touched)
             break
-        restore(document, model, result.displacement)
-        if not worse <= touched - left.faces.keys():
-            raise EditError(
-                f"{model.name}: the result would be less valid",
-                "leave faces out with --faces '!#N', or use --amount 0.5",
-            )
         left.leave(worse, "its result would not be valid", before, result)
     if isinstance(options, Fitting):
-        reasons = {treatment.edge: treatment.reason for treatment in result.edges if treatment.reason}
-        movable = scope.chosen - left.faces.keys()
-        result = replace(
-            result, notes=(*result.notes, *unmended(options, model.diagonal, movable, before, after, reasons))
-        )
-    stage("measuring the deviation")(0, 1)
+        result = _with_notes(result, options, model, scope.chosen - left.faces.keys(), before, after)
+    stage("measuring the deviation")
     off = deviations(model, result.displacement)
     return Report(model, result, off, before, after, valid_before, valid_after, time.perf_counter() - start)
+
+
+def _told(progress: Progress | None, name: str, done: int = 0, total: int = 1) -> None:
+    """Say which stage is running."""
+    guard.doing(name)
+    if progress:
+        progress(name, done, total)
 
 
 @dataclass
@@ -265,28 +246,39 @@ def _joined(faces: set[int], seams: Sequence[SeamMeasure], edited: set[int]) -> 
     return found
 
 
-def looked_at(document: Document, options: Selection) -> tuple[Model, Scope]:
-    """The view of a document for an edit, and what the edit may move.
+def _put(
+    document: Document, model: Model, edit: Edit, left: _Left, before: Validity, stage: Callable[[str], None]
+) -> tuple[set[int], Validity]:
+    """Put an edit into a document: faces that would be less valid, for which it is taken out again, and the verdict."""
+    from mracad.occ.apply import apply, restore
+    from mracad.occ.check import check
 
-    Selected faces that are not NURBS are seen as such.  An instance is made a part of its own first.
-    """
-    from mracad.occ.instance import isolate
-    from mracad.occ.select import select_cq
-    from mracad.occ.view import view
-
-    own = isolate(document, options.instance) if options.instance else None
-    model = view(document)
-    nurbs = [i for i in every_nurbs(model) if own is None or i not in own.copies]
-    scope = select_scope(model, options, partial(select_cq, document), nurbs)
-    if own is not None:
-        faces, held, named = (
-            frozenset(own.faces[i] for i in each & own.faces.keys()) for each in (scope.faces, scope.held, scope.named)
+    stage("changing the model")
+    apply(document, model, edit.displacement)
+    stage("checking the result")
+    touched = {f for i in edit.displacement.offsets for f in model.surfaces[i].faces}
+    moved = check(document, faces=touched)
+    worse = _worse(before, moved)
+    if worse:
+        restore(document, model, edit.displacement)
+    if not worse <= touched - left.faces.keys():
+        raise EditError(
+            f"{model.name}: the result would be less valid", "leave faces out with --faces '!#N', or use --amount 0.5"
         )
-        scope = Scope(faces, held, frozenset(own.edges.get(i, i) for i in scope.edges), named)
-        if options.faces and not faces:
-            raise UsageError(f"no selected face is in '{options.instance}'", "leave out --faces, or select others")
-    convertible = {i for i in scope.chosen if model.faces[i].surface is None}
-    return (view(document, convert=convertible) if convertible else model), scope
+    return worse, _verdict(before, moved, touched)
+
+
+def _with_notes(
+    edit: Edit,
+    options: Fitting,
+    model: Model,
+    movable: Collection[int],
+    before: list[SeamMeasure],
+    after: list[SeamMeasure],
+) -> Edit:
+    """An edit with notes of what was to be mended and is not."""
+    reasons = {treatment.edge: treatment.reason for treatment in edit.edges if treatment.reason}
+    return replace(edit, notes=(*edit.notes, *unmended(options, model.diagonal, movable, before, after, reasons)))
 
 
 def _refuse_if_asked(model: Model, result: Edit, named: Collection[int]) -> None:

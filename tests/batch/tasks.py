@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 import signal
 import time
+from collections.abc import Callable
+from functools import partial
 
 from mracad import guard
 from mracad.batch.work import Product
@@ -27,38 +29,49 @@ def hold(count: int) -> None:
     assert held
 
 
+def hang() -> None:
+    time.sleep(60)
+
+
+def note() -> None:
+    guard.doing("looking", "part.step")
+
+
+def eat() -> None:
+    eaten = []
+    while True:
+        eaten.append(b"x" * MB * 10)
+
+
+def fail(error: Exception) -> None:
+    raise error
+
+
+def end(how: signal.Signals) -> None:
+    os.kill(os.getpid(), how)
+
+
+DEEDS: dict[str, Callable[[], object]] = {
+    "crash": partial(end, signal.SIGSEGV),
+    "kill": partial(end, signal.SIGKILL),
+    "exit": partial(os._exit, 3),
+    "hang": hang,
+    "hang at a stage": lambda: (note(), hang()),
+    "crash at a stage": lambda: (note(), end(signal.SIGSEGV)),
+    "note": note,
+    "eat": eat,
+    "eat in a child": lambda: guard.run(lambda: hold(600 * MB), type(None)),
+    "wrong": partial(fail, UsageError("no", "do better")),
+    "bug": partial(fail, EOFError("of a file")),
+    "print": partial(os.write, 1, b"kernel chatter"),
+}
+
+
 def work(what: str) -> object:
-    if what == "crash":
-        os.kill(os.getpid(), signal.SIGSEGV)
-    elif what == "kill":
-        os.kill(os.getpid(), signal.SIGKILL)
-    elif what == "exit":
-        os._exit(3)
-    elif what == "hang":
-        time.sleep(60)
-    elif what == "hang at a stage":
-        guard.doing("looking", "part.step")
-        time.sleep(60)
-    elif what == "crash at a stage":
-        guard.doing("looking", "part.step")
-        os.kill(os.getpid(), signal.SIGSEGV)
-    elif what == "note":
-        guard.doing("looking", "part.step")
-    elif what == "eat":
-        eaten = []
-        while True:
-            eaten.append(b"x" * MB * 10)
-    elif what == "eat in a child":
-        guard.run(lambda: hold(600 * MB), type(None))
-    elif what == "wrong":
-        raise UsageError("no", "do better")
-    elif what == "bug":
-        raise EOFError("of a file")
-    elif what == "trap":
-        return Trap()
-    elif what == "print":
-        os.write(1, b"kernel chatter")
-    return what
+    """Do a deed, and give back what was asked for; only a trap is given as itself."""
+    if what in DEEDS:
+        DEEDS[what]()
+    return Trap() if what == "trap" else what
 
 
 def made(count: int) -> Product:

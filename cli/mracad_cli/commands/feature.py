@@ -22,11 +22,11 @@ def command() -> None:
 @options.apply(options.reading, options.of(Selection, "instance hold keep edges"), options.printing)
 def list_(source: str, input_unit: str | None, encoding: str | None, faces: tuple[str, ...], as_json: bool) -> None:
     """Propose features: places where the detail of a face stands out, with size, height and scales."""
-    from mracad import job
     from mracad.feature.find import found
+    from mracad.occ.look import looked_at
     from mracad_cli.render import json_text, mm, plain, say
 
-    model, scope = job.looked_at(read(source, input_unit, encoding), Selection(faces=faces))
+    model, scope = looked_at(read(source, input_unit, encoding), Selection(faces=faces))
     features = found(model, scope.chosen)
     if as_json:
         body = [{**plain(f), "face": f.face + 1, "feature": f.text} for f in features]
@@ -61,9 +61,9 @@ def extract(
     **given: Any,
 ) -> None:
     """Save a feature to a file: a library of details that mracad repeat and mracad transfer lay elsewhere."""
-    from mracad import job
     from mracad.edit.features import extract as taken
     from mracad.feature.detail import save
+    from mracad.occ.look import looked_at
     from mracad.recipe import options as options_of
     from mracad_cli.render import json_text, mm
 
@@ -72,7 +72,7 @@ def extract(
         raise UsageError(f"cannot write {path}: unknown ending {path.suffix!r}", "end it in .feature")
     check_target(path, overwrite)
     chosen_options = options_of(Repeat, {**given, "feature": feature, "at": ("0,0,0",)})
-    model, scope = job.looked_at(read(source, input_unit, encoding), chosen_options)
+    model, scope = looked_at(read(source, input_unit, encoding), chosen_options)
     found = taken(model, chosen_options, scope.chosen)
     body = {
         "file": model.name,

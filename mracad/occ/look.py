@@ -1,0 +1,35 @@
+"""A document as an edit sees it, and what the edit may move."""
+
+from __future__ import annotations
+
+from functools import partial
+
+from mracad.errors import UsageError
+from mracad.model import Model
+from mracad.occ.document import Document
+from mracad.occ.instance import isolate
+from mracad.occ.select import select_cq
+from mracad.occ.view import view
+from mracad.options import Selection
+from mracad.select import Scope, every_nurbs
+from mracad.select import scope as select_scope
+
+
+def looked_at(document: Document, options: Selection) -> tuple[Model, Scope]:
+    """The view of a document for an edit, and what the edit may move.
+
+    Selected faces that are not NURBS are seen as such.  An instance is made a part of its own first.
+    """
+    own = isolate(document, options.instance) if options.instance else None
+    model = view(document)
+    nurbs = [i for i in every_nurbs(model) if own is None or i not in own.copies]
+    scope = select_scope(model, options, partial(select_cq, document), nurbs)
+    if own is not None:
+        faces, held, named = (
+            frozenset(own.faces[i] for i in each & own.faces.keys()) for each in (scope.faces, scope.held, scope.named)
+        )
+        scope = Scope(faces, held, frozenset(own.edges.get(i, i) for i in scope.edges), named)
+        if options.faces and not faces:
+            raise UsageError(f"no selected face is in '{options.instance}'", "leave out --faces, or select others")
+    convertible = {i for i in scope.chosen if model.faces[i].surface is None}
+    return (view(document, convert=convertible) if convertible else model), scope
