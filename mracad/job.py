@@ -162,6 +162,7 @@ def run(
     valid_before: Validity | None = None
     left = _Left(model.name, dict(spoiled))
     while True:
+        stage("editing")
         try:
             result = edit(model, options, *others, scope=scope.holding(left.faces), progress=partial(stage, "editing"))
         except EditError as error:
