@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from mracad.constraint.seam import HELD, Treatment
 from mracad.constraint.wishes import Wishes
-from mracad.edit.driver import Moved, Result
+from mracad.edit.driver import STAYS, Moved, Result
 from mracad.edit.fair import Filter, faired
 from mracad.edit.level import Level
 from mracad.edit.pose import Tolerances
@@ -144,6 +144,10 @@ def treatments(model: Model, movable: set[int], result: Result, options: Smooth)
     how = dict.fromkeys(joints.moving, "coupled")
     how |= {edge: "to tolerance" for seam in joints.loose for edge in (seam.edge, seam.twin)}
     how |= dict.fromkeys(result.mended, "mended")
+    moved = {i for i, each in result.moved.items() if each.amount}
+    still = {e for e in how if moved.isdisjoint(model.faces[side.face].surface for side in model.edges[e].sides)}
+    how = {edge: way for edge, way in how.items() if edge not in still}
+    frozen |= dict.fromkeys(still, STAYS)
     found = []
     for edge in model.edges:
         faces = tuple(side.face for side in edge.sides)

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
 import time
@@ -70,11 +71,12 @@ def test_every_sample_smooths_and_stays_valid(mracad, samples, tmp_path, name):
     assert max(m.gap for m in new.seams) <= max(m.gap for m in old.seams) + 1e-7
 
 
-@pytest.mark.parametrize("name", ["assembly", "bottle"])
+@pytest.mark.parametrize("name", ["assembly", "bottle", "panel"])
 def test_amount_zero_changes_nothing(mracad, samples, tmp_path, name):
     out, source = tmp_path / "out.step", samples / f"{name}.step"
     result = mracad("smooth", source, "--scale", "5%", "--amount", "0", "-o", out)
     assert result.code == 0 and "nothing changed" in result.out
+    assert re.search(r"; 0 of \d+ edges moved", result.out)
     new, old = judge(out).model, judge(source).model
     assert (new.unit, new.products, len(new.faces)) == (old.unit, old.products, len(old.faces))
     for a, b in zip(new.faces, old.faces, strict=True):
