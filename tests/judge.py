@@ -102,7 +102,7 @@ def assert_as_good(
             limit = old_gap + (1e-6 if faces in coupled else 1e-7)
             if faces in loose:
                 limit = max(limit, SAMPLED * widest[faces], LOOSE[0])
-            assert new_gap <= limit, faces
+            assert new_gap <= limit, (faces, old_gap)
         steeper = LOOSE[1] if faces in loose or not set(faces).isdisjoint(refined) else 1e-4
         smooth = [sorted(m.angle for m in each if m.smooth) for each in (found, before)]
         for new_angle, old_angle in zip(*smooth, strict=True):

@@ -10,12 +10,12 @@ RIGHT, WRONG = "Geh\u00e4use", "Geh\u0434use"  # in cp1252 and in cp1251
 
 
 @pytest.fixture
-def model(samples, tmp_path):
-    """A sample whose product has a name that is not UTF-8."""
-    text = (samples / "panel.step").read_bytes()
-    assert b"PRODUCT('panel','panel'" in text
+def model(small, tmp_path):
+    """A model whose product has a name that is not UTF-8."""
+    text = small[0].read_bytes()
+    assert b"PRODUCT('part','part'" in text
     path = tmp_path / "model.step"
-    path.write_bytes(text.replace(b"PRODUCT('panel','panel'", b"PRODUCT('panel','Geh\xe4use'"))
+    path.write_bytes(text.replace(b"PRODUCT('part','part'", b"PRODUCT('part','Geh\xe4use'"))
     return path
 
 
@@ -36,7 +36,7 @@ def test_the_name_reaches_info_and_every_output(mracad, model, tmp_path, encodin
         out = tmp_path / f"{words[0]}.step"
         result = mracad(*words, *said, "-o", out, "--json")
         assert result.code == 0, result.err
-        assert f"PRODUCT('panel','Geh{escaped}use'" in out.read_text()
+        assert f"PRODUCT('part','Geh{escaped}use'" in out.read_text()
         warnings = json.loads(result.out)["warnings"]
         assert len(warnings) == (encoding is None) and all(f"warning: {text}" in result.err for text in warnings)
     folder = tmp_path / "out"
