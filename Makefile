@@ -3,7 +3,7 @@
 #   make demo    set everything up and smooth a sample
 #   make example fair a panel of six patches and put details on it: moved, repeated over seams, carried from a file
 #   make test    set everything up and run the tests
-#   make test-long  and refine the largest real models as well
+#   make test-long  at more scales, with the largest real models everywhere
 #   make regress compare every sample with the reference figures in samples/figures.json
 #   make fuzz    feed the commands 2 000 damaged files and kill 200 writers (half an hour)
 #

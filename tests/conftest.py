@@ -14,11 +14,11 @@ CORPUS = Path(os.environ["MRACAD_CORPUS"]) if os.environ.get("MRACAD_CORPUS") el
 
 
 LONG = 10**6
-"""Real models of more bytes than this are refined only where ``--long`` asks for it."""
+"""Real models of more bytes than this take part in some tests only where ``--long`` asks for it."""
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    parser.addoption("--long", action="store_true", help="refine the largest real models as well")
+    parser.addoption("--long", action="store_true", help="more scales, and the largest real models everywhere")
 
 
 class Outcome(NamedTuple):
@@ -41,9 +41,9 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
 
 @pytest.fixture
 def refined_file(corpus_file: Path, pytestconfig: pytest.Config) -> Path:
-    """A real model that is refined."""
+    """A real model that is not among the largest."""
     if corpus_file.stat().st_size > LONG and not pytestconfig.getoption("--long"):
-        pytest.skip("more than 1 MB: pytest --long refines it")
+        pytest.skip("more than 1 MB: pytest --long takes it")
     return corpus_file
 
 
