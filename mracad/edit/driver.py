@@ -18,7 +18,7 @@ from mracad.constraint.seam import Seam
 from mracad.constraint.trimmed import TrimmedSeam
 from mracad.edit.pose import Scene, Tolerances
 from mracad.edit.target import Sheet, Wish
-from mracad.edit.trial import ENOUGH, Trial, Verdict, Watch, amounts, displaced, strict
+from mracad.edit.trial import ENOUGH, Trial, Verdict, Watch, amounts, displaced
 from mracad.inspect.roughness import Change, Worse
 from mracad.model import Displacement, Offset
 from mracad.seam.interface import Joints
@@ -91,17 +91,19 @@ class Moved:
         if amount == self.amount:
             return self
         offset = self.offset * (amount / self.amount)
-        now = Watch.of([(self.net, self.sheet.faces)], CLOSER).changes({0: displaced(self.net, offset)})[0]
+        now = self._watch().changes({0: displaced(self.net, offset)})[0]
         return replace(self, offset=offset, amount=amount, changes=now)
 
     def confirmed(self, tolerances: Tolerances) -> Moved:
         """What a closer look leaves of it: what grows between the points of the first is taken back."""
         if not self.amount:
             return self
-        watch, whole = Watch.of([(self.net, self.sheet.faces)], CLOSER), self.offset / self.amount
-        most = strict(tolerances, self.sheet.wavelength)
-        (amount,), (changes,), (limits,) = amounts(watch, [self.net], [whole], np.array([self.amount]), most)
+        whole, most = self.offset / self.amount, np.array([self.amount])
+        (amount,), (changes,), (limits,) = amounts(self._watch(), [self.net], [whole], most, tolerances)
         return replace(self, offset=amount * whole, amount=amount, changes=changes, limits=limits or self.limits)
+
+    def _watch(self) -> Watch:
+        return Watch.of([(self.net, self.sheet.faces)], self.sheet.wavelength, CLOSER)
 
     def displacement(self) -> Offset:
         """The displacement over the surface as it is."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -80,10 +80,10 @@ class Trial:
 
     def __init__(self, scene: Scene, members: Mapping[int, Sheet], joined: Joints) -> None:
         self.width = max(sheet.wavelength for sheet in members.values())
-        self.tolerances = strict(scene.tolerances, self.width)
+        self.tolerances = scene.tolerances
         self.pose = pose(scene, members, joined, self.width, max(sheet.detail for sheet in members.values()))
         self.problem = self.pose.problem
-        self.watch = Watch.of([(space.net, members[i].faces) for i, space in self.problem.spaces.items()])
+        self.watch = Watch.of([(space.net, members[i].faces) for i, space in self.problem.spaces.items()], self.width)
 
     def nothing(self) -> Verdict:
         """What the judge makes of leaving everything as it is."""
@@ -178,11 +178,11 @@ class Watch:
     owners: Sequence[tuple[int, int]]
 
     @classmethod
-    def of(cls, surfaces: Sequence[tuple[Net, Sequence[Face]]], points: int = POINTS) -> Watch:
-        """Look at faces of surfaces before an edit, at so many points a span."""
+    def of(cls, surfaces: Sequence[tuple[Net, Sequence[Face]]], width: float, points: int = POINTS) -> Watch:
+        """Look at faces of surfaces before an edit that takes waves up to a width (mm), at so many points a span."""
         every = [(place, net, face) for place, (net, faces) in enumerate(surfaces) for face in faces]
         return cls(
-            surveys([(net, (face,), net.u, net.v) for _, net, face in every], points),
+            surveys([(net, (face,), net.u, net.v) for _, net, face in every], points, SINGULAR / width),
             [(place, face.index) for place, _, face in every],
         )
 
@@ -201,11 +201,6 @@ class Watch:
         for (place, face, _), change in zip(looked, now, strict=True):
             found[place][face] = change
         return found
-
-
-def strict(tolerances: Tolerances, width: float) -> Tolerances:
-    """The tolerances, with the curvature from which on a face is singular where waves up to a width (mm) are taken."""
-    return replace(tolerances, growth=replace(tolerances.growth, singular=SINGULAR / width))
 
 
 def amounts(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
-from math import inf
 
 
 class Rougher(Enum):
@@ -16,6 +15,10 @@ class Rougher(Enum):
     KINK = "kink"
     FOLD = "fold"
     SINGULAR = "singular point"
+
+
+SETTLED = 0.005
+"""Share by which the curvature at singular points may change."""
 
 
 @dataclass(frozen=True)
@@ -62,6 +65,8 @@ class Change:
         Largest motion along the normal, mm.
     motion : float
         Largest motion, mm.
+    unsettled : float
+        Largest relative change of the curvature at singular points that stay singular.
     """
 
     before: Roughness
@@ -71,6 +76,7 @@ class Change:
     turn: float = 0.0
     deviation: float = 0.0
     motion: float = 0.0
+    unsettled: float = 0.0
 
     def undone(self) -> Change:
         """Nothing done instead."""
@@ -89,8 +95,6 @@ class Growth:
         By how much an angle across a knot line may grow, degrees.
     fold : float
         By how much a normal may turn, degrees.
-    singular : float
-        Curvature that stays, 1/mm, from which on what a grid sees of a face depends on where its points lie.
     """
 
     bending: float = 0.0
@@ -98,12 +102,12 @@ class Growth:
     curvature: float = 0.0
     kink: float = 0.0
     fold: float = 30.0
-    singular: float = inf
 
 
 @dataclass(frozen=True)
 class Worse:
-    """One figure of a face that got worse, before and after (of a fold: 0 and the angle, degrees)."""
+    """One figure of a face that got worse, before and after; of a fold 0 and the angle (degrees), of a singular point 0
+    and the share by which its curvature changed."""
 
     what: Rougher
     before: float
@@ -124,8 +128,8 @@ def worse(change: Change, allowed: Growth) -> tuple[Worse, ...]:
         found.append(Worse(Rougher.KINK, before.kink, after.kink))
     if change.turn > allowed.fold:
         found.append(Worse(Rougher.FOLD, 0.0, change.turn))
-    if min(before.curvature, after.curvature) > allowed.singular:
-        found.append(Worse(Rougher.SINGULAR, before.curvature, after.curvature))
+    if change.unsettled > SETTLED:
+        found.append(Worse(Rougher.SINGULAR, 0.0, change.unsettled))
     return tuple(found)
 
 

@@ -52,7 +52,9 @@ class Survey:
     points, normals : ndarray (3, q)
         At the points of the rule; normals in single precision.
     regular : ndarray of bool (q,)
-        Where the surface is not degenerate and knots lie apart: only there curvature counts.
+        Where the surface is neither degenerate nor singular and knots lie apart: only there curvature counts.
+    sharp : ndarray (q,)
+        Curvature at singular points, 1/mm; 0 elsewhere.
     rounding : ndarray (q,)
         Curvature that rounding may make, 1/mm.
     crossed : list of (Crossing, ndarray)
@@ -67,6 +69,7 @@ class Survey:
     points: Array
     normals: Array
     regular: Array
+    sharp: Array
     rounding: Array
     crossed: Sequence[tuple[Crossing, Array]]
     roughness: Roughness
@@ -74,7 +77,9 @@ class Survey:
 
 
 def surveys(
-    surfaces: Iterable[tuple[Net, Sequence[Face], KnotVector, KnotVector]], points: int = POINTS
+    surfaces: Iterable[tuple[Net, Sequence[Face], KnotVector, KnotVector]],
+    points: int = POINTS,
+    singular: float = np.inf,
 ) -> list[Survey]:
     """Look at surfaces before an edit.
 
@@ -84,6 +89,8 @@ def surveys(
         The surface, those of its faces that are to be seen as one, and the knots that it will have afterwards.
     points : int
         Points a span of those knots, in either direction.
+    singular : float
+        Curvature, 1/mm, from which on a point is singular: what a grid sees of it depends on where its points lie.
     """
     ready = [
         (net, tuple(faces), _rule(faces, u, v, points), (u, v), net.poles.mean(axis=(0, 1)))
@@ -95,6 +102,8 @@ def surveys(
         sides = form.speeds * _spans(rule, knots)
         least = max(CLUSTER[0], CLUSTER[1] * float(np.linalg.norm(np.ptp(net.poles, axis=(0, 1)))))
         regular = form.regular & (sides.min(axis=0) >= least)
+        sharp = np.where(regular & (form.largest > singular), form.largest, 0.0)
+        regular &= sharp == 0
         sides = np.maximum(sides, least)
         areas = _areas(rule, form)
         rounding = ROUNDING * float(np.abs(net.poles).max()) * _wavenumber(sides.min(axis=0)) ** 2
@@ -102,7 +111,7 @@ def surveys(
         kink = _largest(angles for _, angles in crossed)
         found.append(
             Survey(
-                net, faces, rule, centre, at, form.normal.astype(np.float32), regular, rounding, crossed,
+                net, faces, rule, centre, at, form.normal.astype(np.float32), regular, sharp, rounding, crossed,
                 _roughness(areas, form, regular, rounding, kink), _noise(areas * regular, sides, rounding),
             )
         )  # fmt: skip
@@ -135,9 +144,20 @@ def changes(surveyed: Sequence[Survey], nets: Sequence[Net]) -> list[Change]:
                 np.degrees(2 * np.arcsin(min(float(turned.max(initial=0.0)) / 2, 1.0))).item(),
                 float(np.abs((motion * survey.normals).sum(axis=0)).max(initial=0.0)),
                 float(np.linalg.norm(motion, axis=0).max(initial=0.0)),
+                _unsettled(survey.sharp, form.largest),
             )
         )
     return found
+
+
+def _unsettled(sharp: Array, largest: Array) -> float:
+    """Largest relative change of the curvature of singular points that stay singular."""
+    those = sharp > 0
+    if not those.any():
+        return 0.0
+    before, after = sharp[those], largest[those]
+    stay = after > before.min()
+    return float(np.abs(after / before - 1)[stay].max(initial=0.0))
 
 
 def _turned(survey: Survey, normals: Array, counted: Array) -> Array:

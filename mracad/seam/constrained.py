@@ -18,6 +18,9 @@ PASSES, MOST, MET = 2, 24, 1e-14
 """Proximal passes (one leaves errors of 1e-6 where lengths are many spans), and most of them until conditions are met
 to a share of what moves: rows that barely depend on each other are met slowly."""
 
+HELD = 1e-9
+"""Share of a condition that must be on points that may move: of others only rounding is left."""
+
 LEAST = 1e-10
 """Share of the largest diagonal entry that is added to the form: functions that barely reach into a face stay put."""
 
@@ -47,9 +50,10 @@ class Constrained:
         self.scale = 1.0 / np.sqrt(diagonal + LEAST * diagonal.max(initial=0.0) + 1e-300)
         scaling = diags_array(self.scale)
         self.form = (scaling @ form @ scaling + LEAST * eye_array(len(self.free))).tocsr()
+        whole, some = _lengths(rows), _lengths(rows.tocsr()[:, self.free])
         rows = (rows.tocsr()[:, self.free] @ scaling).tocsr()
-        length = np.sqrt(np.asarray(rows.multiply(rows).sum(axis=1)).ravel())
-        self.there = np.flatnonzero(length > 0)
+        length = _lengths(rows)
+        self.there = np.flatnonzero((length > 0) & (some > HELD * whole))
         self.length = length[self.there]
         self.rows = (diags_array(1.0 / self.length) @ rows[self.there]).tocsr()
         count = self.rows.shape[0]
@@ -88,12 +92,14 @@ class Constrained:
             begun = start[self.free] / self.scale[:, None]
             owed, size = owed - self.rows @ begun, float(np.abs(begun).max(initial=0.0))
         x, y = np.zeros_like(b), np.zeros_like(owed)
+        missed = np.inf
         for _ in range((MOST if exactly else PASSES) if len(y) else 1):
             residual = b - self.form @ x - self.rows.T @ y
             step = self._solve(np.concatenate([residual, owed - self.rows @ x]))
             x += step[: len(x)]
             y += step[len(x) :]
-            if np.abs(owed - self.rows @ x).max(initial=0.0) <= MET * max(size, np.abs(x).max(initial=0.0)):
+            last, missed = missed, float(np.abs(owed - self.rows @ x).max(initial=0.0))
+            if missed <= MET * max(size, np.abs(x).max(initial=0.0)) or not missed < last:
                 break
         return self._whole(x)
 
@@ -105,3 +111,8 @@ class Constrained:
         out = np.zeros((self.size, x.shape[1]))
         out[self.free] = self.scale[:, None] * x
         return out
+
+
+def _lengths(rows: Any) -> Array:
+    """Euclidean norms of the rows of a sparse matrix."""
+    return np.sqrt(np.asarray(rows.multiply(rows).sum(axis=1)).ravel())
