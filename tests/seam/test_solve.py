@@ -214,3 +214,21 @@ def test_gains_are_what_comes_nearer():
         mass = spaces[k].forms.mass
         left, before = target[part] - amounts[k] * delta[part], target[part]
         assert gain == pytest.approx((before * (mass @ before)).sum() - (left * (mass @ left)).sum())
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_contacts_that_weigh_much_and_nearly_repeat_conditions_are_borne(seed):
+    """Passes of a solve that rounding spoils would make what they miss ever larger."""
+    rng = np.random.default_rng(seed)
+    n, m = 200, 60
+    rows = np.zeros((m, n))
+    for row in rows:
+        row[rng.choice(n, 8, replace=False)] = rng.standard_normal(8)
+    contacts = rows[::2] * (1 + 1e-6 * rng.standard_normal((m // 2, n)))
+    form = np.diag(rng.uniform(1e-6, 1, n)) + 1e9 * contacts.T @ contacts
+    right = rng.standard_normal((n, 1))
+    nearest = null_space(rows)
+    wanted = nearest @ np.linalg.solve(nearest.T @ form @ nearest, nearest.T @ right)
+    found = Constrained(csr_array(form), csr_array(rows), np.ones(n, bool))(right)
+    size = np.abs(wanted).max()
+    assert np.abs(rows @ found).max() <= 1e-8 * size and np.abs(found).max() <= 2 * size
