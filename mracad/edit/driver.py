@@ -138,7 +138,8 @@ def drive(scene: Scene, wish: Wish, progress: Callable[[int, int], None] | None 
         tell(done, 2 * len(scene.sheets))
         result |= _attempt(scene, wish, {i: sheet}, scene.joints.among({i}))
     rest = list(result)
-    exact = [seam for seam in scene.joints.exact if seam.a.surface == seam.b.surface and seam.a.surface in result]
+    moving = {i for i, moved in result.items() if moved.amount > 0}
+    exact = [seam for seam in scene.joints.exact if seam.a.surface == seam.b.surface and seam.a.surface in moving]
     loose: list[TrimmedSeam] = []
     done = len(scene.sheets)
     able = [i for i, moved in result.items() if moved.amount >= LEAST]
@@ -151,7 +152,8 @@ def drive(scene: Scene, wish: Wish, progress: Callable[[int, int], None] | None 
             result |= part
             rest = [i for i in rest if i not in part]
     result |= {i: result[i].confirmed(scene.tolerances) for i in rest}
-    used = replace(scene.joints, exact=tuple(exact), loose=tuple(loose))
+    closing = {edge: pair for edge, pair in scene.joints.closing.items() if pair[0].surface in moving}
+    used = replace(scene.joints, exact=tuple(exact), loose=tuple(loose), closing=closing)
     return Result(result, replace(used, frozen={**scene.joints.frozen, **_dropped(scene.joints, used, result)}))
 
 

@@ -9,6 +9,7 @@ from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS
 
 from mracad import job, occ
+from mracad.edit.result import Reason
 from mracad.edit.smooth import smooth
 from mracad.model import Displacement, Offset
 from mracad.occ.apply import apply
@@ -18,7 +19,7 @@ from mracad.options import Smooth
 from samples import make
 from tests.occ.test_mesh import corners, is_watertight
 
-NOISE, SPANS = 0.05, 12
+NOISE, SPANS = 0.05, 8
 
 
 def rounded_box():
@@ -47,25 +48,20 @@ def sample(name):
 
 
 @pytest.mark.parametrize(
-    ("source", "scale", "moving"),
-    [
-        (lambda _: rounded_box(), "12mm", 48),
-        (sample("bottle"), "3%", 1),
-        (sample("blade"), "6%", 2),
-        (sample("trimmed"), "5%", 0),
-    ],
+    ("source", "scale"),
+    [(lambda _: rounded_box(), "12mm"), (sample("bottle"), "3%"), (sample("blade"), "6%"), (sample("trimmed"), "5%")],
     ids=["rounded box", "bottle", "blade", "panel with a hole"],
 )
-def test_solids_stay_solid_and_smooth(samples, tmp_path, source, scale, moving):
+def test_solids_stay_solid_and_smooth(samples, tmp_path, source, scale):
+    """Seams stay shut; those that are smooth stay so, edges keep their place."""
     document = source(samples)
     report = job.run(document, smooth, Smooth(scale=scale))
-    moved = {t.edge: t for t in report.edit.edges if t.how != "frozen"}
-    assert len(moved) == moving and report.edit.faces("edited")
+    assert report.edit.faces("edited")
     assert report.valid_before.valid and report.valid_after.valid and check(document).solids == 1
-    assert report.valid_after.edge_tolerance <= max(report.valid_before.edge_tolerance, 1e-5)
+    assert report.valid_after.edge_tolerance <= 1.1 * report.valid_before.edge_tolerance
     for before, after in zip(report.before, report.after, strict=True):
         assert after.gap <= max(before.gap, 1e-4)
-        if before.smooth or before.edge not in moved:
+        if before.smooth:
             assert after.angle <= before.angle + 0.01
     occ.write(document, tmp_path / "out.stl")
     assert is_watertight(corners(tmp_path / "out.stl"))
@@ -77,16 +73,23 @@ def pipe():
     return make.single(BRepBuilderAPI_NurbsConvert(solid, True).Shape(), "pipe")
 
 
-def test_a_face_that_only_follows_its_neighbour_counts_as_edited():
-    report = job.run(pipe(), smooth, Smooth(scale="8%"))
-    assert [t.how for t in report.edit.edges] == ["coupled", "to tolerance", "to tolerance"]
-    assert [(o.status, o.moved > 0) for o in report.edit.outcomes] == [("edited", True)] * 3
-    assert min(o.detail for o in report.edit.outcomes) < 1e-7
+def test_a_clean_pipe_is_left_as_it_is():
+    document = pipe()
+    edit = job.run(document, smooth, Smooth(scale="8%")).edit
+    assert [(o.status, o.reason) for o in edit.outcomes] == [("unchanged", Reason.FAIR)] * 3
+    assert {t.how for t in edit.edges} == {"frozen"} and not edit.displacement.offsets
 
 
 def test_a_face_that_closes_on_itself_gets_no_kink_there():
     document = pipe()
-    report = job.run(document, smooth, Smooth(level=1))
+    model = view(document)
+    net = model.surfaces[0].net
+    knots = np.linspace(*net.u.domain, 13)[1:-1], np.linspace(*net.v.domain, 25)[1:-1]
+    noise = np.zeros(net.refined(*knots).poles.shape)
+    noise[:, 12:-12] = 0.1 * np.random.default_rng(0).standard_normal(noise[:, 12:-12].shape)
+    apply(document, model, Displacement({0: Offset(noise, *knots)}))
+    report = job.run(document, smooth, Smooth(scale="12%"))
     closing = [(a, b) for a, b in zip(report.before, report.after, strict=True) if a.faces[0] == a.faces[1]]
+    assert [t.how for t in report.edit.edges if t.faces[0] == t.faces[1]] == ["coupled"]
     assert closing and report.edit.faces("edited") and report.valid_after.valid
     assert all(after.angle <= before.angle + 0.01 for before, after in closing)
