@@ -70,9 +70,9 @@ def test_bodies_as_nurbs(name, format, quick):
 
 @pytest.mark.parametrize("name", zoo.SOLIDS)
 @pytest.mark.parametrize("scale", SCALES)
-@pytest.mark.parametrize("refine", [False, True], ids=["", "refine"])
+@pytest.mark.parametrize("refine", ["auto", "never"])
 def test_bodies_smoothed(name, scale, refine, quick):
-    quick(name in QUICK and scale == "20%" and not refine)
+    quick(name in QUICK and scale == "20%" and refine == "auto")
     document = zoo.noisy(body(name))
     try:
         report = job.run(document, smooth, Smooth(scale=scale, refine=refine))
