@@ -15,37 +15,17 @@ from mracad.model import Displacement, Offset
 from mracad.occ.step import read_step, write_step
 from mracad.occ.view import view
 from mracad.options import Smooth
-from mracad.wavelet.ladder import arc_lengths, ladder_for_scale, rungs_by_level
-from mracad.wavelet.project import projection
 from tests.edit import panels
+from tests.edit.models import sheet
 
-SPANS, NOISE = 32, 0.3
+SPANS, NOISE = 16, 0.3
 TURNS = ["", "u", "v", "x", "uv", "ux", "vx", "uvx"]
 
 
-def ideal(noisy, shape, keep="g1", level=None, scale=None):
-    """The unsplit surface smoothed on a ladder that keeps the seam knots, its outer rows frozen."""
-    coarse = []
-    for axis, (knots, count) in enumerate(zip((noisy.u, noisy.v), shape, strict=True)):
-        kept, lengths = frozenset(panels.SIZE * np.arange(1, count)), arc_lengths(noisy, axis)
-        if scale is None:
-            coarse.append(rungs_by_level(knots, keep=kept, lengths=lengths)[level])
-        else:
-            coarse.append(ladder_for_scale(knots, lengths, float(scale), keep=kept))
-    poles = projection(coarse[1], noisy.v).apply(projection(coarse[0], noisy.u).apply(noisy.poles, 0), 1)
-    rows = int(keep[1]) + 1
-    free = np.zeros(poles.shape[:2], bool)
-    free[rows:-rows, rows:-rows] = True
-    return Net(noisy.u, noisy.v, np.where(free[..., None], poles, noisy.poles))
-
-
-def reference(clean, noisy, shape, **options):
-    """How far the ideal is from the truth, mm."""
-    return panels.rms(
-        {k: p.net for k, p in panels.cut(ideal(noisy, shape, **options), shape).items()},
-        panels.cut(noisy, shape),
-        clean,
-    )
+def unsplit(noisy, **options):
+    """The net of the panel in one piece, smoothed."""
+    model = sheet(noisy)
+    return smooth(model, Smooth(**options)).displacement.applied(model).surfaces[0].net
 
 
 def edited(patches, **options):
@@ -72,22 +52,54 @@ def holds(model):
     return max(m.gap for m in measures), max(m.angle for m in measures)
 
 
-@pytest.mark.parametrize(("shape", "limits"), [((2, 3), (1.15, 1.05)), ((4, 4), (1.3, 1.15))])
-@pytest.mark.parametrize("level", [2, 3])
-def test_patches_come_close_to_the_unsplit_surface(shape, limits, level):
-    clean, noisy = panels.whole(SPANS, NOISE, patches=shape)
-    patches = panels.cut(noisy, shape)
-    ratios = {}
-    for keep in ("g1", "g2"):
-        model, report = edited(patches, level=level, keep=keep)
-        gap, angle = holds(model)
-        ratios[keep] = error(model, patches, clean) / reference(clean, noisy, shape, keep=keep, level=level)
-        assert coupled(report) == (shape[0] - 1) * shape[1] + shape[0] * (shape[1] - 1)
-        assert gap <= 1e-9 and angle <= 1e-5
-    frozen, _ = edited(patches, level=level, edges="frozen")
-    ratios["frozen"] = error(frozen, patches, clean) / reference(clean, noisy, shape, level=level)
-    print(f"{shape} patches, {SPANS >> level} coarse spans: " + ", ".join(f"{k} {r:.3f}" for k, r in ratios.items()))
-    assert ratios["g1"] <= limits[0] and ratios["g2"] <= limits[1]
+SHAPE = (2, 3)
+
+
+@pytest.fixture(scope="module")
+def panel():
+    """Clean and noisy nets of the panel, and how far off the truth its smoothing in one piece is, mm, by options."""
+    clean, noisy = panels.whole(SPANS, NOISE, patches=SHAPE)
+    known = {}
+
+    def whole(**options):
+        if str(options) not in known:
+            cut = panels.cut(unsplit(noisy, **options), SHAPE)
+            known[str(options)] = panels.rms({k: p.net for k, p in cut.items()}, panels.cut(noisy, SHAPE), clean)
+        return known[str(options)]
+
+    return clean, noisy, whole
+
+
+def ratio(panel, change, keep, **options):
+    """Error of the patches, read back, over that of the panel in one piece; all seams moved and hold."""
+    clean, noisy, whole = panel
+    patches = change(panels.cut(noisy, SHAPE))
+    model, report = edited(patches, keep=keep, **options)
+    gap, angle = holds(model)
+    assert coupled(report) == 7 and gap <= 1e-9 and angle <= 1e-5
+    if keep != "g1":
+        assert max(m.bend for m in seams(model)) <= 1e-8
+    found = error(model, patches, clean) / whole(**options)
+    print(f"{change.__name__}, {keep}, {options}: {found:.3f} of the error in one piece")
+    return found
+
+
+def as_cut(patches):
+    return patches
+
+
+@pytest.mark.parametrize(
+    ("keep", "options", "most"),
+    [
+        ("g1", {"scale": "25mm"}, 1.10),
+        ("g2", {"scale": "25mm"}, 1.05),
+        ("as-is", {"scale": "25mm"}, 1.05),
+        ("g1", {"level": 2}, 1.14),
+        ("as-is", {"level": 2}, 1.02),
+    ],
+)
+def test_patches_come_close_to_the_unsplit_surface(panel, keep, options, most):
+    assert ratio(panel, as_cut, keep, **options) <= most
 
 
 def other_knots(patches):
@@ -112,25 +124,10 @@ def other_degrees(patches):
     }
 
 
-@pytest.mark.parametrize(
-    ("change", "level"), [(other_senses, 2), (other_senses, 3), (other_degrees, 2), (other_knots, 2)]
-)
-def test_patches_that_differ_come_close_as_well(change, level):
-    shape = (2, 3)
-    clean, noisy = panels.whole(SPANS, NOISE, patches=shape)
-    patches = change(panels.cut(noisy, shape))
-    ratios = {}
-    for keep in ("g1", "g2"):
-        options = {"keep": keep} | ({"scale": "16"} if change is other_knots else {"level": level})
-        model, report = edited(patches, **options)
-        ratios[keep] = error(model, patches, clean) / reference(clean, noisy, shape, **options)
-        gap, angle = holds(model)
-        assert coupled(report) == 7
-        assert gap <= 1e-9 and angle <= 1e-5
-        least = min(net.u.count for net in (s.net for s in model.surfaces))
-        assert all(t.freedom >= min(least, SPANS // 2**level + 3) for t in report.edit.edges if t.how == "coupled")
-    print(f"{change.__name__}, level {level}: " + ", ".join(f"{k} {r:.3f}" for k, r in ratios.items()))
-    assert ratios["g1"] <= 1.15 and ratios["g2"] <= 1.05
+@pytest.mark.parametrize("change", [other_senses, other_degrees, other_knots])
+@pytest.mark.parametrize(("keep", "most"), [("g1", 1.10), ("as-is", 1.05)])
+def test_patches_that_differ_come_close_as_well(panel, change, keep, most):
+    assert ratio(panel, change, keep, scale="25mm") <= most
 
 
 def skewed(noise, skew):
@@ -154,25 +151,20 @@ def skewed(noise, skew):
     return Net(u, v, s), Net(u, quartic, t)
 
 
-def test_a_joint_of_varying_ratio():
+def test_a_joint_of_varying_ratio_moves():
     grid = np.stack(np.meshgrid(np.linspace(0, 1, 60), np.linspace(0, 1, 60), indexing="ij"), -1).reshape(-1, 2)
-    figures = {}
+    figures = []
     for skew in (0.5, 0.0):
         clean, noisy = skewed(0.0, skew), skewed(NOISE, skew)
-        for edges in ("coupled", "frozen"):
-            document = panels.pair(*noisy)
-            report = job.run(document, smooth, Smooth(level=2, edges=edges))
-            model = view(document)
-            apart = [s.net.evaluate(grid) - c.evaluate(grid) for s, c in zip(model.surfaces, clean, strict=True)]
-            figures[skew, edges] = np.sqrt(np.mean(np.concatenate(apart) ** 2))
-            gap, angle = holds(model)
-            assert gap <= 1e-9 and angle <= 1e-5
-            if edges == "coupled":
-                (seam,) = [t for t in report.edit.edges if t.how == "coupled"]
-                print(f"ratio 1 + {skew} v: {seam.freedom} degrees of freedom on the seam")
-                assert seam.freedom >= SPANS // 4 + 3
-    print(", ".join(f"ratio 1 + {skew} v {edges}: {v:.4f} mm" for (skew, edges), v in figures.items()))
-    assert figures[0.5, "coupled"] < figures[0.5, "frozen"]
+        document = panels.pair(*noisy)
+        report = job.run(document, smooth, Smooth(scale="25mm"))
+        model = view(document)
+        apart = [s.net.evaluate(grid) - c.evaluate(grid) for s, c in zip(model.surfaces, clean, strict=True)]
+        figures.append(np.sqrt(np.mean(np.concatenate(apart) ** 2)))
+        gap, angle = holds(model)
+        assert coupled(report) == 1 and gap <= 1e-9 and angle <= 1e-5
+    print(f"ratio that varies {figures[0]:.4f} mm, constant {figures[1]:.4f} mm")
+    assert figures[0] <= 1.10 * figures[1]
 
 
 def torn(patches, sewn):
@@ -190,7 +182,7 @@ def torn(patches, sewn):
 
 @pytest.mark.parametrize("sewn", [True, False])
 def test_defects_are_carried_or_mended(sewn):
-    _, noisy = panels.whole(24, 0.05, patches=(2, 2))
+    _, noisy = panels.whole(12, 0.05, patches=(2, 2))
     patches = panels.cut(noisy, (2, 2))
     before = seams(view(torn(patches, sewn)))
     gap, angle = max(m.gap for m in before), max(m.angle for m in before)
@@ -214,7 +206,7 @@ def test_defects_are_carried_or_mended(sewn):
 
 
 def test_a_t_junction_moves():
-    _, noisy = panels.whole(16, 0.1, patches=(2, 2))
+    _, noisy = panels.whole(10, 0.1, patches=(2, 2))
     document = panels.junction(noisy)
     report = job.run(document, smooth, Smooth(scale="16mm"))
     gap, angle = holds(view(document))
