@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from mracad.bspline.net import Net
+from mracad.bspline.gram import gram
+from mracad.bspline.net import Net, cross
 from mracad.constraint.crease import crease_lines
 from mracad.inspect.cells import Quadrature
 from mracad.seam.energy import Forms, forms
@@ -20,8 +21,8 @@ Array = np.ndarray
 SMOOTHER = 2.5
 """The metric is smoothed at so many times the wavelength of the edit."""
 
-BARELY = 1e-12
-"""Share of the largest mass below which a control point does not reach into a face."""
+BARELY = 1e-6
+"""Share of the whole of a function's mass that must lie in a face: others would go anywhere, for hardly any effect."""
 
 
 def planar(net: Net) -> Net:
@@ -42,8 +43,12 @@ def _walked(count: int, steps: Array) -> Array:
 
 def seen(net: Net, masses: Forms) -> Array:
     """Control points ``(nu, nv)`` that reach into the faces over which masses were taken."""
-    diagonal = masses.mass.diagonal()
-    return np.asarray(diagonal > BARELY * diagonal.max(initial=0.0)).reshape(net.poles.shape[:2])
+    us, vs = net.u.greville(), net.v.greville()
+    area = np.linalg.norm(cross(net.tangents(us, vs, 0), net.tangents(us, vs, 1)), axis=-1)
+    area = np.minimum(area, np.median(area))  # where it is large only here, it says little of the function
+    whole = np.multiply.outer(*(gram(knots).toarray().diagonal() for knots in (net.u, net.v))) * area
+    mass = masses.mass.diagonal().reshape(whole.shape)
+    return np.asarray((mass > BARELY * whole) & (mass > 0))
 
 
 def creases(net: Net, points: Array) -> tuple[frozenset[float], frozenset[float]]:
