@@ -9,16 +9,14 @@ from OCP.TopExp import TopExp
 
 from mracad import job
 from mracad.audit.continuity import seams
-from mracad.bspline.net import Net
 from mracad.edit.smooth import smooth
 from mracad.occ.step import read_step, write_step
 from mracad.occ.view import view
 from mracad.options import Smooth
-from mracad.wavelet.ladder import arc_lengths, ladder_for_scale
-from mracad.wavelet.project import projection
 from tests.edit import halves
+from tests.edit.models import sheet
 
-NOISE = 0.2
+NOISE, SPANS = 0.05, (30, 60)
 
 
 def smoothed(left, right, sewn=True, **options):
@@ -28,13 +26,6 @@ def smoothed(left, right, sewn=True, **options):
     stream = io.BytesIO()
     write_step(document, stream)
     return report.model, view(read_step(io.BytesIO(stream.getvalue()))), report
-
-
-def ideal(clean, left):
-    """The left half's surface, which goes on beyond the seam, smoothed as a whole: how far it is from the truth."""
-    u, v = (ladder_for_scale(k, arc_lengths(left, axis), 30.0) for axis, k in enumerate((left.u, left.v)))
-    poles = projection(v, left.v).apply(projection(u, left.u).apply(left.poles, 0), 1)
-    return error([Net(left.u, left.v, poles)] * 2, clean, (0.0, 0.0))
 
 
 def seam(model):
@@ -59,29 +50,32 @@ def treatment(report):
     return next((t.how, t.reason) for t in report.edit.edges if len(t.faces) == 2)
 
 
-@pytest.mark.parametrize("spans", [(30, 60), (60, 120)], ids=["coarse", "fine"])
-def test_a_trimmed_seam_moves_and_holds(spans):
-    clean, left, right = halves.surfaces(NOISE, spans)
-    errors = {"ideal": ideal(clean, left), "noise": error((left, right), clean)}
-    for how in ("frozen", "g1", "g2"):
-        options = {"edges": "frozen"} if how == "frozen" else {"keep": how}
-        before, after, report = smoothed(left, right, **options)
+@pytest.fixture(scope="module")
+def rough_halves():
+    return halves.surfaces(NOISE, SPANS)
+
+
+def test_a_trimmed_seam_moves_and_holds(rough_halves):
+    """Nearer to the truth than with the seam held; the left half's surface, which goes on beyond it, is the measure."""
+    clean, left, right = rough_halves
+    model = sheet(left)
+    unsplit = smooth(model, Smooth(scale="30mm")).displacement.applied(model).surfaces[0].net
+    errors = {"unsplit": error([unsplit] * 2, clean, (0.0, 0.0))}
+    for edges in ("frozen", "coupled"):
+        before, after, report = smoothed(left, right, edges=edges)
         (old, line), (new, moved) = seam(before), seam(after)
-        errors[how] = error([surface.net for surface in after.surfaces], clean)
+        errors[edges] = error([surface.net for surface in after.surfaces], clean)
         assert report.valid_after.valid
-        assert new.gap <= max(old.gap, 1e-4) + 1e-7 and new.angle <= old.angle + 0.008
-        if how != "frozen":
-            assert treatment(report) == ("to tolerance", "")
-            assert np.linalg.norm(line - moved, axis=1).max() > NOISE / 4
-            assert all(t.freedom >= 11 for t in report.edit.edges if t.how == "to tolerance")  # 8 coarse spans
-    print("\nrms beside the seam, mm:", {k: round(x, 4) for k, x in errors.items()})
-    assert errors["g1"] < min(1.25 * errors["ideal"], 0.8 * errors["frozen"])
-    # eight coarse spans leave little that keeps the curvature as well
-    assert errors["g2"] < min(1.35 * errors["ideal"], 0.85 * errors["frozen"])
+        assert new.gap <= max(old.gap, 1e-4) + 1e-6 and new.angle <= old.angle + 0.008
+        assert treatment(report) == (("to tolerance", "") if edges == "coupled" else ("frozen", "no edge moves"))
+        assert (np.linalg.norm(line - moved, axis=1).max() > NOISE / 4) == (edges == "coupled")
+    print("rms beside the seam, mm:", {k: round(x, 4) for k, x in errors.items()})
+    assert errors["coupled"] <= 1.05 * errors["unsplit"] and errors["coupled"] < 0.9 * errors["frozen"]
 
 
-def test_a_model_that_was_never_sewn_moves_like_a_sewn_one():
-    left, right = halves.quiet(NOISE, (10, 20))
+def test_a_model_that_was_never_sewn_moves_like_a_sewn_one(rough_halves):
+    """As nearly as the edges of both faces lie together."""
+    _, left, right = rough_halves
     y, moved = np.linspace(10, 190, 200), []
     for sewn in (True, False):
         before, after, report = smoothed(left, right, sewn)
@@ -91,50 +85,30 @@ def test_a_model_that_was_never_sewn_moves_like_a_sewn_one():
         assert new.gap <= old.gap + 1e-4 and new.angle <= old.angle + 0.008
         moved.append(after.surfaces[0].net.evaluate(np.stack([halves.waist(y) - 1.0, y], axis=1))[:, 2])
     still = left.evaluate(np.stack([halves.waist(y) - 1.0, y], axis=1))[:, 2]
-    assert np.abs(moved[1] - moved[0]).max() < 0.05 * np.abs(moved[0] - still).max()
+    assert np.abs(moved[1] - moved[0]).max() < old.gap < 0.25 * np.abs(moved[0] - still).max()
 
 
 @pytest.mark.parametrize("keep", ["g1", "g2"])
-def test_surfaces_that_meet_exactly_stay_together(keep):
+def test_a_seam_beside_a_face_with_nothing_to_smooth_stays(keep):
     before, after, report = smoothed(*halves.quiet(NOISE, (10, 20)), keep=keep)
     (old, _), (new, _) = seam(before), seam(after)
-    assert treatment(report) == ("to tolerance", "") and len(report.edit.faces("edited")) == 2
+    assert treatment(report) == ("frozen", "neighbour does not move")
+    assert [outcome.status for outcome in report.edit.outcomes] == ["edited", "unchanged"]
     assert old.gap < 1e-9 and new.gap <= 1e-4 and new.angle <= 0.008
     if keep == "g2":
         assert new.bend - old.bend <= 1e-3 / 30
 
 
-def test_spans_under_a_seam_that_stays_open_are_halved(monkeypatch):
-    found = {}
-    for steeper in (0.008, 2e-6):
-        monkeypatch.setattr("mracad.edit.group.STEEPER", np.radians(steeper))
-        _, after, report = smoothed(*halves.quiet(NOISE, (4, 6), 20.0), gap_tolerance="1e-6mm")
-        assert treatment(report) == ("to tolerance", "")
-        found[steeper] = seam(after)[0].angle, sum(surface.net.poles.size for surface in after.surfaces)
-        assert found[steeper][0] <= steeper
-    assert found[2e-6][1] > found[0.008][1] and found[2e-6][0] < found[0.008][0]
-
-
-def test_a_seam_that_cannot_hold_stays_and_says_why(monkeypatch):
-    monkeypatch.setattr("mracad.edit.group.STEEPER", 1e-12)
-    _, left, right = halves.surfaces(NOISE, (30, 60))
-    right.poles[..., 2] += 1e-3 * np.random.default_rng(5).standard_normal(right.poles.shape[:2])
-    before, _, report = smoothed(left, right)
-    assert treatment(report)[0] == "frozen" and treatment(report)[1]
-    gaps = [next(m.gap for m in found if m.edge == seam(before)[0].edge) for found in (report.before, report.after)]
-    assert gaps[1] == pytest.approx(gaps[0], abs=1e-9)
-
-
-def test_gaps_and_tilts_are_pulled_shut_where_asked():
-    _, left, right = halves.surfaces(NOISE, (30, 60))
+def test_gaps_and_tilts_are_pulled_shut_where_asked(rough_halves):
+    _, left, right = rough_halves
     before, after, report = smoothed(left, right, close_gaps=True, fit_g1=0.5)
     (old, _), (new, _) = seam(before), seam(after)
     assert treatment(report) == ("mended", "")
     assert new.mean_gap < 0.3 * old.mean_gap and new.mean_angle < 0.5 * old.mean_angle
 
 
-def test_vertices_stay_where_the_ends_of_their_edges_do():
-    document = halves.document(*halves.quiet(NOISE, (10, 20)), beside=1e-3)
+def test_vertices_stay_where_the_ends_of_their_edges_do(rough_halves):
+    document = halves.document(*rough_halves[1:], beside=1e-3)
     edge = next(edge.index for edge in view(document).edges if len(edge.sides) == 2)
     vertices = [end(document.edges[edge]) for end in (TopExp.FirstVertex_s, TopExp.LastVertex_s)]
     before = [BRep_Tool.Pnt_s(vertex) for vertex in vertices]
