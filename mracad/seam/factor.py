@@ -12,7 +12,7 @@ Array = np.ndarray
 WIDEST = 50.0
 """Widest band, over the fourth root of the number of unknowns, that takes less time than nested elimination."""
 
-LOST = 1e-7
+LOST = 1e-4
 """Relative residual from which on factors need pivots."""
 
 
