@@ -67,7 +67,15 @@ def nested(matrix: Any) -> Callable[[Array], Array]:
     with np.errstate(invalid="ignore", over="ignore"):
         lost = np.abs(matrix @ factor.solve(right) - right).max(initial=0.0)
     if not lost <= LOST * np.abs(right).max(initial=0.0):
-        factor = splu(matrix, permc_spec="COLAMD", diag_pivot_thresh=1.0)
+        return pivoted(matrix)
+    return lambda right: np.asarray(factor.solve(right))
+
+
+def pivoted(matrix: Any) -> Callable[[Array], Array]:
+    """Solutions with a matrix by sparse factors with pivoting: slower, and good to rounding."""
+    from scipy.sparse.linalg import splu
+
+    factor = splu(matrix.tocsc(), permc_spec="COLAMD")
     return lambda right: np.asarray(factor.solve(right))
 
 
