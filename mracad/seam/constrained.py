@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from mracad.seam.factor import Definite, nested, pivoted
+from mracad.seam.factor import Definite, nested
 
 Array = np.ndarray
 
@@ -17,9 +17,6 @@ SLACK = 1e-9
 PASSES, MOST, MET = 2, 24, 1e-14
 """Proximal passes (one leaves errors of 1e-6 where lengths are many spans), and most of them until conditions are met
 to a share of what moves: rows that barely depend on each other are met slowly."""
-
-POOR = 1e-10
-"""Where so much is missed when passes gain no more, factors need pivots."""
 
 HELD = 1e-9
 """Share of a condition that must be on points that may move: of others only rounding is left."""
@@ -60,10 +57,11 @@ class Constrained:
         self.length = length[self.there]
         self.rows = (diags_array(1.0 / self.length) @ rows[self.there]).tocsr()
         count = self.rows.shape[0]
-        self._whole_form = (
-            block_array([[self.form, self.rows.T], [self.rows, -slack * eye_array(count)]]) if count else None
+        self._solve = (
+            nested(block_array([[self.form, self.rows.T], [self.rows, -slack * eye_array(count)]]))
+            if count
+            else Definite(self.form)
         )
-        self._solve = Definite(self.form) if self._whole_form is None else nested(self._whole_form)
 
     def __call__(
         self, right: Array, start: Array | None = None, goal: Array | None = None, exactly: bool = True
@@ -93,25 +91,17 @@ class Constrained:
         if start is not None:
             begun = start[self.free] / self.scale[:, None]
             owed, size = owed - self.rows @ begun, float(np.abs(begun).max(initial=0.0))
-        x, missed = self._passes(b, owed, size, exactly)
-        if exactly and self._whole_form is not None and missed > POOR:
-            self._solve, self._whole_form = pivoted(self._whole_form), None
-            x, _ = self._passes(b, owed, size, exactly)
-        return self._whole(x)
-
-    def _passes(self, b: Array, owed: Array, size: float, exactly: bool) -> tuple[Array, float]:
-        """The minimum by proximal passes, and what conditions miss of a share of what moves."""
-        x, y, missed = np.zeros_like(b), np.zeros_like(owed), np.inf
+        x, y = np.zeros_like(b), np.zeros_like(owed)
+        missed = np.inf
         for _ in range((MOST if exactly else PASSES) if len(y) else 1):
             residual = b - self.form @ x - self.rows.T @ y
             step = self._solve(np.concatenate([residual, owed - self.rows @ x]))
             x += step[: len(x)]
             y += step[len(x) :]
             last, missed = missed, float(np.abs(owed - self.rows @ x).max(initial=0.0))
-            missed /= max(size, np.abs(x).max(initial=0.0), 1e-300)
-            if missed <= MET or not missed < last:
+            if missed <= MET * max(size, np.abs(x).max(initial=0.0)) or not missed < last:
                 break
-        return x, missed if len(y) else 0.0
+        return self._whole(x)
 
     def settled(self, x: Array) -> Array:
         """What is nearest to x, ``(n, k)``, with L x = 0: what one pass has left of it is taken away."""

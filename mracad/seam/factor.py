@@ -12,8 +12,8 @@ Array = np.ndarray
 WIDEST = 50.0
 """Widest band, over the fourth root of the number of unknowns, that takes less time than nested elimination."""
 
-LOST = 1e-4
-"""Relative residual from which on factors need pivots."""
+LOST = 1e-9
+"""Relative residual that may be left after one refinement; factors that leave more need pivots."""
 
 
 class Definite:
@@ -58,24 +58,18 @@ class Definite:
 
 
 def nested(matrix: Any) -> Callable[[Array], Array]:
-    """Solutions with a symmetric matrix by sparse factors: without pivoting, unless that loses too many digits."""
+    """Solutions with a symmetric matrix by sparse factors: without pivoting, unless refinement does not mend that."""
     from scipy.sparse.linalg import splu
 
     matrix = matrix.tocsc()
     factor = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
     right = np.asarray(matrix @ np.sin(np.arange(matrix.shape[0])))
     with np.errstate(invalid="ignore", over="ignore"):
-        lost = np.abs(matrix @ factor.solve(right) - right).max(initial=0.0)
+        found = factor.solve(right)
+        found += factor.solve(right - matrix @ found)
+        lost = np.abs(matrix @ found - right).max(initial=0.0)
     if not lost <= LOST * np.abs(right).max(initial=0.0):
-        return pivoted(matrix)
-    return lambda right: np.asarray(factor.solve(right))
-
-
-def pivoted(matrix: Any) -> Callable[[Array], Array]:
-    """Solutions with a matrix by sparse factors with pivoting: slower, and good to rounding."""
-    from scipy.sparse.linalg import splu
-
-    factor = splu(matrix.tocsc(), permc_spec="COLAMD")
+        factor = splu(matrix, permc_spec="COLAMD", diag_pivot_thresh=1.0)
     return lambda right: np.asarray(factor.solve(right))
 
 
