@@ -32,6 +32,9 @@ NOISY, STEEP = 1.0, 20.0
 """Where normals turn by more than the first in the median, degrees, noise goes; those that turn by more than the second
 are then compared with those around, too."""
 
+STEADY = 0.05
+"""What a turn of the normal at a singular point counts for beside a change of its curvature, per radian."""
+
 _BLOCK = 50_000
 
 _ENOUGH = 4096
@@ -144,20 +147,21 @@ def changes(surveyed: Sequence[Survey], nets: Sequence[Net]) -> list[Change]:
                 np.degrees(2 * np.arcsin(min(float(turned.max(initial=0.0)) / 2, 1.0))).item(),
                 float(np.abs((motion * survey.normals).sum(axis=0)).max(initial=0.0)),
                 float(np.linalg.norm(motion, axis=0).max(initial=0.0)),
-                _unsettled(survey.sharp, form.largest),
+                _unsettled(survey, form),
             )
         )
     return found
 
 
-def _unsettled(sharp: Array, largest: Array) -> float:
-    """Largest relative change of the curvature of singular points that stay singular."""
-    those = sharp > 0
+def _unsettled(survey: Survey, form: Forms) -> float:
+    """Largest relative change of the curvature of singular points that stay singular, or turn of their normals."""
+    those = survey.sharp > 0
     if not those.any():
         return 0.0
-    before, after = sharp[those], largest[those]
+    before, after = survey.sharp[those], form.largest[those]
     stay = after > before.min()
-    return float(np.abs(after / before - 1)[stay].max(initial=0.0))
+    turned = np.linalg.norm(form.normal[:, those].astype(np.float32) - survey.normals[:, those], axis=0)
+    return float(max(np.abs(after / before - 1)[stay].max(initial=0.0), STEADY * turned.max(initial=0.0)))
 
 
 def _turned(survey: Survey, normals: Array, counted: Array) -> Array:
