@@ -34,9 +34,6 @@ LEAST = 0.25
 APART, STAYS = "its faces get fairer each by itself", "a face there stays"
 """Reasons for which a seam that could move does not."""
 
-SLIGHT = 0.1
-"""A surface of which less may be done stays as it is: that would not be seen, and takes control points."""
-
 CLOSER = 9
 """Points a span at which a result is looked at again."""
 
@@ -101,10 +98,8 @@ class Moved:
         """What a closer look leaves of it: what grows between the points of the first is taken back."""
         if not self.amount:
             return self
-        watch, whole, most = self._watch(), self.offset / self.amount, np.array([self.amount])
-        (amount,), (changes,), (limits,) = amounts(watch, [self.net], [whole], most, tolerances)
-        if amount < SLIGHT:
-            amount, (changes,) = 0.0, watch.still()
+        whole, most = self.offset / self.amount, np.array([self.amount])
+        (amount,), (changes,), (limits,) = amounts(self._watch(), [self.net], [whole], most, tolerances)
         return replace(self, offset=amount * whole, amount=amount, changes=changes, limits=limits or self.limits)
 
     def _watch(self) -> Watch:

@@ -30,7 +30,7 @@ WHOLE = 1.25
 """What may be done in whole is preferred to a part of what comes nearer to the target by less than this factor: a part
 leaves something of every wave everywhere."""
 
-SINGULAR = 1e3
+SINGULAR = 1e5
 """Curvature over the wavelength from which on a face is singular."""
 
 FINER = 3
