@@ -34,10 +34,10 @@ example: $(VENV)/ready
 	@echo 'The result lies in build/example.step (and .stl); samples/example/recipe.toml says how it was made.'
 
 test: $(VENV)/dev
-	$(BIN)/python -m pytest -n 2
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n 2
 
 test-long: $(VENV)/dev
-	$(BIN)/python -m pytest -n 2 --long
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --long
 
 regress: $(VENV)/ready
 	$(BIN)/python samples/regress.py samples/*.step

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
+import mracad_cli  # noqa: F401  # before numpy: it keeps linear algebra to one thread
 import pytest
 
 SAMPLES = Path(__file__).parents[1] / "samples"

@@ -21,7 +21,7 @@ def pairs(body, ways):
 
 
 @pytest.mark.parametrize("percent", [2, 0.5, 10])
-def test_smoothing_makes_no_face_rougher(corpus_file, percent, mracad, tmp_path, pytestconfig):
+def test_smoothing_makes_no_face_rougher(corpus_file, refined_file, percent, mracad, tmp_path, pytestconfig):
     if percent != 2 and not pytestconfig.getoption("--long"):
         pytest.skip(f"pytest --long smooths at {percent} %")
     out, report = tmp_path / "out.step", tmp_path / "report.json"
