@@ -61,5 +61,5 @@ def test_a_spoiled_face_is_left_and_named(monkeypatch):
     assert np.array_equal(before[1].net.poles, after[1].net.poles)
     assert not np.array_equal(before[0].net.poles, after[0].net.poles)
     assert report.valid_after.valid
-    with pytest.raises(EditError, match="#2 would come out worse: its result would not be valid"):
+    with pytest.raises(EditError, match="#2: would come out worse: its result would not be valid"):
         job.run(read_step(SAMPLES / "panel.step"), smooth, Smooth(scale="16mm", faces=("#2",)))
