@@ -25,9 +25,10 @@ from OCP.TopExp import TopExp_Explorer
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Shape, TopoDS_Shell
 
-from mracad.constraint.frozen import halvings, separate
+from mracad.constraint.frozen import separate
 from mracad.model import Displacement, Offset
 from mracad.occ import Document, apply, view
+from mracad.wavelet.ladder import arc_lengths
 from tests.occ import shapes
 
 Maker = Callable[[], TopoDS_Shape]
@@ -287,6 +288,20 @@ SOLIDS: dict[str, Callable[[], cq.Workplane]] = {
     )
 }  # fmt: skip
 """Bodies as they are drawn every day."""
+
+
+def halvings(net):
+    """A surface with ever more knots, in search of free points: ever shorter spans are halved."""
+    coarse, u_knots, v_knots = net, np.empty(0), np.empty(0)
+    while net.poles.shape[0] * net.poles.shape[1] < 10_000:
+        spans = arc_lengths(net, 0), arc_lengths(net, 1)
+        halves_u, halves_v = (
+            ((k.breaks[:-1] + k.breaks[1:]) / 2)[s > max(spans[0].max(), spans[1].max()) / 2]
+            for k, s in zip((net.u, net.v), spans, strict=True)
+        )
+        u_knots, v_knots = np.sort(np.r_[u_knots, halves_u]), np.sort(np.r_[v_knots, halves_v])
+        net = coarse.refined(u_knots, v_knots)
+        yield net, u_knots, v_knots
 
 
 def noisy(shape: TopoDS_Shape, size: float = 0.03, seed: int = 1) -> Document:

@@ -9,7 +9,7 @@ its derivatives; edges, vertices and pcurves stay exactly valid.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -21,7 +21,6 @@ from mracad.bspline.knots import KnotVector, Side
 from mracad.bspline.net import Net
 from mracad.constraint.region import Region, face_region, supported
 from mracad.model import Face
-from mracad.wavelet.ladder import arc_lengths
 
 Array = np.ndarray
 
@@ -34,13 +33,6 @@ then below 1e-6 of δ per span, 1e-4° for a δ of a sixth of the span."""
 
 NEAR = 1e-4
 """Distance, as a fraction of the longer span beside it, within which a pcurve counts as lying at a knot line."""
-
-
-REFINED_POINTS = 10_000
-"""Most control points to which a net is refined in search of free ones."""
-
-REFINED_SHARE = 1 / 16
-"""Share of the visible points that should be free after refinement."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,27 +102,6 @@ def separate(
         else:
             frozen |= reach[face.index]
     return Separation(visible, frozen, reach)
-
-
-def halvings(net: Net) -> Iterator[tuple[Net, Array, Array]]:
-    """A surface with ever more knots, in search of free points: ever shorter spans are halved.
-
-    Yields
-    ------
-    net : Net
-    u_knots, v_knots : ndarray
-        Knots inserted in all.
-    """
-    coarse, u_knots, v_knots = net, np.empty(0), np.empty(0)
-    while net.poles.shape[0] * net.poles.shape[1] < REFINED_POINTS:
-        spans = arc_lengths(net, 0), arc_lengths(net, 1)
-        halves_u, halves_v = (
-            ((k.breaks[:-1] + k.breaks[1:]) / 2)[s > max(spans[0].max(), spans[1].max()) / 2]
-            for k, s in zip((net.u, net.v), spans, strict=True)
-        )
-        u_knots, v_knots = np.sort(np.r_[u_knots, halves_u]), np.sort(np.r_[v_knots, halves_v])
-        net = coarse.refined(u_knots, v_knots)
-        yield net, u_knots, v_knots
 
 
 def frozen_along(net: Net, curves: Sequence[Curve], region: Region, orders: Sequence[int]) -> Array:

@@ -14,7 +14,7 @@ import numpy as np
 
 from mracad.constraint.seam import Treatment
 from mracad.constraint.wishes import Wishes
-from mracad.edit.result import Edit, FaceOutcome, Reason
+from mracad.edit.result import Edit, FaceOutcome, Reason, spared
 from mracad.errors import EditError, UsageError
 from mracad.feature.character import at_scale, laid_on
 from mracad.feature.copies import Laid, laid
@@ -229,12 +229,10 @@ def _outcome(
     model: Model, face: Face, laid: Laid, scope: Scope, chosen: Collection[int], touched: Collection[int]
 ) -> FaceOutcome:
     """What became of a face; copies lie on those ``touched``."""
-    if face.surface is None:
-        return FaceOutcome(face.index, "analytic", Reason.ANALYTIC, face.kind)
-    if face.index in scope.held:
-        return FaceOutcome(face.index, "held", Reason.HELD)
-    if face.index not in chosen:
-        return FaceOutcome(face.index, "unselected", Reason.UNSELECTED)
+    outcome = spared(face, scope, chosen)
+    if outcome:
+        return outcome
+    assert face.surface is not None
     surface, offset = model.surfaces[face.surface], laid.offsets.get(face.surface)
     points = int(np.prod(surface.net.poles.shape[:2]))
     moved = 0.0 if offset is None else float(np.linalg.norm(offset.poles, axis=-1).max())

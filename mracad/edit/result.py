@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import Literal
@@ -9,7 +10,8 @@ from typing import Literal
 from mracad.constraint.seam import Treatment
 from mracad.feature.copies import Copy
 from mracad.inspect.roughness import Roughness
-from mracad.model import Displacement
+from mracad.model import Displacement, Face
+from mracad.select import Scope
 
 Status = Literal["edited", "unchanged", "left", "held", "unselected", "analytic"]
 """``edited``; ``unchanged``: nothing to do there; ``left``: something to do that cannot be done well;
@@ -94,3 +96,14 @@ class Edit:
     def faces(self, *status: Status) -> list[FaceOutcome]:
         """Outcomes with one of the given statuses."""
         return [outcome for outcome in self.outcomes if outcome.status in status]
+
+
+def spared(face: Face, scope: Scope, movable: Collection[int]) -> FaceOutcome | None:
+    """The outcome of a face that an edit must not touch; None for one that it may."""
+    if face.surface is None:
+        return FaceOutcome(face.index, "analytic", Reason.ANALYTIC, face.kind)
+    if face.index in scope.held:
+        return FaceOutcome(face.index, "held", Reason.HELD)
+    if face.index not in movable:
+        return FaceOutcome(face.index, "unselected", Reason.UNSELECTED)
+    return None

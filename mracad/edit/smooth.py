@@ -12,7 +12,7 @@ from mracad.edit.driver import STAYS, Moved, Result
 from mracad.edit.fair import Filter, faired
 from mracad.edit.level import Level
 from mracad.edit.pose import Tolerances
-from mracad.edit.result import Edit, FaceOutcome, Reason, Status
+from mracad.edit.result import Edit, FaceOutcome, Reason, Status, spared
 from mracad.edit.target import Wish
 from mracad.inspect.roughness import Worse
 from mracad.model import Face, Model
@@ -83,12 +83,10 @@ def tolerances(model: Model, options: Smooth) -> Tolerances:
 
 def _outcome(face: Face, result: Result, movable: Collection[int], scope: Scope, options: Smooth) -> FaceOutcome:
     """What became of one face."""
-    if face.surface is None:
-        return FaceOutcome(face.index, "analytic", Reason.ANALYTIC, face.kind)
-    if face.index in scope.held:
-        return FaceOutcome(face.index, "held", Reason.HELD)
-    if face.index not in movable:
-        return FaceOutcome(face.index, "unselected", Reason.UNSELECTED)
+    outcome = spared(face, scope, movable)
+    if outcome:
+        return outcome
+    assert face.surface is not None
     sheet, moved = result.sheets[face.surface], result.moved.get(face.surface)
     known = FaceOutcome(
         face.index,
