@@ -3,7 +3,8 @@
 An edit says what it wants of surfaces that seams join (a :class:`mracad.edit.target.Wish`); the solver finds what is
 nearest to it under the conditions of seams and rims; the judge says how much of that may be done.  A surface of which
 next to nothing may be done is left, and its neighbours are solved again without it: at first each surface by itself,
-then together with those that seams join to it.
+then together with those that seams join to it.  Where the first few go through by themselves, and then all of them
+together, the others need not be looked at alone.
 """
 
 from __future__ import annotations
@@ -33,6 +34,9 @@ LEAST = 0.25
 
 APART, STAYS = "its faces get fairer each by itself", "a face there stays"
 """Reasons for which a seam that could move does not."""
+
+FIRST = 2
+"""Surfaces of a group of which each goes through by itself, so that all are tried together before the others are."""
 
 CLOSER = 9
 """Points a span at which a result is looked at again."""
@@ -134,24 +138,23 @@ def drive(scene: Scene, wish: Wish, progress: Callable[[int, int], None] | None 
     """Do as much of a wish as the judge allows."""
     tell = progress or (lambda done, total: None)
     result: dict[int, Moved] = {}
-    for done, (i, sheet) in enumerate(scene.sheets.items()):
-        tell(done, 2 * len(scene.sheets))
-        result |= _attempt(scene, wish, {i: sheet}, scene.joints.among({i}))
-    rest = list(result)
-    moving = {i for i, moved in result.items() if moved.amount > 0}
-    exact = [seam for seam in scene.joints.exact if seam.a.surface == seam.b.surface and seam.a.surface in moving]
+    exact: list[Seam] = []
     loose: list[TrimmedSeam] = []
-    done = len(scene.sheets)
-    able = [i for i, moved in result.items() if moved.amount >= LEAST]
-    for group in groups(able, scene.joints.among(able)):
-        tell(done, 2 * len(scene.sheets))
-        done += len(group)
-        for part, joined in _together(scene, wish, group, result):
-            exact += [seam for seam in joined.exact if seam.a.surface != seam.b.surface]
-            loose += joined.loose
-            result |= part
-            rest = [i for i in rest if i not in part]
-    result |= {i: result[i].confirmed(scene.tolerances) for i in rest}
+    rest = set(scene.sheets)
+    for group in groups(scene.sheets, scene.joints):
+        tell(len(result), len(scene.sheets))
+        alone, tried = _alone(scene, wish, group)
+        result |= alone
+        able = [i for i in group if i not in alone or alone[i].amount >= LEAST]
+        for members in groups(able, scene.joints.among(able)):
+            for part, joined in _together(scene, wish, members, alone, tried):
+                exact += [seam for seam in joined.exact if seam.a.surface != seam.b.surface]
+                loose += joined.loose
+                result |= part
+                rest -= part.keys()
+    result = {i: result[i].confirmed(scene.tolerances) if i in rest else result[i] for i in scene.sheets}
+    moving = {i for i, moved in result.items() if moved.amount > 0}
+    exact += [seam for seam in scene.joints.exact if seam.a.surface == seam.b.surface and seam.a.surface in moving]
     closing = {edge: pair for edge, pair in scene.joints.closing.items() if pair[0].surface in moving}
     used = replace(scene.joints, exact=tuple(exact), loose=tuple(loose), closing=closing)
     return Result(result, replace(used, frozen={**scene.joints.frozen, **_dropped(scene.joints, used, result)}))
@@ -168,8 +171,42 @@ def _dropped(wanted: Joints, used: Joints, result: Mapping[int, Moved]) -> dict[
     return dropped
 
 
+def _alone(
+    scene: Scene, wish: Wish, group: Sequence[int]
+) -> tuple[dict[int, Moved], dict[tuple[int, ...], dict[int, Moved]]]:
+    """What becomes of surfaces that seams join, each by itself; of the first only, where together all go through."""
+    alone: dict[int, Moved] = {}
+    tried: dict[tuple[int, ...], dict[int, Moved]] = {}
+    for i in group:
+        if len(alone) == FIRST and _through(alone):
+            whole = tried[tuple(group)] = _attempt(scene, wish, group, scene.joints.among(group))
+            if _through(whole) and not _less(whole, alone):
+                break
+        alone |= _attempt(scene, wish, [i], scene.joints.among({i}))
+    return alone, tried
+
+
+def _through(moved: Mapping[int, Moved]) -> bool:
+    """Whether all that is wanted may be done to all surfaces."""
+    return all(each.amount > ENOUGH for each in moved.values())
+
+
+def _less(together: Mapping[int, Moved], alone: Mapping[int, Moved]) -> bool:
+    """Whether surfaces come less near to what is wanted than each by itself, of those of which that is known.
+
+    Shares are compared, for together something else may be wanted of them than of each.
+    """
+    every = next(iter(together.values()))
+    gain, wanted = (sum(getattr(alone[i], name) for i in together if i in alone) for name in ("gain", "wanted"))
+    return every.gain * wanted < gain * every.wanted
+
+
 def _together(
-    scene: Scene, wish: Wish, group: Sequence[int], alone: Mapping[int, Moved]
+    scene: Scene,
+    wish: Wish,
+    group: Sequence[int],
+    alone: Mapping[int, Moved],
+    tried: Mapping[tuple[int, ...], dict[int, Moved]],
 ) -> Iterable[tuple[dict[int, Moved], Joints]]:
     """What becomes of surfaces that seams join, in the parts in which they move together."""
     waiting = [(list(group), ROUNDS)]
@@ -178,14 +215,12 @@ def _together(
         joined = scene.joints.among(part)
         if len(part) < 2 or not rounds:
             continue
-        found = _attempt(scene, wish, {i: scene.sheets[i] for i in part}, joined)
+        found = tried.get(tuple(part)) or _attempt(scene, wish, part, joined)
         good = [i for i, moved in found.items() if moved.amount >= LEAST]
         if len(good) < len(part):
             waiting += [(each, rounds - 1) for each in groups(good, scene.joints.among(good))]
             continue
-        # shares, for together something else may be wanted of them than of each
-        gain, wanted = (sum(getattr(alone[i], name) for i in part) for name in ("gain", "wanted"))
-        if found[part[0]].gain * wanted < gain * found[part[0]].wanted:
+        if _less(found, alone):
             continue
         found = {i: moved.confirmed(scene.tolerances) for i, moved in found.items()}
         least = min(moved.amount for moved in found.values())
@@ -211,8 +246,9 @@ def groups(surfaces: Iterable[int], joined: Joints) -> list[list[int]]:
     return list(found.values())
 
 
-def _attempt(scene: Scene, wish: Wish, members: Mapping[int, Sheet], joined: Joints) -> dict[int, Moved]:
+def _attempt(scene: Scene, wish: Wish, surfaces: Iterable[int], joined: Joints) -> dict[int, Moved]:
     """The best that can be done to surfaces that move together; amounts may differ."""
+    members = {i: scene.sheets[i] for i in surfaces}
     trial = Trial(scene, members, joined)
     target = wish.target(trial.problem, members, joined)
     best, found = trial.nothing(), []

@@ -113,7 +113,7 @@ def faired(
     refine : bool
         Whether control points may be added beside rims.
     progress : callable, optional
-        Called with surfaces done and surfaces in all, each counted twice: by itself and together with others.
+        Called with surfaces done and surfaces in all.
     """
     every = sheets(model, movable, wish)
     width = max((each.wavelength for each in every.values()), default=1.0)

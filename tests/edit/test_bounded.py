@@ -47,6 +47,27 @@ def test_groups_are_solved_a_bounded_number_of_times(side, monkeypatch):
     assert len(edit.faces("edited")) == side * side and all(edge.how == "frozen" for edge in edit.edges)
 
 
+@pytest.mark.parametrize(("spans", "scale", "solved"), [(10, "30mm", [1, 1, 9]), (6, "60mm", [1, 1, 9, *[1] * 7])])
+def test_surfaces_that_go_through_together_are_not_all_tried_alone(spans, scale, solved, monkeypatch):
+    """What comes of them is what would have come of them; at 60 mm nothing does, and is not tried again."""
+    model, options, tried = panel(3, spans), Smooth(scale=scale), []
+    attempt = driver._attempt
+
+    def counted(scene, wish, members, joined):
+        tried.append(len(members))
+        return attempt(scene, wish, members, joined)
+
+    monkeypatch.setattr(driver, "_attempt", counted)
+    some = smooth(model, options)
+    assert tried == solved
+    monkeypatch.setattr(driver, "FIRST", 9)
+    every = smooth(model, options)
+    assert tried[len(solved) :] == [1] * 9 + [9]
+    assert len(some.displacement.offsets) == 9 and some.faces("edited") == every.faces("edited")
+    for index, offset in some.displacement.offsets.items():
+        assert np.array_equal(offset.poles, every.displacement.offsets[index].poles)
+
+
 class Stub:
     """An edit that says of every face that it may move that it did; the rounds are counted."""
 
