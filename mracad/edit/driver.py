@@ -42,7 +42,8 @@ CLOSER = 9
 """Points a span at which a result is looked at again."""
 
 BLENDS, PROMISE = 2, 1.05
-"""Most times that what is best for each of joined surfaces is put together, and by how much it has to come nearer."""
+"""Most times that what is best for each of joined surfaces is put together, and by how much that, or what is done to
+each by itself, has to come nearer."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -192,13 +193,13 @@ def _through(moved: Mapping[int, Moved]) -> bool:
 
 
 def _less(together: Mapping[int, Moved], alone: Mapping[int, Moved]) -> bool:
-    """Whether surfaces come less near to what is wanted than each by itself, of those of which that is known.
+    """Whether surfaces come clearly less near to what is wanted than each by itself, of those of which that is known.
 
     Shares are compared, for together something else may be wanted of them than of each.
     """
     every = next(iter(together.values()))
     gain, wanted = (sum(getattr(alone[i], name) for i in together if i in alone) for name in ("gain", "wanted"))
-    return every.gain * wanted < gain * every.wanted
+    return PROMISE * every.gain * wanted < gain * every.wanted
 
 
 def _together(

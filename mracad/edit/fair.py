@@ -59,17 +59,17 @@ class Filter:
 
     def target(self, problem: Problem, sheets: Mapping[int, Sheet], joined: Joints) -> Array:
         """What smoothing would do were no rim held, ``(points, 3)``."""
-        return problem.filtered(stiffness(self.scale), problem.seen, trended=True)
+        return problem.filtered(stiffness(self.scale), problem.seen)
 
     def ways(self, problem: Problem, target: Array, width: float) -> Iterable[Iterable[Array]]:
-        """Noisy rims are met by projection, or in a band a wavelength wide; clean ones are held as one filters."""
+        """What is held meets the target, ever more smoothly; is held as one filters; or fades it a wavelength wide."""
         if not problem.rimmed:
             yield [target]
             return
-        fade, stiff = problem.fading(width), stiffness(self.scale)
-        yield problem.nearest(target), problem.nearest(fade * target), problem.filtered(stiff, trended=True)
-        yield problem.filtered(stiff), problem.nearest(fade * problem.filtered(stiff, problem.seen))
-        yield [problem.nearest(fade * calm(problem, target, width) * target)]
+        smooth, faded = stiffness(width / 2), problem.fading(width) * target
+        yield [problem.nearest(target, stiff) for stiff in (0.0, stiffness(width / 4), smooth)]
+        yield problem.filtered(stiffness(self.scale)), problem.nearest(faded, smooth), problem.nearest(faded)
+        yield [problem.nearest(calm(problem, target, width) * faded)]
 
 
 def calm(problem: Problem, target: Array, width: float) -> Array:

@@ -17,7 +17,7 @@ from mracad.seam.conditions import rows as seam_rows
 from mracad.seam.contact import Rows
 from mracad.seam.contact import rows as contact_rows
 from mracad.seam.energy import forms
-from mracad.seam.interface import Joints, away, contact, mended_ends, rims
+from mracad.seam.interface import Joints, away, contact, mended_ends, rims, twists
 from mracad.seam.metric import seen
 from mracad.seam.solve import Problem, Space
 from mracad.seam.space import refined
@@ -29,6 +29,10 @@ GROWTH = Growth(0.005, 0.005, 0.005, 0.02, 30.0)
 
 TIGHT = 0.3
 """Share of what a contact may lack at which its conditions aim."""
+
+EASY = 30.0
+"""How much more contacts between surfaces may lack in what an edit wants: splines of unrelated knots that had to agree
+closely along a curve could hardly follow what is wanted beside it."""
 
 
 @dataclass(frozen=True)
@@ -134,6 +138,7 @@ def pose(
         points = seen(net, form)
         held, more = rims(scene.model, net, sheet.all_faces, movable, joined)
         held &= ~mended_ends(scene.model, net, i, sheet.all_faces, movable, joined, width / 2)
+        held |= twists(held)
         contacts += more
         far = away(scene.model, net, sheet.faces, joined.moving)
         spaces[i] = Space(net, form, points & ~held, points, sheet.trend.over(net.u, net.v).poles, far)
@@ -152,8 +157,9 @@ def pose(
     weight = (detail / TIGHT) ** 2 * width
     shut = np.where(mends[:, None], opened, 0.0) if joined.mended else opened
     soft, pull = (weight * found.form(limits), -weight * found.pull(shut, limits)) if contacts else (None, None)
+    between = weight * found.form(np.where(pairs, EASY * limits, np.inf)) if pairs.any() else None
     trimmed = mends & np.array([not each.since for each in contacts], bool)[found.owner]
-    problem = Problem(spaces, rows, np.where(goal[:, None], -(rows @ f), 0.0), soft, pull)
+    problem = Problem(spaces, rows, np.where(goal[:, None], -(rows @ f), 0.0), soft, pull, between)
     return Pose(problem, found, [each.surfaces for each in contacts], opened, limits, trimmed)
 
 

@@ -161,6 +161,18 @@ def rims(
     return held, contacts
 
 
+def twists(held: Array) -> Array:
+    """Control points on which the twist depends where two held sides of a surface meet, both ``(nu, nv)``.
+
+    All else of the curvature there is that of the sides; what is smoothest between two rough sides twists there.
+    """
+    found = np.zeros_like(held)
+    for u, v in ((1, 1), (1, -1), (-1, 1), (-1, -1)):
+        corner = held[::u, ::v]
+        found[::u, ::v][1:2, 1:2] |= corner[:1, :1] & corner[:1, 1:2] & corner[1:2, :1]
+    return found
+
+
 def mended_ends(
     model: Model, net: Net, surface: int, faces: Sequence[Face], movable: Collection[int], joined: Joints, within: float
 ) -> Array:

@@ -123,6 +123,8 @@ class Problem:
         Cᵀ W C.
     pull : ndarray (points, 3), optional
         Cᵀ W c, where contacts are to be mended.
+    between : scipy.sparse matrix (points, points), optional
+        That part of ``soft`` which joins the surfaces to each other, where the rest holds them.
     """
 
     def __init__(
@@ -132,10 +134,11 @@ class Problem:
         goal: Array | None = None,
         soft: Any = None,
         pull: Array | None = None,
+        between: Any = None,
     ) -> None:
         from scipy.sparse import csr_array
 
-        self.spaces, self.soft = spaces, soft
+        self.spaces, self.soft, self.between = spaces, soft, between
         self.rows = csr_array((0, sum(s.free.size for s in spaces.values()))) if rows is None else rows
         self.goal = goal if goal is not None and goal.any() else None
         self.pull = pull if pull is not None and pull.any() else None
@@ -148,33 +151,30 @@ class Problem:
         f = np.concatenate([space.net.poles.reshape(-1, 3) for space in spaces.values()])
         self.f = f - f[self.seen].mean(axis=0)
         self._solvers: dict[tuple[float, bytes, bool], Constrained | Divided] = {}
-        self.above = np.concatenate(
-            [(s.net.poles - (0.0 if s.trend is None else s.trend)).reshape(-1, 3) for s in spaces.values()]
-        )
+        trends = (np.zeros_like(s.net.poles) if s.trend is None else s.trend for s in spaces.values())
+        above = f - np.concatenate([each.reshape(-1, 3) for each in trends])
+        self.above = above - above[self.seen].mean(axis=0)
 
-    def filtered(self, stiffness: float, free: Array | None = None, trended: bool = False) -> Array:
-        """δ of the filter of gain 1 / (1 + x²).
+    def filtered(self, stiffness: float, free: Array | None = None) -> Array:
+        """δ of the filter of gain 1 / (1 + x²), which takes nothing of the bending of trends.
 
         Parameters
         ----------
         stiffness : float
             a = ℓ⁴, mm⁴.
         free : ndarray of bool (points,), optional
-            Control points that may move, instead of those of the spaces; contacts then hold nothing.
-        trended : bool
-            Whether the trends of the spaces are shape, whose bending is not taken away.
+            Control points that may move, instead of those of the spaces; contacts then only join the surfaces.
 
         Returns
         -------
         ndarray (points, 3)
         """
         solve = self._solver(stiffness, self.free if free is None else free)
-        base = self.above if trended else self.f
-        mended = np.zeros_like(base)
+        mended = np.zeros_like(self.above)
         pull = self.pull if free is None else None
         if self.goal is not None or pull is not None:
             mended = solve(mended if pull is None else pull, goal=self.goal)
-        first = solve(-stiffness * (self.bending @ (base + mended)), exactly=False)
+        first = solve(-stiffness * (self.bending @ (self.above + mended)), exactly=False)
         delta = _chebyshev(lambda x: solve(self.mass @ x, exactly=False), first)
         return mended + solve.settled(delta)
 
@@ -204,12 +204,12 @@ class Problem:
 
     def _solver(self, stiffness: float, free: Array) -> Constrained | Divided:
         """The solver of the form M + stiffness · K and the contacts."""
-        soft = self.soft is not None and free is self.free
-        key = stiffness, free.tobytes(), soft
+        held = free is self.free
+        key = stiffness, free.tobytes(), held
         if key not in self._solvers:
             while self._solvers and (len(self._solvers) + 1) * len(free) > KEPT:
                 del self._solvers[next(iter(self._solvers))]
-            self._solvers[key] = self._factored(stiffness, free, self.soft if soft else None)
+            self._solvers[key] = self._factored(stiffness, free, self.soft if held else self.between)
         return self._solvers[key]
 
     def _factored(self, stiffness: float, free: Array, soft: Any) -> Constrained | Divided:

@@ -11,7 +11,7 @@ from mracad.constraint.wishes import Wishes
 from mracad.inspect.cells import quadrature
 from mracad.model import Edge, Face, Model, Side, Surface, Trim
 from mracad.occ.view import view
-from mracad.seam.interface import Joints, away, contact, end, joints, rims
+from mracad.seam.interface import Joints, away, contact, end, joints, rims, twists
 from mracad.seam.metric import planar, smoothed
 from mracad.seam.space import MOST_POINTS, refined
 from mracad.wavelet.ladder import arc_lengths
@@ -40,6 +40,15 @@ def test_a_natural_rim_holds_its_row():
     assert not contacts and np.array_equal(held, border)
     held, _ = held_by(sheet(net), net, moving={0})
     assert not held[1:-1, 0].any() and held[[0, -1]].all() and held[:, -1].all()
+
+
+def test_twists_are_kept_where_two_held_sides_meet():
+    net = plane(6)
+    for moving, corners in ((), 4), ({0}, 2), ({0, 1}, 1), ({0, 2}, 0):
+        held, _ = held_by(sheet(net), net, moving)
+        found = twists(held)
+        assert found.sum() == corners and not (found & held).any()
+        assert not found.any() or found[np.ix_([1, -2], [1, -2])].sum() == corners
 
 
 def beside(angle, curvature=0.0):
