@@ -165,7 +165,9 @@ def rows(
             mended.append(np.full(len(share), (seam.joint.close, seam.joint.fit, False)[order]))
             count += len(share)
     row, column, value = (np.concatenate(part) for part in zip(*entries, strict=True))
-    return csr_array((value, (row, column)), shape=(count, total)), np.concatenate(mended)
+    found = csr_array((value, (row, column)), shape=(count, total))
+    found.eliminate_zeros()
+    return found, np.concatenate(mended)
 
 
 def _terms(joint: Joint, order: int, share: Array, sides: Sequence[Any]) -> tuple[Array, Array]:
