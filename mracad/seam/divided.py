@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -31,6 +32,26 @@ PENALTY = 1e7
 
 
 @dataclass(frozen=True, eq=False)
+class _Strip:
+    """One strip.
+
+    Attributes
+    ----------
+    points : ndarray (q,) of int
+    outside : csr_array (q, all points)
+        What the form and the penalties of conditions make of them outside of it.
+    rows : csr_array (q, conditions)
+        The conditions on them.
+    factor : Definite
+    """
+
+    points: Array
+    outside: Any
+    rows: Any
+    factor: Definite
+
+
+@dataclass(frozen=True, eq=False)
 class _Colour:
     """Strips that have nothing in common.
 
@@ -38,9 +59,9 @@ class _Colour:
     ----------
     points : ndarray (q,) of int
         One strip after another, in the points about strips.
-    outside : csr_array (q, points about strips)
+    outside : csc_array (points about strips, q)
         What the form and the penalties of conditions make of them outside of their strips.
-    rows : csr_array (conditions, q)
+    rows : csc_array (conditions, q)
     ends : ndarray of int
         Where strips begin.
     factors : list of Definite
@@ -52,6 +73,21 @@ class _Colour:
     rows: Any
     ends: Array
     factors: Sequence[Definite]
+
+    @classmethod
+    def of(cls, strips: Sequence[_Strip], place: Array, about: int) -> _Colour:
+        """Put together what has nothing in common; ``place`` are the numbers of points about strips."""
+        from scipy.sparse import csr_array, vstack
+
+        outside = vstack([strip.outside for strip in strips], format="csr")
+        outside = csr_array((outside.data, place[outside.indices], outside.indptr), shape=(outside.shape[0], about))
+        return cls(
+            place[np.concatenate([strip.points for strip in strips])],
+            outside.T,
+            vstack([strip.rows for strip in strips], format="csr").T,
+            np.cumsum([0, *(len(strip.points) for strip in strips)]),
+            [strip.factor for strip in strips],
+        )
 
     def __call__(self, right: Array) -> Array:
         """The displacements of a right-hand side, both ``(q, k)``."""
@@ -90,7 +126,7 @@ class Divided:
         joined: dict[tuple[int, int], Array],
         strips: Sequence[Array],
     ) -> None:
-        from scipy.sparse import csr_array, diags_array
+        from scipy.sparse import csr_array, diags_array, vstack
 
         self.size = len(free)
         diagonal = diagonal if soft is None else diagonal + soft.diagonal()
@@ -105,8 +141,10 @@ class Divided:
         for marked, sets in ((tied, joined.values()), (near, strips)):
             for points in sets:
                 marked[points] = True
-        self.tied, near_by = np.flatnonzero(tied), []
+        apart = None if soft is None else diags_array(self.scale) @ _apart(soft, layout) @ diags_array(self.scale)
         self.insides: list[tuple[Array, Definite]] = []
+        self.tied = np.flatnonzero(tied)
+        tied_form, making = [], _Strips(strips, layout, self.rows, self.tied)
         for form, begin, end in zip(forms, layout.ends[:-1], layout.ends[1:], strict=True):
             own = slice(begin, end)
             scale = self.scale[own]
@@ -114,46 +152,21 @@ class Divided:
             row = np.repeat(np.arange(end - begin), np.diff(form.indptr))
             data = form.data * scale[row] * scale[form.indices] + LEAST * (row == form.indices)
             form = csr_array((data, form.indices, form.indptr), shape=form.shape)
-            inside = np.flatnonzero(free[own] & ~tied[own])
+            inside, bound, other = (
+                np.flatnonzero(each) for each in (free[own] & ~tied[own], tied[own], near[own] & ~tied[own])
+            )
             self.insides.append((begin + inside, Definite(_part(form, inside))))
-            near_by.append(_widened(form[np.flatnonzero(near[own])], own, self.size))
-        apart = None if soft is None else diags_array(self.scale) @ _apart(soft, layout) @ diags_array(self.scale)
-        self._divide(np.flatnonzero(near), near_by, apart, strips)
-
-    def _divide(self, near: Array, parts: list[Any], apart: Any, strips: Sequence[Array]) -> None:
-        """Factors of strips, of the rows of the form in them."""
-        from scipy.sparse import csr_array, vstack
-
-        form = vstack(parts, format="csr")
-        parts.clear()
-        if apart is not None:
-            form = (form + apart.tocsr()[near]).tocsr()
-        reached = np.zeros(self.size, bool)
-        reached[form.indices] = True
-        self.about = np.flatnonzero(reached)
-        place, row = np.empty(self.size, np.int32), np.empty(self.size, int)
-        place[self.about], row[near] = np.arange(len(self.about)), np.arange(len(near))
+            firm = _widened(form[bound], own, self.size)
+            tied_form.append(firm if apart is None else (firm + apart[begin + bound]).tocsr())
+            making.add(begin + other, _widened(form[other], own, self.size), begin + bound, tied_form[-1])
+        self.about, self.colours = making.done()
+        del making
+        self.tied_form = vstack(tied_form, format="csr")
+        place = np.empty(self.size, int)
+        place[self.about] = np.arange(len(self.about))
         self.at = place[self.tied]
         self.inner = np.flatnonzero(~np.isin(self.about, self.tied))
-        self.tied_form = form[row[self.tied]]
-        form = csr_array((form.data, place[form.indices], form.indptr), shape=(len(near), len(self.about)))
-        columns = self.rows.tocsc()
-        self.conditions = columns[:, self.about].tocsr()
-        conditions = [np.unique(columns[:, points].indices) for points in strips]
-        self.colours = []
-        for members in coloured(strips, conditions, self.size):
-            points = np.concatenate([strips[i] for i in members])
-            own = columns[:, points].tocsr()
-            part = (form[row[points]] + PENALTY * (own.T @ self.conditions)).tocsr()
-            ends = np.cumsum([0, *(len(strips[i]) for i in members)])
-            factors = [
-                Definite(_part(part[begin:end], place[strips[i]], slice(None)))
-                for i, begin, end in zip(members, ends[:-1], ends[1:], strict=True)
-            ]
-            strip = np.full(len(self.about), -1, np.int32)
-            strip[place[points]] = whose = np.repeat(np.arange(len(members), dtype=np.int32), np.diff(ends))
-            outside = _taken(part, strip[part.indices] != np.repeat(whose, np.diff(part.indptr)))
-            self.colours.append(_Colour(place[points], outside, own, ends, factors))
+        self.conditions = self.rows.tocsc()[:, self.about].tocsr()
 
     def __call__(
         self, right: Array, start: Array | None = None, goal: Array | None = None, exactly: bool = True
@@ -164,13 +177,14 @@ class Divided:
             owed += goal[self.there] / self.length[:, None]
         if start is not None:
             owed -= self.rows @ self._scaled(start)
-        found = np.zeros_like(b)
-        if owed.any():
-            found = self._met(owed, 0.0, b)
-        found += self._within(b)
+        begun = self._met(owed, 0.0, b) if owed.any() else None
+        found = self._within(b)
+        if begun is not None:
+            found += begun
         if exactly and len(owed):
             found += self._met(owed - self.rows @ found, float(np.abs(found).max(initial=0.0)))
-        return self.scale[:, None] * found
+        found *= self.scale[:, None]
+        return found
 
     def settled(self, x: Array) -> Array:
         """What is near to x, ``(n, k)``, with L x = 0."""
@@ -183,22 +197,22 @@ class Divided:
         return x / np.where(self.scale > 0, self.scale, np.inf)[:, None]
 
     def _within(self, right: Array) -> Array:
-        """The minimum under L x = 0, but for what one pass leaves of it."""
-        found = self._inside(right)
-        left = np.zeros((len(self.about), right.shape[1]))
-        left[self.at] = right[self.tied] - self.tied_form @ found
+        """The minimum under L x = 0, but for what one pass leaves of it, in the place of its right-hand side."""
+        found, left = right, np.zeros((len(self.about), right.shape[1]))
+        left[self.at] = found[self.tied]
+        found[self.tied] = 0.0
+        self._inside(found)
+        left[self.at] -= self.tied_form @ found
         first = np.linalg.norm(left)
         for sweep in range(SWEEPS):
-            step = np.zeros_like(left)
             for colour in self.colours[:: 1 - 2 * (sweep % 2)]:
                 moved = colour(left[colour.points])
                 left[colour.points] = 0.0
-                left -= colour.outside.T @ moved
-                step[colour.points] += moved
-            found[self.about] += step
+                left -= colour.outside @ moved
+                found[self.about[colour.points]] += moved
             rest = np.zeros_like(found)
             rest[self.about[self.inner]] = left[self.inner]
-            rest = self._inside(rest)
+            self._inside(rest)
             found += rest
             left[self.inner] = 0.0
             left[self.at] -= self.tied_form @ rest
@@ -206,12 +220,10 @@ class Divided:
                 break
         return found
 
-    def _inside(self, right: Array) -> Array:
-        """The minimum over the points that nothing joins."""
-        found = np.zeros_like(right)
+    def _inside(self, x: Array) -> None:
+        """Put the minimum over the points that nothing joins in the place of its right-hand side."""
         for points, factor in self.insides:
-            found[points] = factor(right[points])
-        return found
+            x[points] = factor(x[points])
 
     def _met(self, owed: Array, size: float, right: Array | None = None) -> Array:
         """What meets conditions beside a displacement of a size; what the form makes of it is taken from ``right``."""
@@ -225,29 +237,96 @@ class Divided:
                 found[self.about[colour.points]] += moved
                 if right is not None:
                     right[self.about[colour.points]] -= pull
-                    right[self.about] -= colour.outside.T @ moved - PENALTY * (self.conditions.T @ met)
+                    right[self.about] -= colour.outside @ moved - PENALTY * (self.conditions.T @ met)
             if np.abs(owed).max(initial=0.0) <= MET * max(size, np.abs(found).max(initial=0.0)):
                 break
         return found
 
 
-def _part(form: Any, columns: Array, rows: Array | slice | None = None) -> Any:
-    """Some rows and columns of a matrix, the same by default."""
-    from scipy.sparse import csr_array
+class _Strips:
+    """The making of strips, as soon as the rows of the form for all of their points are known: these take most room.
 
-    form = form[columns if rows is None else rows]
+    Parameters
+    ----------
+    strips : sequence of ndarray of int
+    layout : Layout
+    rows : scipy.sparse.csr_array (conditions, points)
+    tied : ndarray of int
+        The points that they join.
+    """
+
+    def __init__(self, strips: Sequence[Array], layout: Layout, rows: Any, tied: Array) -> None:
+        self.strips, self.owner, self.tied, self.pull = strips, layout.owner, tied, rows.T.tocsr()
+        self.rows = rows.tocsc()[:, tied].tocsr()
+        surfaces = [np.unique(self.owner[points]) for points in strips]
+        self.last = np.array([each[-1] for each in surfaces], int)
+        self.needed = np.full(len(layout.reach), -1)
+        for last, each in zip(self.last, surfaces, strict=True):
+            self.needed[each] = np.maximum(self.needed[each], last)
+        self.forms: dict[int, Any] = {}
+        self.row, self.place = np.zeros(len(self.owner), np.int32), np.full(len(self.owner), -1, np.int32)
+        self.reached = np.zeros(len(self.owner), bool)
+        self.made: dict[int, _Strip] = {}
+
+    def add(self, points: Array, form: Any, tied: Array, tied_form: Any) -> None:
+        """Take the form of the points of the next surface that strips take, those tied by joints apart."""
+        from scipy.sparse import csr_array, vstack
+
+        surface = len(self.forms)
+        penalty = PENALTY * (self.pull[tied] @ self.rows)
+        penalty.sort_indices()
+        penalty = csr_array((penalty.data, self.tied[penalty.indices], penalty.indptr), shape=tied_form.shape)
+        self.forms[surface] = vstack([form, tied_form + penalty], format="csr")
+        self.reached[self.forms[surface].indices] = True
+        self.row[np.concatenate([points, tied])] = np.arange(len(points) + len(tied))
+        for i in np.flatnonzero(self.last == surface).tolist():
+            self.made[i] = self._strip(self.strips[i])
+        for i in np.flatnonzero(self.needed[: surface + 1] == surface).tolist():
+            self.forms[i] = None
+
+    def _strip(self, points: Array) -> _Strip:
+        from scipy.sparse import vstack
+
+        owner = self.owner[points]
+        order = np.argsort(owner, kind="stable")
+        ends = np.searchsorted(owner[order], np.arange(owner.max() + 2))
+        every = [
+            self.forms[i][self.row[points[order[begin:end]]]]
+            for i, (begin, end) in enumerate(pairwise(ends))
+            if end > begin
+        ]
+        form = vstack(every, format="csr")[np.argsort(order)]
+        self.place[points] = np.arange(len(points))
+        column = self.place[form.indices]
+        self.place[points] = -1
+        own = _taken(form, column >= 0, column, len(points))
+        return _Strip(points, _taken(form, column < 0), self.pull[points], Definite(own))
+
+    def done(self) -> tuple[Array, list[_Colour]]:
+        """The points about strips, and strips by colour."""
+        about = np.flatnonzero(self.reached)
+        self.place[about] = np.arange(len(about))
+        conditions = [np.unique(self.made[i].rows.indices) for i in range(len(self.strips))]
+        colours = coloured(self.strips, conditions, len(self.owner))
+        return about, [_Colour.of([self.made.pop(i) for i in those], self.place, len(about)) for those in colours]
+
+
+def _part(form: Any, points: Array) -> Any:
+    """Some rows and the same columns of a matrix."""
+    form = form[points]
     place = np.full(form.shape[1], -1, np.int32)
-    place[columns] = np.arange(len(columns))
-    form = csr_array((form.data, place[form.indices], form.indptr), shape=(form.shape[0], len(columns)))
-    return _taken(form, form.indices >= 0)
+    place[points] = np.arange(len(points))
+    column = place[form.indices]
+    return _taken(form, column >= 0, column, len(points))
 
 
-def _taken(form: Any, which: Array) -> Any:
-    """Some of the entries of a matrix."""
+def _taken(form: Any, which: Array, columns: Array | None = None, width: int | None = None) -> Any:
+    """Some of the entries of a matrix, in other columns where that is said."""
     from scipy.sparse import csr_array
 
     ends = np.append(0, np.cumsum(which))[form.indptr].astype(np.int32)
-    return csr_array((form.data[which], form.indices[which], ends), shape=form.shape)
+    columns = form.indices if columns is None else columns
+    return csr_array((form.data[which], columns[which], ends), shape=(form.shape[0], width or form.shape[1]))
 
 
 def _widened(form: Any, own: slice, size: int) -> Any:

@@ -94,8 +94,11 @@ class Blocks:
         self.parts = parts
 
     def __matmul__(self, x: Array) -> Array:
-        ends = np.cumsum([part.shape[0] for part in self.parts])
-        return np.concatenate([part @ own for part, own in zip(self.parts, np.split(x, ends[:-1]), strict=True)])
+        found, end = np.empty_like(x), 0
+        for part in self.parts:
+            begin, end = end, end + part.shape[0]
+            found[begin:end] = part @ x[begin:end]
+        return found
 
     def diagonal(self) -> Array:
         """Its diagonal."""
@@ -170,13 +173,12 @@ class Problem:
         ndarray (points, 3)
         """
         solve = self._solver(stiffness, self.free if free is None else free)
-        mended = np.zeros_like(self.above)
+        mended: Array | float = 0.0
         pull = self.pull if free is None else None
         if self.goal is not None or pull is not None:
-            mended = solve(mended if pull is None else pull, goal=self.goal)
+            mended = solve(np.zeros_like(self.above) if pull is None else pull, goal=self.goal)
         first = solve(-stiffness * (self.bending @ (self.above + mended)), exactly=False)
-        delta = _chebyshev(lambda x: solve(self.mass @ x, exactly=False), first)
-        return mended + solve.settled(delta)
+        return mended + solve.settled(_chebyshev(lambda x: solve(self.mass @ x, exactly=False), first))
 
     def faired(self, stiffness: float) -> Array:
         """δ of the filter of gain 1 / (1 + x), ``(points, 3)``; stiffness in mm⁴."""
@@ -274,6 +276,12 @@ def _sum(forms: Forms, stiffness: float) -> Any:
 def _chebyshev(power: Callable[[Array], Array], first: Array) -> Array:
     """p(C) first, by Clenshaw's recursion; ``power`` applies C."""
     last, before = _EXPANSION[TERMS] * first, np.zeros_like(first)
-    for k in range(TERMS - 1, 0, -1):
-        last, before = _EXPANSION[k] * first + 2 * (2 * power(last) - last) - before, last
-    return _EXPANSION[0] * first + (2 * power(last) - last) - before
+    for k in range(TERMS - 1, -1, -1):
+        now = power(last)
+        now *= 2
+        now -= last
+        now *= 2 if k else 1
+        now += _EXPANSION[k] * first
+        now -= before
+        last, before = now, last
+    return last

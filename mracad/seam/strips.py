@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -50,7 +51,10 @@ def joints(layout: Layout, rows: Any, soft: Any, free: Array) -> dict[tuple[int,
         points.append(both.row[apart])
     pair, point = np.concatenate(pairs), np.concatenate(points)
     pair, point = pair[free[point]], point[free[point]]
-    return {divmod(int(key), len(layout.reach)): np.unique(point[pair == key]) for key in np.unique(pair)}
+    order = np.argsort(pair, kind="stable")
+    keys, first = np.unique(pair[order], return_index=True)
+    each = np.split(point[order], first[1:])
+    return {divmod(key, len(layout.reach)): np.unique(own) for key, own in zip(keys.tolist(), each, strict=False)}
 
 
 def strips(layout: Layout, joined: dict[tuple[int, int], Array], free: Array) -> list[Array]:
@@ -61,19 +65,26 @@ def strips(layout: Layout, joined: dict[tuple[int, int], Array], free: Array) ->
     for a, b in joined:
         beside.setdefault(a, {a}).add(b)
         beside.setdefault(b, {b}).add(a)
+    boxes = [_box(layout.places[begin:end]) for begin, end in pairwise(layout.ends.tolist())]
     found = []
     for (a, b), points in joined.items():
-        near = []
+        near, (low, high) = [], _box(layout.places[points])
         for surface in sorted(beside[a] | beside[b]):
             own = slice(layout.ends[surface], layout.ends[surface + 1])
             reach, places = layout.reach[surface], layout.places[own]
-            low, high = (each(layout.places[points], axis=0) for each in (np.min, np.max))
+            if (boxes[surface][0] > high + reach).any() or (boxes[surface][1] < low - reach).any():
+                continue
             close = np.flatnonzero(free[own] & ((places >= low - reach) & (places <= high + reach)).all(axis=1))
             near.append((own.start + close, np.full(len(close), reach)))
         point, reach = (np.concatenate(each) for each in zip(*near, strict=True))
         away = cKDTree(layout.places[points]).query(layout.places[point])[0]
         found.append(_along(layout.places, point[away <= reach]))
     return found
+
+
+def _box(places: Array) -> tuple[Array, Array]:
+    """The least and the largest coordinates of points."""
+    return places.min(axis=0), places.max(axis=0)
 
 
 def _along(places: Array, points: Array) -> Array:
