@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import math
 import time
 from collections import Counter
 from collections.abc import Callable, Collection, Mapping, Sequence
@@ -16,6 +17,7 @@ from mracad.audit.continuity import SeamMeasure, key, remeasured, seams
 from mracad.audit.deviation import Deviation, deviations
 from mracad.audit.mended import unmended
 from mracad.edit.result import Edit, Reason
+from mracad.edit.tolerances import Tolerances, tolerances
 from mracad.errors import EditError
 from mracad.judge import Judged, Original
 from mracad.model import Model
@@ -25,9 +27,6 @@ if TYPE_CHECKING:
     from mracad.occ.check import Validity
     from mracad.occ.document import Document
     from mracad.recipe import Step
-
-WIDER, STEEPER = 1e-5, 0.01
-"""No seam may gape by so much more (mm), and no smooth one turn by so much more (degrees), after an edit."""
 
 ROUNDS = 8
 """How often an edit is done again, each time without the faces that came out worse; then all are left that seams join
@@ -178,7 +177,8 @@ def run(
         valid_after = valid_before
         offsets = result.displacement.offsets
         after = remeasured(result.displacement.applied(model), before, offsets) if offsets else before
-        torn = {i for i in _torn(before, after, result, options.keep) if model.faces[i].surface is not None}
+        found = _torn(model, before, after, result, tolerances(model, options), options.keep)
+        torn = {i for i in found if model.faces[i].surface is not None}
         torn -= left.faces.keys()
         if torn:
             left.leave(torn, "its seams would not hold", before, result)
@@ -291,22 +291,22 @@ def _refuse_if_asked(model: Model, result: Edit, named: Collection[int]) -> None
         raise EditError(f"{model.name}: {names}: {left[0].words}", "leave out what cannot be done, or all of --faces")
 
 
-def _torn(before: list[SeamMeasure], after: list[SeamMeasure], edit: Edit, keep: str) -> set[int]:
+def _torn(
+    model: Model, before: list[SeamMeasure], after: list[SeamMeasure], edit: Edit, allowed: Tolerances, keep: str
+) -> set[int]:
     """Faces of seams that an edit would open, or that were smooth and would not be; against its own intent.
 
     Where only the position is to be kept a kink is no harm.
     """
     intent = {treatment.edge: treatment.how for treatment in edit.edges}
-    return {
-        face
-        for old, new in zip(before, after, strict=True)
-        if intent.get(old.edge) != "mended"
-        and (
-            (new.gap > old.gap + WIDER and intent.get(old.edge) != "to tolerance")
-            or (keep != "g0" and old.smooth and new.angle > old.angle + STEEPER)
-        )
-        for face in old.faces
-    }
+    steeper, torn = math.degrees(allowed.angle), set()
+    for old, new in zip(before, after, strict=True):
+        how = intent.get(old.edge)
+        wider = allowed.gap if how == "to tolerance" else allowed.wider(model.edges[old.edge], old.gap)
+        bent = keep != "g0" and old.smooth and new.angle > old.angle + steeper
+        if how != "mended" and (new.gap > old.gap + wider or bent):
+            torn |= set(old.faces)
+    return torn
 
 
 def _named(result: Edit, spoiled: Mapping[int, str]) -> Edit:

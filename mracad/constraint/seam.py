@@ -11,7 +11,7 @@ from mracad.constraint.border import SHARES, Border, border, jets, opened
 from mracad.constraint.coincide import apart, coinciding, length, reach, touching
 from mracad.constraint.frozen import CONTINUITY, ISO
 from mracad.constraint.joint import Joint, joint_of
-from mracad.constraint.sides import between, views
+from mracad.constraint.sides import across, between, views
 from mracad.constraint.wishes import Wishes
 from mracad.model import Edge, Model, Side
 
@@ -79,6 +79,30 @@ class Treatment:
     reason: str = ""
 
 
+@dataclass(frozen=True)
+class Meeting:
+    """How two faces meet at an edge.
+
+    Attributes
+    ----------
+    order : {0, 1, 2}
+        Derivatives that it keeps with what lies beyond it.
+    gap : float
+        Largest distance between them, mm.
+    faces : tuple of int
+    """
+
+    order: int
+    gap: float
+    faces: tuple[int, ...]
+
+    def with_(self, other: Meeting | None) -> Meeting:
+        """The same with what is known of it from elsewhere."""
+        if other is None:
+            return self
+        return Meeting(max(self.order, other.order), max(self.gap, other.gap), self.faces)
+
+
 @dataclass(frozen=True, eq=False)
 class Seams:
     """What is known of the edges of the faces that an edit may move.
@@ -93,15 +117,20 @@ class Seams:
         Every other edge, and why it does not move.
     twins : dict of int to int
         Free edges that coincide with another one, as a whole.
-    orders : dict of int to int
-        Derivatives that edges keep with what lies beyond them, if it stays.
+    meetings : dict of int to Meeting
+        Edges at which two faces meet.
     """
 
     found: list[Seam] = field(default_factory=list)
     closing: dict[int, tuple[Border, Border]] = field(default_factory=dict)
     frozen: dict[int, str] = field(default_factory=dict)
     twins: dict[int, int] = field(default_factory=dict)
-    orders: dict[int, int] = field(default_factory=dict)
+    meetings: dict[int, Meeting] = field(default_factory=dict)
+
+    @property
+    def orders(self) -> dict[int, int]:
+        """Derivatives that edges keep with what lies beyond them, if it stays."""
+        return {edge: each.order for edge, each in self.meetings.items()}
 
 
 def seams(model: Model, movable: Collection[int], wishes: Wishes) -> Seams:
@@ -117,7 +146,7 @@ def seams(model: Model, movable: Collection[int], wishes: Wishes) -> Seams:
     own = [edge for edge in model.edges if any(side.face in movable for side in edge.sides)]
     sewn = [(edge, edge.sides) for edge in own if len(edge.sides) == 2 and not edge.degenerate and len(edge.points)]
     unsewn = [(edge, (one, two)) for edge, one, two in coinciding(model) if one.face in movable or two.face in movable]
-    result = Seams(orders=_orders(model, wishes, [*sewn, *unsewn]))
+    result = Seams(meetings=_meetings(model, wishes, [*sewn, *unsewn]))
     for edge in own:
         _sort(result, edge, _still(edge, wishes) or _seam(result, model, movable, wishes, (edge, edge), edge.sides))
     for edge, sides in unsewn:
@@ -128,13 +157,15 @@ def seams(model: Model, movable: Collection[int], wishes: Wishes) -> Seams:
     return result
 
 
-def _orders(model: Model, wishes: Wishes, found: Sequence[tuple[Edge, Sequence[Side]]]) -> dict[int, int]:
-    """Derivatives that edges keep, from how their two faces meet there."""
+def _meetings(model: Model, wishes: Wishes, found: Sequence[tuple[Edge, Sequence[Side]]]) -> dict[int, Meeting]:
+    """How two faces meet at edges."""
     looks = views(model, [(edge, side) for edge, sides in found for side in sides])
-    result: dict[int, int] = {}
-    for (edge, _), a, b in zip(found, looks[::2], looks[1::2], strict=True):
+    result: dict[int, Meeting] = {}
+    for (edge, sides), a, b in zip(found, looks[::2], looks[1::2], strict=True):
         order = wishes.order(between(a[:, 3:6], b[:, 3:6]), a[:, 6], b[:, 6])
-        result[edge.index] = max(order, result.get(edge.index, 0))
+        gap = float(np.linalg.norm(across(a[:, :3] - b[:, :3], edge.tangents), axis=1).max())
+        meeting = Meeting(order, gap, tuple(side.face for side in sides))
+        result[edge.index] = meeting.with_(result.get(edge.index))
     return result
 
 
@@ -167,7 +198,7 @@ def _unsewn(
     """Look at a free edge that coincides with one of another face."""
     other = _twin(model, edge, sides[1].face)
     if other:
-        result.orders[other.index] = max(result.orders[edge.index], result.orders.get(other.index, 0))
+        result.meetings[other.index] = result.meetings[edge.index].with_(result.meetings.get(other.index))
     if edge.index not in result.frozen or (other and other.index not in result.frozen):
         return
     if other is None:
@@ -226,7 +257,7 @@ def _seam(
         if knots.periodic and abs(abs(a.at - b.at) - knots.period) <= ISO * knots.period:
             return a, b
     found = jets(model, a, SHARES, 2), jets(model, b, SHARES, 2)
-    order = known.orders.get(edges[0].index, 0)
+    order = known.meetings[edges[0].index].order if edges[0].index in known.meetings else 0
     if wishes.keep not in CONTINUITY:
         order = min(order, *(_room(model, border) for border in (a, b)))
     joint = joint_of(model, (a, b), found, order, wishes)

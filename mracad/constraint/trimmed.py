@@ -20,7 +20,7 @@ from mracad.bspline.knots import KnotVector
 from mracad.bspline.net import curvature
 from mracad.constraint.joint import UNEVEN
 from mracad.constraint.seam import Seam, runs_back
-from mracad.constraint.sides import between
+from mracad.constraint.sides import across, between
 from mracad.constraint.trace import EVENLY, LOOKS, NEAR, Trace, along, crossings, trace_of
 from mracad.constraint.wishes import Wishes
 from mracad.model import Edge, Face, Model, Trim
@@ -179,12 +179,6 @@ def _opened(model: Model, traces: tuple[Trace, Trace], share: Array) -> tuple[Ar
     angle = between(*normals)
     angle[np.minimum(*(np.linalg.norm(n, axis=1) for n in normals)) == 0.0] = np.nan
     return np.linalg.norm(apart, axis=1), angle, bends
-
-
-def across(vectors: Array, along: Array) -> Array:
-    """The part of vectors ``(q, 3)`` across directions ``along``."""
-    along = along / np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-300)
-    return vectors - (vectors * along).sum(axis=1, keepdims=True) * along
 
 
 def fine_sites(traces: tuple[Trace, Trace], spaces: Mapping[int, tuple[KnotVector, KnotVector]]) -> tuple[Array, Array]:

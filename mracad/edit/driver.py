@@ -17,8 +17,9 @@ import numpy as np
 from mracad.bspline.net import Net
 from mracad.constraint.seam import Seam
 from mracad.constraint.trimmed import TrimmedSeam
-from mracad.edit.pose import Scene, Tolerances
+from mracad.edit.pose import Scene
 from mracad.edit.target import Sheet, Wish
+from mracad.edit.tolerances import Tolerances
 from mracad.edit.trial import ENOUGH, Trial, Verdict, Watch, amounts, displaced
 from mracad.inspect.roughness import Change, Worse
 from mracad.model import Displacement, Offset

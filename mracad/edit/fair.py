@@ -20,8 +20,9 @@ from mracad.bspline.net import Net
 from mracad.constraint.wishes import Wishes
 from mracad.edit.driver import Result, drive
 from mracad.edit.mend import Mended, mended
-from mracad.edit.pose import Scene, Tolerances
+from mracad.edit.pose import Scene
 from mracad.edit.target import Sheet, Wish, eased, sheets, stiffness
+from mracad.edit.tolerances import Tolerances
 from mracad.inspect.curvature import forms
 from mracad.inspect.jets import jets
 from mracad.model import Model

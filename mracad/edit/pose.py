@@ -9,12 +9,12 @@ import numpy as np
 
 from mracad.bspline.net import Net
 from mracad.edit.target import Sheet
+from mracad.edit.tolerances import Tolerances
 from mracad.inspect.cells import quadrature
-from mracad.inspect.roughness import Growth
 from mracad.model import Model
 from mracad.seam.conditions import doubled, matched
 from mracad.seam.conditions import rows as seam_rows
-from mracad.seam.contact import Rows
+from mracad.seam.contact import Contact, Rows
 from mracad.seam.contact import rows as contact_rows
 from mracad.seam.energy import forms
 from mracad.seam.interface import Joints, away, contact, mended_ends, rims, twists
@@ -24,9 +24,6 @@ from mracad.seam.space import refined
 
 Array = np.ndarray
 
-GROWTH = Growth(0.005, 0.005, 0.005, 0.02, 30.0)
-"""What the judge lets pass by default: a quarter of the 2 % that count as worse where faces are compared."""
-
 TIGHT = 0.3
 """Share of what a contact may lack at which its conditions aim."""
 
@@ -35,27 +32,8 @@ EASY = 30.0
 closely along a curve could hardly follow what is wanted beside it."""
 
 
-@dataclass(frozen=True)
-class Tolerances:
-    """What a result may be worse in.
-
-    Attributes
-    ----------
-    gap : float
-        Of a contact, mm.
-    angle, bend : float
-        By which the angle (radians) and the curvature (over the wavelength of the edit) along a contact may grow.
-    growth : Growth
-        Of roughness.
-    deviation : float
-        Largest deviation along the normal, mm.
-    """
-
-    gap: float
-    angle: float = 1.4e-4
-    bend: float = 1e-3
-    growth: Growth = GROWTH
-    deviation: float = np.inf
+WITHIN = 0.8
+"""Share of what may be worse that contacts may lack, which are looked at in other places than the result."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,6 +56,20 @@ class Scene:
     joints: Joints
     tolerances: Tolerances
     refine: bool = True
+
+    def allowed(self, contact: Contact, joined: Joints, width: float) -> tuple[float, float, float]:
+        """By how much the gap (mm), the slope and the curvature (1/mm) of a contact may grow.
+
+        Where both faces of an edge move, each by itself, they share it.
+        """
+        t = self.tolerances
+        if contact.b is not None:
+            return t.gap, t.angle, t.bend / width
+        meeting, edge = joined.meetings.get(contact.edge), self.model.edges[contact.edge]
+        if meeting is None:
+            return t.gap, t.angle, t.bend / width
+        sharing = max(sum(self.model.faces[face].surface in self.sheets for face in meeting.faces), 1)
+        return t.wider(edge, meeting.gap) / sharing, t.angle / sharing, t.bend / width / sharing
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,8 +140,7 @@ def pose(
     rows, goal = seam_rows(nets, joined.exact, everywhere=True)
     pairs = np.array([each.b is not None for each in contacts], bool)[found.owner]
     opened = np.where(pairs[:, None], found.matrix @ f, 0.0)
-    t = scene.tolerances
-    most = t.gap, t.angle, t.bend / width
+    most = WITHIN * np.array([scene.allowed(each, joined, width) for each in contacts]).reshape(-1, 3)
     limits, tolerances = found.limits(opened, most), found.limits(0.0 * opened, most)
     mends = np.array([(each.close, each.fit, False) for each in contacts], bool).reshape(-1, 3)
     mends = mends[found.owner, found.order]

@@ -11,9 +11,9 @@ from mracad.constraint.wishes import Wishes
 from mracad.edit.driver import STAYS, Moved, Result
 from mracad.edit.fair import Filter, faired
 from mracad.edit.level import Level
-from mracad.edit.pose import Tolerances
 from mracad.edit.result import Edit, FaceOutcome, Reason, Status, spared
 from mracad.edit.target import Wish
+from mracad.edit.tolerances import tolerances
 from mracad.inspect.roughness import Worse
 from mracad.model import Face, Model
 from mracad.options import Smooth, length
@@ -71,14 +71,6 @@ def wish(model: Model, options: Smooth) -> Wish:
         return Filter(length(options.scale, model.diagonal, "scale"))
     assert options.level is not None
     return Level(options.level)
-
-
-def tolerances(model: Model, options: Smooth) -> Tolerances:
-    """What the result may be worse in."""
-    gap = length(options.gap_tolerance, model.diagonal, "gap-tolerance")
-    if options.max_deviation is None:
-        return Tolerances(gap)
-    return Tolerances(gap, deviation=length(options.max_deviation, model.diagonal, "max-deviation"))
 
 
 def _outcome(face: Face, result: Result, movable: Collection[int], scope: Scope, options: Smooth) -> FaceOutcome:

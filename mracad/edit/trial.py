@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from mracad.bspline.net import Net, cross
-from mracad.edit.pose import Scene, Tolerances, pose
+from mracad.edit.pose import Scene, pose
 from mracad.edit.target import Sheet, eased, stiffness
+from mracad.edit.tolerances import Tolerances
 from mracad.inspect.roughness import Change, Worse, better, worse
 from mracad.inspect.survey import POINTS, Survey, changes, surveys
 from mracad.model import Face

@@ -49,13 +49,12 @@ def apply(document: Document, model: Model, displacement: Displacement) -> None:
     highest, most = max(max(o.degrees) for o in displacement.offsets.values()), Geom_BSplineSurface.MaxDegree_s()
     if highest > most:
         raise UsageError(f"a surface of degree {highest} is beyond the kernel", f"ask for {most} at most")
-    with quiet(), following(document, _moved_edges(model, displacement)):
+    with quiet(), following(document, _moved_edges(model, displacement), _moved_faces(model, displacement)):
         for index, offset in sorted(displacement.offsets.items()):
             surface = model.surfaces[index]
             _move(_handle(document, surface, offset), offset)
         _forget(document)
-        faces = (face for index in displacement.offsets for face in model.surfaces[index].faces)
-        document.moved |= {label_key(document.part_of(face).label) for face in faces}
+        document.moved |= {label_key(document.part_of(face).label) for face in _moved_faces(model, displacement)}
 
 
 def restore(document: Document, model: Model, displacement: Displacement) -> None:
@@ -63,7 +62,7 @@ def restore(document: Document, model: Model, displacement: Displacement) -> Non
 
     Faces that were converted stay on their (undisplaced) NURBS surfaces.
     """
-    with quiet(), following(document, _moved_edges(model, displacement)):
+    with quiet(), following(document, _moved_edges(model, displacement), _moved_faces(model, displacement)):
         for index in sorted(displacement.offsets):
             surface = model.surfaces[index]
             handle = basis(BRep_Tool.Surface_s(document.faces[surface.faces[0]], TopLoc_Location()))
@@ -127,6 +126,10 @@ def _move(surface: Geom_BSplineSurface | Geom_BezierSurface, offset: Offset) -> 
     if poles.shape != offset.poles.shape:
         raise MracadError(f"offsets of shape {offset.poles.shape} for a surface of {poles.shape} control points")
     set_poles(surface, np.where(offset.poles.any(axis=2, keepdims=True), poles + offset.poles, poles))
+
+
+def _moved_faces(model: Model, displacement: Displacement) -> list[int]:
+    return [face for index in sorted(displacement.offsets) for face in model.surfaces[index].faces]
 
 
 def _moved_edges(model: Model, displacement: Displacement) -> dict[int, int]:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 
+from OCP.Adaptor3d import Adaptor3d_CurveOnSurface
 from OCP.BRep import BRep_Builder, BRep_Tool
-from OCP.BRepAdaptor import BRepAdaptor_Curve
-from OCP.BRepLib import BRepLib
+from OCP.BRepAdaptor import BRepAdaptor_Curve, BRepAdaptor_Curve2d, BRepAdaptor_Surface
+from OCP.BRepLib import BRepLib, BRepLib_ValidateEdge
 from OCP.gp import gp_Pnt, gp_Vec
 from OCP.TopAbs import TopAbs_FORWARD
 from OCP.TopExp import TopExp
@@ -15,25 +16,30 @@ from OCP.TopoDS import TopoDS, TopoDS_Edge, TopoDS_Face
 from OCP.TopTools import TopTools_MapOfShape
 
 from mracad.occ.document import Document
+from mracad.occ.topology import edge_uses
 
 _TOLERANCE = 1e-7  # memory units
+_ABOVE = 1 + 1e-6  # so much more than the kernel finds is a tolerance that it takes
 
 
 @contextmanager
-def following(document: Document, edges: Mapping[int, int]) -> Iterator[None]:
+def following(document: Document, edges: Mapping[int, int], faces: Collection[int]) -> Iterator[None]:
     """Let edges follow faces that are moved inside the block: new 3D curves on the faces, and vertices that move as the
     ends of the edges' curves on the faces do.
 
     A stale curve must never be left to the kernel, which would hide it in a large tolerance.  The faces of an edge
     must move together: its curves on them stay.  A vertex stays as far from the ends of its edges as it was: those that
     do not move get no gap there that a reader would close.  Nor does an edge get a smaller tolerance than it had: files
-    state the mean of all, and by that a reader heals edges that nothing touched.
+    state the mean of all, and by that a reader heals edges that nothing touched.  One that stays may get a larger one:
+    kernels state it as close as can be, and evaluate surfaces of high degree that moved a little otherwise.
 
     Parameters
     ----------
     document : Document
     edges : mapping of int to int
         Indices of edges, none of them degenerate, each with a face that it bounds.
+    faces : collection of int
+        The faces that move.
     """
     builder = BRep_Builder()
     chosen = [
@@ -41,7 +47,8 @@ def following(document: Document, edges: Mapping[int, int]) -> Iterator[None]:
         for edge, face in edges.items()
     ]
     old = [_ends(*each) for each in chosen]
-    tolerances = [BRep_Tool.Tolerance_s(edge) for edge, _ in chosen]
+    tolerances = [_own(edge) for edge, _ in chosen]
+    near = [(edge, face) for edge, face in _uses(document, faces) if _checked(edge, face).CheckTolerance(_own(edge))]
     yield
     for (edge, _), tolerance in zip(chosen, tolerances, strict=True):
         builder.UpdateEdge(edge, None, _TOLERANCE)
@@ -57,8 +64,30 @@ def following(document: Document, edges: Mapping[int, int]) -> Iterator[None]:
             if moved.Add(vertex):
                 place = BRep_Tool.Pnt_s(vertex).Translated(gp_Vec(before, now))
                 builder.UpdateVertex(vertex, place, BRep_Tool.Tolerance_s(vertex))
-    for part in document.parts if chosen else ():
+    for edge, face in near:
+        found = _checked(edge, face)
+        if not found.CheckTolerance(_own(edge)):
+            builder.UpdateEdge(edge, _ABOVE * found.GetMaxDistance())
+    for part in document.parts if near else ():
         BRepLib.UpdateTolerances_s(part.shape)
+
+
+def _uses(document: Document, faces: Collection[int]) -> Iterator[tuple[TopoDS_Edge, TopoDS_Face]]:
+    """The edges of faces as these use them, degenerate ones left out."""
+    for face in (TopoDS.Face_s(document.faces[index].Oriented(TopAbs_FORWARD)) for index in faces):
+        yield from ((edge, face) for edge in edge_uses(face) if not BRep_Tool.Degenerated_s(edge))
+
+
+def _own(edge: TopoDS_Edge) -> float:
+    return float(BRep_Tool.Tolerance_s(edge))
+
+
+def _checked(edge: TopoDS_Edge, face: TopoDS_Face) -> BRepLib_ValidateEdge:
+    """How far an edge and its curve on a face are apart, as the kernel's check sees it."""
+    on_face = Adaptor3d_CurveOnSurface(BRepAdaptor_Curve2d(edge, face), BRepAdaptor_Surface(face, False))
+    found = BRepLib_ValidateEdge(BRepAdaptor_Curve(edge), on_face, BRep_Tool.SameParameter_s(edge))
+    found.Process()
+    return found
 
 
 def _ends(edge: TopoDS_Edge, face: TopoDS_Face) -> tuple[gp_Pnt, gp_Pnt]:

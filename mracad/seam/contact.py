@@ -25,8 +25,8 @@ from mracad.seam.conditions import laid_out
 
 Array = np.ndarray
 
-GAUSS = 5
-"""Conditions in each piece of a contact between knot lines."""
+MORE = 2
+"""Conditions in each piece of a contact between knot lines, beyond the highest degree of its sides."""
 
 _EVENLY = np.linspace(0.0, 1.0, 129)
 
@@ -45,6 +45,8 @@ class Contact:
         Whether the gap and the tilt of the input are pulled shut.
     since : {0, 1, 2}
         The least of the derivatives that are asked.
+    edge : int
+        The edge that it stands for.
     """
 
     a: Trace
@@ -53,6 +55,7 @@ class Contact:
     close: bool = False
     fit: bool = False
     since: int = 0
+    edge: int = -1
 
     @property
     def surfaces(self) -> set[int]:
@@ -81,20 +84,20 @@ class Rows:
     width: Array
     owner: Array
 
-    def limits(self, opened: Array, tolerances: Sequence[float]) -> Array:
+    def limits(self, opened: Array, tolerances: Array) -> Array:
         """How far contacts may be open, ``(conditions,)``.
 
         Parameters
         ----------
         opened : ndarray (conditions, 3)
             How far they were: positions may be so at every place, slopes and curvatures as at their worst.
-        tolerances : sequence of float
+        tolerances : ndarray (contacts, 3)
             By how much more, in each order.
         """
         old, worst = np.linalg.norm(opened, axis=1), np.zeros((int(self.owner.max(initial=-1)) + 1, 3))
         np.maximum.at(worst, (self.owner, self.order), old)
         most = np.where(self.order == 0, old, worst[self.owner, self.order])
-        return np.asarray(most + np.asarray(tolerances)[self.order])
+        return np.asarray(most + tolerances[self.owner, self.order])
 
     def form(self, limits: Array) -> Any:
         """``Cᵀ W C``, ``(points, points)``, W the widths over the squared limits ``(conditions,)``."""
@@ -156,6 +159,7 @@ def _sites(sides: Sequence[Trace], nets: Mapping[int, Net]) -> tuple[Array, Arra
     """Gauss points of the pieces of a contact, fractions, and their shares of it."""
     breaks = np.unique(np.concatenate([crossings(t, (nets[t.surface].u, nets[t.surface].v)) for t in sides]))
     breaks = breaks[np.append(True, np.diff(breaks) > 1e-9)]
-    place, weight = np.polynomial.legendre.leggauss(GAUSS)
+    highest = max(knots.degree for side in sides for knots in (nets[side.surface].u, nets[side.surface].v))
+    place, weight = np.polynomial.legendre.leggauss(highest + MORE)
     step = np.diff(breaks)[:, None]
     return (breaks[:-1, None] + step * (place + 1) / 2).ravel(), (step * weight / 2).ravel()

@@ -16,7 +16,7 @@ from mracad.bspline.net import Net
 from mracad.constraint.border import Border
 from mracad.constraint.frozen import meeting, reached
 from mracad.constraint.joint import UNEVEN
-from mracad.constraint.seam import TRIMMED, Seam, seams
+from mracad.constraint.seam import TRIMMED, Meeting, Seam, seams
 from mracad.constraint.trace import trace_of
 from mracad.constraint.trimmed import TrimmedSeam, beside, trimmed
 from mracad.constraint.wishes import Wishes
@@ -49,15 +49,15 @@ class Joints:
         Closing edges that a periodic space keeps smooth by itself.
     frozen : mapping of int to str
         Edges that stay, and why.
-    orders : mapping of int to int
-        Derivatives that edges keep with what lies beyond them, where they stay; none where it is not said.
+    meetings : mapping of int to Meeting
+        How edges meet what lies beyond them; where they stay, they keep that.
     """
 
     exact: tuple[Seam, ...] = ()
     loose: tuple[TrimmedSeam, ...] = ()
     closing: Mapping[int, tuple[Border, Border]] = field(default_factory=dict)
     frozen: Mapping[int, str] = field(default_factory=dict)
-    orders: Mapping[int, int] = field(default_factory=dict)
+    meetings: Mapping[int, Meeting] = field(default_factory=dict)
 
     @property
     def moving(self) -> frozenset[int]:
@@ -65,6 +65,11 @@ class Joints:
         exact = (edge for seam in self.exact for edge in (seam.edge, seam.twin))
         loose = (edge for seam in self.loose for edge in (seam.edge, seam.twin))
         return frozenset(self.closing).union(exact, loose)
+
+    @property
+    def orders(self) -> dict[int, int]:
+        """Derivatives that edges keep with what lies beyond them, where they stay."""
+        return {edge: meeting.order for edge, meeting in self.meetings.items()}
 
     @property
     def mended(self) -> tuple[Seam | TrimmedSeam, ...]:
@@ -106,12 +111,12 @@ def joints(model: Model, movable: Collection[int], wishes: Wishes) -> Joints:
         elif not seam.joint.order:
             exact.remove(seam)
             frozen |= dict.fromkeys((seam.edge, seam.twin), rest)
-    return Joints(tuple(exact), tuple(loose), known.closing, frozen, known.orders)
+    return Joints(tuple(exact), tuple(loose), known.closing, frozen, known.meetings)
 
 
 def contact(seam: TrimmedSeam) -> Contact:
     """A seam kept to a tolerance, as conditions see it."""
-    return Contact(seam.a, seam.b, seam.order, seam.close, seam.fit, seam.since)
+    return Contact(seam.a, seam.b, seam.order, seam.close, seam.fit, seam.since, seam.edge)
 
 
 def rims(
@@ -152,12 +157,13 @@ def rims(
             edge = model.edges[trim.edge]
             if edge.index in moving or edge.index in given:
                 continue
-            order = POLE if edge.degenerate else joined.orders.get(edge.index, 0)
+            meeting = joined.meetings.get(edge.index)
+            order = POLE if edge.degenerate else meeting.order if meeting else 0
             found = end(net, trim)
             if found is not None:
                 held |= _rows(net, trim, *found, order)
             elif not edge.degenerate:
-                contacts.append(Contact(trace_of(model, face, trim), None, order))
+                contacts.append(Contact(trace_of(model, face, trim), None, order, edge=edge.index))
     return held, contacts
 
 
@@ -199,7 +205,7 @@ def mended_ends(
     ]
     if not ends:
         return np.zeros(net.poles.shape[:2], bool)
-    free = {trim.edge for face in faces for trim in face.trims if model.edges[trim.edge].free} - joined.orders.keys()
+    free = {trim.edge for face in faces for trim in face.trims if model.edges[trim.edge].free} - joined.meetings.keys()
     firm, _ = rims(model, net, faces, movable, joined, free)
     points = np.asarray(net.grid(net.u.greville(), net.v.greville())).reshape(-1, 3)
     near = KDTree(np.concatenate(ends)).query(points)[0] <= within

@@ -96,7 +96,7 @@ def chains(*lengths):
 def first_edited(faces):
     """A finding of the first of some faces that is edited, each time, as if there were no end of them."""
 
-    def found(before, after, edit, keep):
+    def found(model, before, after, edit, allowed, keep):
         return set(sorted({outcome.face for outcome in edit.faces("edited")} & set(faces))[:1])
 
     return found

@@ -12,7 +12,7 @@ from mracad.bspline.net import Net
 from mracad.constraint.wishes import Wishes
 from mracad.edit.driver import groups
 from mracad.edit.fair import Filter, faired
-from mracad.edit.pose import Tolerances
+from mracad.edit.tolerances import Tolerances
 from mracad.inspect.roughness import Growth, worse
 from mracad.inspect.survey import changes, surveys
 from mracad.occ.view import view

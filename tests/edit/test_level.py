@@ -8,8 +8,8 @@ from mracad.bspline.net import Net
 from mracad.constraint.wishes import Wishes
 from mracad.edit.fair import faired
 from mracad.edit.level import Level
-from mracad.edit.pose import Tolerances
 from mracad.edit.target import sheets
+from mracad.edit.tolerances import Tolerances
 from mracad.inspect.cells import quadrature
 from mracad.occ.view import view
 from mracad.seam.energy import forms

@@ -11,6 +11,7 @@ from OCP.TopoDS import TopoDS
 from mracad import job, occ
 from mracad.edit.result import Reason
 from mracad.edit.smooth import smooth
+from mracad.edit.tolerances import MORE, Tolerances
 from mracad.model import Displacement, Offset
 from mracad.occ.apply import apply
 from mracad.occ.check import check
@@ -58,7 +59,9 @@ def test_solids_stay_solid_and_smooth(samples, tmp_path, source, scale):
     report = job.run(document, smooth, Smooth(scale=scale))
     assert report.edit.faces("edited")
     assert report.valid_before.valid and report.valid_after.valid and check(document).solids == 1
-    assert report.valid_after.edge_tolerance <= 1.1 * report.valid_before.edge_tolerance
+    widest = max(measure.gap for measure in report.before)
+    allowed = max((1 + MORE) * widest, Tolerances().least)  # edges that follow one face get the whole gap to the other
+    assert report.valid_after.edge_tolerance <= max(report.valid_before.edge_tolerance, allowed)
     for before, after in zip(report.before, report.after, strict=True):
         assert after.gap <= max(before.gap, 1e-4)
         if before.smooth:

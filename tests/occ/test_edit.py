@@ -4,7 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from OCP.BRep import BRep_Tool
+from OCP.BRep import BRep_Builder, BRep_Tool
 from OCP.BRepAlgoAPI import BRepAlgoAPI_Cut
 from OCP.BRepBuilderAPI import (
     BRepBuilderAPI_Copy,
@@ -29,7 +29,7 @@ from OCP.TopLoc import TopLoc_Location
 from mracad import occ
 from mracad.errors import MracadError, UsageError
 from mracad.model import Displacement, Offset
-from mracad.occ.geometry import basis
+from mracad.occ.geometry import basis, set_poles
 from tests.occ import shapes
 
 
@@ -306,6 +306,23 @@ def test_edges_follow_faces_that_move_together(name):
     assert gaps(again) < 1e-6
     for old, new in zip(model.edges, again.edges, strict=True):
         assert new.points == pytest.approx(old.points + (not old.degenerate) * shift, abs=1e-6)
+
+
+def test_edges_that_stay_are_as_loose_as_the_kernel_finds_them():
+    """Their curves lie as far off as their tolerance says; the face moves by less than what edges follow for."""
+    off, by = 1e-5, 9e-10
+    document = shapes.document(shapes.face_on(shapes.bspline(shapes.wavy_poles(9, 9))))
+    lifted = np.add(occ.view(document).surfaces[0].net.poles, [0.0, 0.0, off])
+    set_poles(basis(BRep_Tool.Surface_s(document.faces[0], TopLoc_Location())), lifted)
+    for edge in document.edges:
+        BRep_Builder().UpdateEdge(edge, off + by / 10)
+    assert occ.check(document).valid
+    model = occ.view(document)
+    curves = [BRep_Tool.Curve_s(edge, 0.0, 0.0) for edge in document.edges]
+    occ.apply(document, model, Displacement({0: Offset(np.full((9, 9, 3), [0.0, 0.0, by]))}))
+    assert [BRep_Tool.Curve_s(edge, 0.0, 0.0) for edge in document.edges] == curves
+    verdict = occ.check(document)
+    assert verdict.valid and off < verdict.edge_tolerance < off + 2 * by
 
 
 def test_a_crack_is_found():

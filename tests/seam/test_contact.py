@@ -9,7 +9,7 @@ from mracad.bspline.interpolate import interpolated
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.net import Net
 from mracad.constraint.trace import Trace
-from mracad.seam.contact import Contact, rows
+from mracad.seam.contact import MORE, Contact, rows
 from tests.inspect.shapes import graph, plane, segment
 
 INF = float("inf")
@@ -44,6 +44,21 @@ def test_squares_along_the_diagonal_of_a_plane(function, squares):
     for order, mean in enumerate(squares):
         value = (delta.T @ found.form(only(found, order)) @ delta).item()
         assert value == pytest.approx(mean * np.sqrt(2), rel=1e-9, abs=1e-9)
+
+
+@pytest.mark.parametrize("degree", [3, 9, 22])
+def test_no_wave_that_a_piece_can_hold_hides_between_the_conditions(degree):
+    """Legendre polynomials of the surface's own degree along the trace: one vanishes wherever so many are asked."""
+    knots = KnotVector.clamped([0.0, 1.0], degree)
+    points = np.stack(np.meshgrid(knots.greville(), knots.greville(), [0.0], indexing="ij"), axis=-1)[:, :, 0]
+    net = Net(knots, knots, points)
+    found = rows({0: net}, [Contact(Trace(0, 0, segment((0.5, 0), (0.5, 1))), None, 0)])
+    for k in range(1, degree + 1):
+        delta = field(net, lambda x, y, k=k: np.polynomial.legendre.Legendre.basis(k, [0, 1])(y))
+        assert np.abs(found.matrix @ delta).max() > 0.2
+        assert (delta.T @ found.form(np.ones(len(found.order))) @ delta).item() == pytest.approx(
+            1 / (2 * k + 1), rel=1e-4
+        )
 
 
 def wavy():
@@ -82,7 +97,7 @@ def test_rows_are_the_derivatives_at_their_places():
     start, stop = np.array([0.2, 0.1]), np.array([0.2, 0.9])
     found = rows({0: net}, [Contact(Trace(0, 0, segment(start, stop)), None, 2)])
     breaks = np.r_[0, (np.array([1 / 3, 2 / 3]) - 0.1) / 0.8, 1]
-    node = np.polynomial.legendre.leggauss(5)[0]
+    node = np.polynomial.legendre.leggauss(5 + MORE)[0]
     share = (breaks[:-1, None] + np.diff(breaks)[:, None] * (node + 1) / 2).ravel()
     uv = start + share[:, None] * (stop - start)
     delta = np.random.default_rng(1).standard_normal((net.u.count * net.v.count, 3))
@@ -154,7 +169,7 @@ def test_contacts_may_lack_what_they_lacked_and_a_little_more():
     found = rows({0: net}, [contact_of()])
     lacked = np.abs(np.random.default_rng(0).standard_normal(len(found.order)))
     opened = lacked[:, None] * np.array([0.6, 0.0, -0.8])
-    limits = found.limits(opened, [0.1, 0.2, 0.3])
+    limits = found.limits(opened, np.array([[0.1, 0.2, 0.3]]))
     assert limits[found.order == 0] == pytest.approx(lacked[found.order == 0] + 0.1)
     for order, more in ((1, 0.2), (2, 0.3)):
         assert limits[found.order == order] == pytest.approx(lacked[found.order == order].max() + more)
@@ -166,7 +181,7 @@ def test_room_is_what_leaves_every_contact_within_its_limits():
     n = net.u.count * net.v.count
     rng = np.random.default_rng(3)
     opened = 0.01 * rng.standard_normal((len(found.order), 3))
-    limits = found.limits(opened, [0.01, 1e-3, 1.0])
+    limits = found.limits(opened, np.tile([0.01, 1e-3, 1.0], (2, 1)))
     delta = rng.standard_normal((2 * n, 3))
     for amount in found.room(delta, opened, limits)[found.owner]:
         assert 0 < amount < 1
@@ -175,8 +190,10 @@ def test_room_is_what_leaves_every_contact_within_its_limits():
     assert (off <= limits * (1 + 1e-9)).all()
     still = np.zeros_like(delta)
     still[:n, 2] = 1e-4
-    assert found.room(still, 0 * opened, found.limits(0 * opened, [0.01, 1e-3, 1.0])) == pytest.approx([1.0, 1.0])
-    straight = found.room(100 * still, 0 * opened, found.limits(0 * opened, [4e-3, 1e-3, 1.0]))
+    assert found.room(still, 0 * opened, found.limits(0 * opened, np.tile([0.01, 1e-3, 1.0], (2, 1)))) == pytest.approx(
+        [1.0, 1.0]
+    )
+    straight = found.room(100 * still, 0 * opened, found.limits(0 * opened, np.tile([4e-3, 1e-3, 1.0], (2, 1))))
     assert straight == pytest.approx([0.4, 1.0])
     assert rows({0: net}, []).room(delta[:n], opened[:0], limits[:0]).size == 0
 

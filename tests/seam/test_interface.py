@@ -7,6 +7,7 @@ import pytest
 
 from mracad.bspline.interpolate import interpolated
 from mracad.bspline.net import Net
+from mracad.constraint.seam import Meeting
 from mracad.constraint.wishes import Wishes
 from mracad.inspect.cells import quadrature
 from mracad.model import Edge, Face, Model, Side, Surface, Trim
@@ -28,7 +29,8 @@ def trimmed(net, curves):
 
 
 def held_by(model, net, moving=(), orders=(), movable=(0,)):
-    joined = Joints(closing=dict.fromkeys(moving), orders=dict(orders))
+    meetings = {edge: Meeting(order, 0.0, ()) for edge, order in dict(orders).items()}
+    joined = Joints(closing=dict.fromkeys(moving), meetings=meetings)
     return rims(model, net, model.faces, set(movable), joined)
 
 

@@ -1,0 +1,64 @@
+"""What the result of an edit may be worse in: one answer for conditions, the judge and the verdict on a document."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from mracad.inspect.roughness import Growth
+from mracad.model import Edge, Model
+from mracad.options import Fitting, Selection, length
+
+GROWTH = Growth(0.005, 0.005, 0.005, 0.02, 30.0)
+"""What the judge lets pass by default: a quarter of the 2 % that count as worse where faces are compared."""
+
+MORE = 0.02
+"""Share by which an edge may gape more that gapes as far as it may."""
+
+
+@dataclass(frozen=True)
+class Tolerances:
+    """What a result may be worse in.
+
+    Attributes
+    ----------
+    gap : float
+        Of a seam that moves along a trim curve, mm: by how much it may gape more; most that any other edge may.
+    least : float
+        What any edge may gape, mm, however exact it is.
+    angle, bend : float
+        By which the angle (radians) and the curvature (over the wavelength of the edit) along an edge may grow.
+    growth : Growth
+        Of roughness.
+    deviation : float
+        Largest deviation along the normal, mm.
+    """
+
+    gap: float = 1e-4
+    least: float = 1e-5
+    angle: float = math.radians(0.01)
+    bend: float = 1e-3
+    growth: Growth = GROWTH
+    deviation: float = np.inf
+
+    def wider(self, edge: Edge, gap: float) -> float:
+        """By how much an edge that gapes by ``gap`` (mm) may gape more where it stays, mm: up to its own tolerance."""
+        return max(min(max(edge.tolerance, self.least), self.gap) - gap, MORE * gap)
+
+
+def tolerances(model: Model, options: Selection) -> Tolerances:
+    """What an edit of a model may be worse in.
+
+    Raises
+    ------
+    UsageError
+        For a length that is none.
+    """
+    if not isinstance(options, Fitting):
+        return Tolerances()
+    gap = length(options.gap_tolerance, model.diagonal, "gap-tolerance")
+    bound = options.max_deviation
+    deviation = np.inf if bound is None else length(bound, model.diagonal, "max-deviation")
+    return Tolerances(gap, deviation=deviation)
