@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib
-import math
 import time
 from collections import Counter
 from collections.abc import Callable, Collection, Mapping, Sequence
@@ -16,6 +15,7 @@ from mracad import guard
 from mracad.audit.continuity import SeamMeasure, key, remeasured, seams
 from mracad.audit.deviation import Deviation, deviations
 from mracad.audit.mended import unmended
+from mracad.audit.torn import gaps, torn
 from mracad.edit.result import Edit, Reason
 from mracad.edit.tolerances import Tolerances, tolerances
 from mracad.errors import EditError
@@ -49,6 +49,8 @@ class Report:
     before, after : list of SeamMeasure
         Seams before and after, in the same order.
     valid_before, valid_after : Validity
+    tolerances : Tolerances
+        What the edit may be worse in.
     """
 
     model: Model
@@ -58,7 +60,12 @@ class Report:
     after: list[SeamMeasure]
     valid_before: Validity
     valid_after: Validity
+    tolerances: Tolerances
     seconds: float
+
+    def gaps(self) -> dict[tuple[int, ...], float]:
+        """How wide seams may gape of faces that moved, each by itself or to a tolerance, mm, by their faces."""
+        return gaps(self.model, self.before, self.edit, self.tolerances)
 
     def smooth_seams(self) -> frozenset[tuple[int, tuple[int, int]]]:
         """Keys of the seams that were smooth before."""
@@ -159,7 +166,7 @@ def run(
     others = [view(read(file)) for file in options.models()]
     before: list[SeamMeasure] = []
     valid_before: Validity | None = None
-    left = _Left(model.name, dict(spoiled))
+    left, allowed = _Left(model.name, dict(spoiled)), tolerances(model, options)
     while True:
         stage("editing")
         try:
@@ -177,11 +184,10 @@ def run(
         valid_after = valid_before
         offsets = result.displacement.offsets
         after = remeasured(result.displacement.applied(model), before, offsets) if offsets else before
-        found = _torn(model, before, after, result, tolerances(model, options), options.keep)
-        torn = {i for i in found if model.faces[i].surface is not None}
-        torn -= left.faces.keys()
-        if torn:
-            left.leave(torn, "its seams would not hold", before, result)
+        found = torn(model, before, after, result, allowed, options.keep)
+        found = {i for i in found if model.faces[i].surface is not None} - left.faces.keys()
+        if found:
+            left.leave(found, "its seams would not hold", before, result)
             continue
         if not (apply and offsets):
             break
@@ -193,7 +199,7 @@ def run(
         result = _with_notes(result, options, model, scope.chosen - left.faces.keys(), before, after)
     stage("measuring the deviation")
     off = deviations(model, result.displacement)
-    return Report(model, result, off, before, after, valid_before, valid_after, time.perf_counter() - start)
+    return Report(model, result, off, before, after, valid_before, valid_after, allowed, time.perf_counter() - start)
 
 
 def _told(progress: Progress | None, name: str, done: int = 0, total: int = 1) -> None:
@@ -289,24 +295,6 @@ def _refuse_if_asked(model: Model, result: Edit, named: Collection[int]) -> None
     if left and not any(outcome.status == "edited" for outcome in asked):
         names = " ".join(f"#{o.face + 1}" for o in left[:6]) + (" …" if len(left) > 6 else "")
         raise EditError(f"{model.name}: {names}: {left[0].words}", "leave out what cannot be done, or all of --faces")
-
-
-def _torn(
-    model: Model, before: list[SeamMeasure], after: list[SeamMeasure], edit: Edit, allowed: Tolerances, keep: str
-) -> set[int]:
-    """Faces of seams that an edit would open, or that were smooth and would not be; against its own intent.
-
-    Where only the position is to be kept a kink is no harm.
-    """
-    intent = {treatment.edge: treatment.how for treatment in edit.edges}
-    steeper, torn = math.degrees(allowed.angle), set()
-    for old, new in zip(before, after, strict=True):
-        how = intent.get(old.edge)
-        wider = allowed.gap if how == "to tolerance" else allowed.wider(model.edges[old.edge], old.gap)
-        bent = keep != "g0" and old.smooth and new.angle > old.angle + steeper
-        if how != "mended" and (new.gap > old.gap + wider or bent):
-            torn |= set(old.faces)
-    return torn
 
 
 def _named(result: Edit, spoiled: Mapping[int, str]) -> Edit:

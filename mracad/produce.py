@@ -194,12 +194,12 @@ class _Memory:
 
     @property
     def slack(self) -> Slack:
-        ways: dict[str, set[tuple[int, int]]] = {"coupled": set(), "mended": set(), "to tolerance": set()}
-        for report in self.reports:
-            for edge in report.edit.edges:
-                if edge.how in ways and len(edge.faces) == 2:
-                    ways[edge.how].add((min(edge.faces), max(edge.faces)))
-        return Slack(ways["coupled"] | ways["mended"], ways["to tolerance"])
+        edges = [edge for report in self.reports for edge in report.edit.edges if len(edge.faces) == 2]
+        moved = {tuple(sorted(edge.faces)) for edge in edges if edge.how != "frozen"}
+        gaps: dict[tuple[int, ...], float] = {}
+        for pair, gap in (each for report in self.reports for each in report.gaps().items()):
+            gaps[pair] = max(gap, gaps.get(pair, 0.0))
+        return Slack(moved, gaps)
 
 
 class _Copies:

@@ -21,16 +21,12 @@ if TYPE_CHECKING:
     pass
 
 Array = np.ndarray
-Pair = tuple[int, int]
 
 SLACK = 1e-7
 """Length, mm, by which a gap or a tolerance may be larger in the file."""
 
 MOVED = 1e-6
 """The same for the gaps of seams that moved with both faces."""
-
-LOOSE = 1e-4
-"""Gap, mm, that a seam may have which moved to the tolerance; and the tolerance of its edges."""
 
 STEEPER = 0.01
 """Angle, degrees, by which a smooth seam may be less smooth in the file."""
@@ -83,10 +79,20 @@ def read_back(file: Facts, faults: tuple[Fault, ...], forgiven: tuple[Fault, ...
 
 @dataclass(frozen=True)
 class Slack:
-    """What may differ: pairs of faces whose seams moved, exactly or to the tolerance, and faces written in parts."""
+    """What may differ.
 
-    moved: Collection[Pair] = ()
-    loose: Collection[Pair] = ()
+    Attributes
+    ----------
+    moved : collection of tuple of int
+        Pairs of faces whose seams moved with both.
+    gaps : mapping of tuple of int to float
+        How wide seams may gape, and their edges be, between faces that moved otherwise, mm.
+    parts : mapping of int to int
+        Faces that were written in parts.
+    """
+
+    moved: Collection[tuple[int, ...]] = ()
+    gaps: Mapping[tuple[int, ...], float] = field(default_factory=dict)
     parts: Mapping[int, int] = field(default_factory=dict)
 
 
@@ -258,7 +264,7 @@ def _hull(spots: Array) -> Array:
 
 def _tolerances(base: _File, file: _File, slack: Slack) -> Iterator[Fault]:
     """Edges and vertices with a larger tolerance than any had."""
-    limit = max(base.facts.tolerance, LOOSE if slack.loose else 0.0)
+    limit = max([base.facts.tolerance, *slack.gaps.values()])
     found: dict[tuple[int, ...], float] = defaultdict(float)
     for pair, edge in zip(file.pairs, file.facts.edges, strict=True):
         found[pair] = max(found[pair], edge.tolerance)
@@ -280,10 +286,9 @@ def _seams(base: _File, file: _File, slack: Slack, pairs: Collection[tuple[int, 
         if not found:
             yield Fault(Reason.SEAM, pair, 0, len(before))
             continue
-        loose = pair in slack.loose
-        room = MOVED if pair in slack.moved or loose else SLACK
+        room = MOVED if pair in slack.moved else SLACK
         gap, was = _worst(found, before, "gap", room)
-        if gap > max(was + room, LOOSE if loose else 0.0):
+        if gap > max(was + room, slack.gaps.get(pair, 0.0)):
             yield Fault(Reason.GAP, pair, gap, was)
         angle, was = _worst(found, [m for m in before if m.smooth], "angle", STEEPER)
         if angle > was + STEEPER:

@@ -117,7 +117,7 @@ def _pairs(model: Model, every: bool = False) -> list[_Pair]:
     sewn: list[_Pair] = [
         (e, True, (e.sides[0], e.sides[1])) for e in model.edges if len(e.sides) == 2 and len(e.points)
     ]
-    matched: list[_Pair] = [(e, False, (a, b)) for e, a, b in coinciding(model, TORN if every else GAP)]
+    matched: list[_Pair] = [(e, False, pair) for e, _, pair in coinciding(model, TORN if every else GAP)]
     return [pair for pair in sewn + matched if every or any(side.uv is not None for side in pair[2])]
 
 

@@ -38,14 +38,14 @@ def reach(model: Model, edge: Edge, other: Edge) -> float:
     return max(share, edge.tolerance + other.tolerance, PRECISION * model.diagonal)
 
 
-def coinciding(model: Model, gap: float = GAP) -> list[tuple[Edge, Side, Side]]:
-    """Seams of free edges within ``gap`` times their :func:`reach` of each other: an edge, its side, and the other
-    face's at the same places.
+def coinciding(model: Model, gap: float = GAP) -> list[tuple[Edge, Edge, tuple[Side, Side]]]:
+    """Seams of free edges within ``gap`` times their :func:`reach` of each other: an edge, the other one, and the sides
+    of both faces at the places of the first.
 
-    Where one edge is a part of the other (a T-junction) the shorter one is the seam.
+    Where one edge is a part of the other (a T-junction) the shorter one comes first.
     """
     free = [e for e in model.edges if e.free and len(e.points) > 1]
-    found: dict[tuple[int, int], tuple[Edge, Side, Side]] = {}
+    found: dict[tuple[int, int], tuple[Edge, Edge, tuple[Side, Side]]] = {}
     space = np.array([model.spaces[e.part] if model.spaces else 0 for e in free])
     for i, j in _candidates(model, free, gap, lambda i: space == space[i]):
         edge, other = free[i], free[j]
@@ -54,7 +54,7 @@ def coinciding(model: Model, gap: float = GAP) -> list[tuple[Edge, Side, Side]]:
         off, uv = _carried(edge.points, other)
         if np.linalg.norm(off, axis=1).max() <= gap * reach(model, edge, other):
             side = Side(other.sides[0].face, uv=uv) if uv is not None else _baked(edge.points - off, other)
-            found[i, j] = (edge, edge.sides[0], side)
+            found[i, j] = (edge, other, (edge.sides[0], side))
     return list(found.values())
 
 

@@ -97,10 +97,11 @@ class Meeting:
     faces: tuple[int, ...]
 
     def with_(self, other: Meeting | None) -> Meeting:
-        """The same with what is known of it from elsewhere."""
+        """The same with what is known of it elsewhere along the edge."""
         if other is None:
             return self
-        return Meeting(max(self.order, other.order), max(self.gap, other.gap), self.faces)
+        faces = (*self.faces, *(face for face in other.faces if face not in self.faces))
+        return Meeting(max(self.order, other.order), max(self.gap, other.gap), faces)
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,11 +146,12 @@ def seams(model: Model, movable: Collection[int], wishes: Wishes) -> Seams:
     """
     own = [edge for edge in model.edges if any(side.face in movable for side in edge.sides)]
     sewn = [(edge, edge.sides) for edge in own if len(edge.sides) == 2 and not edge.degenerate and len(edge.points)]
-    unsewn = [(edge, (one, two)) for edge, one, two in coinciding(model) if one.face in movable or two.face in movable]
-    result = Seams(meetings=_meetings(model, wishes, [*sewn, *unsewn]))
+    unsewn = [each for each in coinciding(model) if any(side.face in movable for side in each[2])]
+    every = [*((edge, edge, sides) for edge, sides in sewn), *unsewn]
+    result = Seams(meetings=_meetings(model, wishes, every))
     for edge in own:
         _sort(result, edge, _still(edge, wishes) or _seam(result, model, movable, wishes, (edge, edge), edge.sides))
-    for edge, sides in unsewn:
+    for edge, _, sides in unsewn:
         _unsewn(result, model, movable, wishes, edge, sides)
     for index in touching(model) & result.frozen.keys():
         if result.frozen[index] == FREE:
@@ -157,15 +159,16 @@ def seams(model: Model, movable: Collection[int], wishes: Wishes) -> Seams:
     return result
 
 
-def _meetings(model: Model, wishes: Wishes, found: Sequence[tuple[Edge, Sequence[Side]]]) -> dict[int, Meeting]:
-    """How two faces meet at edges."""
-    looks = views(model, [(edge, side) for edge, sides in found for side in sides])
+def _meetings(model: Model, wishes: Wishes, found: Sequence[tuple[Edge, Edge, Sequence[Side]]]) -> dict[int, Meeting]:
+    """How two faces meet at edges: at one, or at an edge and another one of which it is a part or the whole."""
+    looks = views(model, [(edge, side) for edge, _, sides in found for side in sides])
     result: dict[int, Meeting] = {}
-    for (edge, sides), a, b in zip(found, looks[::2], looks[1::2], strict=True):
+    for (edge, other, sides), a, b in zip(found, looks[::2], looks[1::2], strict=True):
         order = wishes.order(between(a[:, 3:6], b[:, 3:6]), a[:, 6], b[:, 6])
         gap = float(np.linalg.norm(across(a[:, :3] - b[:, :3], edge.tangents), axis=1).max())
-        meeting = Meeting(order, gap, tuple(side.face for side in sides))
-        result[edge.index] = meeting.with_(result.get(edge.index))
+        for each in (edge, other):
+            meeting = Meeting(order, gap, tuple(side.face for side in sides))
+            result[each.index] = meeting.with_(result.get(each.index))
     return result
 
 
@@ -197,8 +200,6 @@ def _unsewn(
 ) -> None:
     """Look at a free edge that coincides with one of another face."""
     other = _twin(model, edge, sides[1].face)
-    if other:
-        result.meetings[other.index] = result.meetings[edge.index].with_(result.meetings.get(other.index))
     if edge.index not in result.frozen or (other and other.index not in result.frozen):
         return
     if other is None:

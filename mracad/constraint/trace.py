@@ -156,16 +156,23 @@ def derived(table: Sequence[Array], way: Array, bend: Array, order: int) -> Arra
     return twice + bend[:, :1] * table[1] + bend[:, 1:] * table[2]
 
 
-def conormals(ground: Mapping[int, Net], a: Trace, b: Trace, share: Array) -> list[tuple[Array, Array]]:
-    """For a and b the directions c and z ``(q, 2)`` in the parameter planes."""
+def directions(ground: Mapping[int, Net], a: Trace, b: Trace, share: Array) -> list[tuple[Array, Array, Array]]:
+    """For a and b the directions c, z and t ``(q, 2)`` in the parameter planes, t the unit tangent of a."""
     _, su, sv, *second = a.on(ground[a.surface], share, 2)
     way = a.way(share)
-    conormal = np.cross(np.cross(su, sv), su * way[:, :1] + sv * way[:, 1:])
-    conormal /= np.maximum(np.linalg.norm(conormal, axis=1, keepdims=True), 1e-300)
+    tangent = _unit(su * way[:, :1] + sv * way[:, 1:])
+    conormal = _unit(np.cross(np.cross(su, sv), tangent))
     _, tu, tv, *other = b.on(ground[b.surface], share, 2)
     ways = _components(su, sv, conormal), _components(tu, tv, conormal)
     bends = [_twice(x, y) for x, y in zip(ways, (second, other), strict=True)]
-    return [(ways[0], np.zeros_like(way)), (ways[1], _components(tu, tv, bends[0] - bends[1]))]
+    return [
+        (ways[0], np.zeros_like(way), _components(su, sv, tangent)),
+        (ways[1], _components(tu, tv, bends[0] - bends[1]), _components(tu, tv, tangent)),
+    ]
+
+
+def _unit(vectors: Array) -> Array:
+    return vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-300)
 
 
 def _twice(way: Array, second: Sequence[Array]) -> Array:

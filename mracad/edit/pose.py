@@ -68,7 +68,8 @@ class Scene:
         meeting, edge = joined.meetings.get(contact.edge), self.model.edges[contact.edge]
         if meeting is None:
             return t.gap, t.angle, t.bend / width
-        sharing = max(sum(self.model.faces[face].surface in self.sheets for face in meeting.faces), 1)
+        moving = sum(self.model.faces[face].surface in self.sheets for face in meeting.faces)
+        sharing = min(max(moving, 1), 2)
         return t.wider(edge, meeting.gap) / sharing, t.angle / sharing, t.bend / width / sharing
 
 

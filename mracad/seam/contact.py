@@ -3,9 +3,10 @@
 They cannot be kept exactly without freezing all that meets the curve.  A displacement δ is instead asked, at Gauss
 points of every piece between knot lines of either side,
 
-    G0   δ_b = δ_a,      G1   D_c δ_b = D_c δ_a,      G2   D_c² δ_b + D_z δ_b = D_c² δ_a
+    G0   δ_b = δ_a,      G1   D_c δ_b = D_c δ_a,  D_t δ_b = D_t δ_a      G2   D_c² δ_b + D_z δ_b = D_c² δ_a
 
-(δ_b = 0 at a rim; directions as in :mod:`mracad.constraint.trimmed`), weighted with the inverse square of what each may
+(δ_b = 0 at a rim; directions as in :mod:`mracad.constraint.trimmed`, t along the trace: what is off by next to nothing
+still tilts a surface where its knots are close), weighted with the inverse square of what each may
 lack: where the net can, it does, and where it cannot δ gives way.  What two noisy sides lack already is their noise:
 conditions are drawn towards surfaces that meet, the more gently the more they lacked.
 """
@@ -20,7 +21,7 @@ import numpy as np
 
 from mracad.bspline.functions import functions
 from mracad.bspline.net import Net
-from mracad.constraint.trace import Trace, conormals, crossings, derived
+from mracad.constraint.trace import Trace, crossings, derived, directions
 from mracad.seam.conditions import laid_out
 
 Array = np.ndarray
@@ -135,16 +136,16 @@ def rows(nets: Mapping[int, Net], contacts: Sequence[Contact]) -> Rows:
     for number, contact in enumerate(contacts):
         sides = [contact.a] + ([contact.b] if contact.b else [])
         share, part = _sites(sides, nets)
-        ways = conormals(nets, contact.a, contact.b or contact.a, share)
+        ways = directions(nets, contact.a, contact.b or contact.a, share)
         curve = nets[contact.a.surface].evaluate(contact.a.places(_EVENLY))
         width = np.linalg.norm(np.diff(curve, axis=0), axis=1).sum() * part
-        for order in range(contact.since, contact.order + 1):
+        for order, along in _asked(contact):
             row = count + np.arange(len(share))
-            for side, (way, bend), sign in zip(sides, ways, (1.0, -1.0), strict=False):
+            for side, (way, bend, tangent), sign in zip(sides, ways, (1.0, -1.0), strict=False):
                 index, table = functions(nets[side.surface], side.places(share), order, side.limits)
                 places.append(np.repeat(row, index.shape[1]))
                 columns.append(first[side.surface] + index.ravel())
-                values.append(sign * derived(table, way, bend, order).ravel())
+                values.append(sign * derived(table, tangent if along else way, bend, order).ravel())
             orders.append(np.full(len(share), order))
             widths.append(width)
             owners.append(np.full(len(share), number))
@@ -153,6 +154,12 @@ def rows(nets: Mapping[int, Net], contacts: Sequence[Contact]) -> Rows:
         (np.concatenate(values), (np.concatenate(places), np.concatenate(columns))), shape=(count, total)
     )
     return Rows(matrix, np.concatenate(orders), np.concatenate(widths), np.concatenate(owners))
+
+
+def _asked(contact: Contact) -> list[tuple[int, bool]]:
+    """The orders of the derivatives that are asked of a contact, those across it and that along it."""
+    orders = range(contact.since, contact.order + 1)
+    return [*((order, False) for order in orders), *((order, True) for order in orders if order == 1)]
 
 
 def _sites(sides: Sequence[Trace], nets: Mapping[int, Net]) -> tuple[Array, Array]:

@@ -37,7 +37,7 @@ def faces(lifts=(), size=1.0, spans=6):
 
 
 def pairs(model, gap=1.0):
-    return {(edge.index, one.face, two.face) for edge, one, two in coinciding(model, gap)}
+    return {(edge.index, one.face, two.face) for edge, _, (one, two) in coinciding(model, gap)}
 
 
 def at(x=0.0):

@@ -106,7 +106,7 @@ def test_an_edit_is_done_again_a_bounded_number_of_times(monkeypatch):
     """Then all that seams join to what came out worse is left, and the rest is edited."""
     stub, document = Stub(), chains(job.ROUNDS + 6, 3)
     row = range(job.ROUNDS + 6)
-    monkeypatch.setattr(job, "_torn", first_edited(row))
+    monkeypatch.setattr(job, "torn", first_edited(row))
     report = job.run(document, stub, Smooth(level=1))
     assert stub.rounds == job.ROUNDS + 2
     left = report.edit.faces("left")
@@ -117,7 +117,7 @@ def test_an_edit_is_done_again_a_bounded_number_of_times(monkeypatch):
 
 def test_an_edit_that_never_comes_out_is_refused_after_these_rounds(monkeypatch):
     stub, document = Stub(), chains(*[1] * (job.ROUNDS + 4))
-    monkeypatch.setattr(job, "_torn", first_edited(range(job.ROUNDS + 4)))
+    monkeypatch.setattr(job, "torn", first_edited(range(job.ROUNDS + 4)))
     with pytest.raises(EditError, match=f"#{job.ROUNDS + 2} would come out worse") as caught:
         job.run(document, stub, Smooth(level=1))
     assert caught.value.code == Code.CANNOT_EDIT and stub.rounds == job.ROUNDS + 2
@@ -131,7 +131,7 @@ def test_an_edit_that_fails_for_a_face_that_had_to_stay_says_so(monkeypatch):
             raise EditError("the place is off the faces to edit", "give a point on one of them")
         return Stub()(model, options, scope=scope, progress=progress)
 
-    monkeypatch.setattr(job, "_torn", first_edited([1]))
+    monkeypatch.setattr(job, "torn", first_edited([1]))
     with pytest.raises(EditError, match="#2 cannot be edited: its seams would not hold; choose other faces"):
         job.run(chains(3), edit, Smooth(level=1))
     with pytest.raises(EditError, match="off the faces to edit"):

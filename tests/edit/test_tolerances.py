@@ -6,13 +6,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mracad import job
 from mracad.audit.continuity import seams
+from mracad.audit.torn import gaps, torn
 from mracad.constraint.seam import Treatment
 from mracad.constraint.wishes import Wishes
 from mracad.edit.fair import Filter
 from mracad.edit.pose import Scene
-from mracad.edit.result import Edit
+from mracad.edit.result import Edit, FaceOutcome
 from mracad.edit.target import sheets
 from mracad.edit.tolerances import MORE, Tolerances, tolerances
 from mracad.model import Displacement
@@ -84,17 +84,22 @@ def test_the_verdict_allows_what_rims_are_aimed_at(model, how, keep, most):
         before, after = shifted(model, offset)
         edge = before[0].edge
         edit = Edit(Displacement({}), (), edges=(Treatment(edge, before[0].faces, how),))
-        torn = job._torn(model, before, after, edit, Tolerances(gap=1e-4), keep)
+        found = torn(model, before, after, edit, Tolerances(gap=1e-4), keep)
         grown = after[0].gap - before[0].gap
         wider = most - before[0].gap if how == "frozen" else most
-        assert torn == (set(before[0].faces) if grown > wider else set())
+        assert found == (set(before[0].faces) if grown > wider else set())
+        edited = replace(edit, outcomes=(FaceOutcome(0, "edited"),))
+        widest = {(0, 1): pytest.approx(before[0].gap + wider)} if how != "mended" else {}
+        assert gaps(model, before, edited, Tolerances(gap=1e-4)) == widest and not gaps(
+            model, before, edit, Tolerances()
+        )
 
 
 def test_a_smooth_seam_may_not_turn_further(model):
     before = [replace(seams(model)[0], angle=0.5)]
     assert before[0].smooth
     edit = Edit(Displacement({}), ())
-    for angle, keep, torn in ((0.009, "as-is", False), (0.011, "as-is", True), (0.011, "g0", False)):
+    for angle, keep, bent in ((0.009, "as-is", False), (0.011, "as-is", True), (0.011, "g0", False)):
         after = [replace(before[0], angle=before[0].angle + angle)]
-        assert bool(job._torn(model, before, after, edit, Tolerances(), keep)) == torn
+        assert bool(torn(model, before, after, edit, Tolerances(), keep)) == bent
     assert math.degrees(Tolerances().angle) == pytest.approx(0.01)

@@ -30,14 +30,14 @@ def field(net, function):
     ("function", "squares"),
     [
         (lambda x, y: 1 + 0 * x, (1.0, 0.0, 0.0)),
-        (lambda x, y: x, (1 / 3, 0.5, 0.0)),
+        (lambda x, y: x, (1 / 3, 1.0, 0.0)),
         (lambda x, y: x - y, (0.0, 2.0, 0.0)),
-        (lambda x, y: x**2, (1 / 5, 2 / 3, 1.0)),
+        (lambda x, y: x**2, (1 / 5, 4 / 3, 1.0)),
         (lambda x, y: (x - y) ** 2, (0.0, 0.0, 16.0)),
     ],
 )
 def test_squares_along_the_diagonal_of_a_plane(function, squares):
-    """Means over the diagonal of δ², (D_c δ)² and (D_c² δ)², c = (1, −1) / √2."""
+    """Means over the diagonal of δ², |∇δ|² and (D_c² δ)², c = (1, −1) / √2."""
     net = plane(5)
     found = rows({0: net}, [Contact(Trace(0, 0, segment((0, 0), (1, 1))), None, 2)])
     delta = field(net, function)
@@ -84,9 +84,11 @@ def test_rows_on_a_curved_surface_against_finite_differences():
     c = np.array([np.linalg.lstsq(np.stack([p, q], axis=1), r)[0] for p, q, r in zip(su, sv, conormal, strict=True)])
     h = 1e-4
     values = [moved.evaluate(uv + k * h * c)[:, 0] for k in (-1, 0, 1)]
-    expected = values[1], (values[2] - values[0]) / (2 * h), (values[2] - 2 * values[1] + values[0]) / h**2
-    length = (weight * np.linalg.norm(tangent, axis=1)).sum()
-    for order, each in enumerate(expected):
+    speed = np.linalg.norm(tangent, axis=1)
+    along = [moved.evaluate(uv + k * h * way / speed[:, None])[:, 0] for k in (-1, 1)]
+    slope = np.hypot(values[2] - values[0], along[1] - along[0]) / (2 * h)
+    length = (weight * speed).sum()
+    for order, each in enumerate((values[1], slope, (values[2] - 2 * values[1] + values[0]) / h**2)):
         value = (delta.T @ found.form(only(found, order)) @ delta).item()
         assert value == pytest.approx(length * (each**2 * weight).sum(), rel=1e-3), order
 
@@ -107,11 +109,14 @@ def test_rows_are_the_derivatives_at_their_places():
     c = np.stack([np.ones_like(e), -f / g], axis=1) / np.sqrt(e - f * f / g)[:, None]  # across, of length 1
     h = 1e-4
     values = [moved.evaluate(uv + k * h * c) for k in (-1, 0, 1)]
-    expected = values[1], (values[2] - values[0]) / (2 * h), (values[2] - 2 * values[1] + values[0]) / h**2
-    for order, near in enumerate((1e-12, 1e-4, 1e-4)):
-        own = (found.matrix @ delta)[found.order == order]
-        sign = 1.0 if order != 1 or (own * expected[1]).sum() > 0 else -1.0
-        assert np.abs(own - sign * expected[order]).max() < near * max(1.0, np.abs(expected[order]).max())
+    t = (stop - start) / np.linalg.norm(sv, axis=1)[:, None] / 0.8
+    along = [moved.evaluate(uv + k * h * t) for k in (-1, 1)]
+    bent = (values[2] - 2 * values[1] + values[0]) / h**2
+    expected = values[1], (values[2] - values[0]) / (2 * h), bent, (along[1] - along[0]) / (2 * h)
+    for each, own, near in zip(expected, np.split(found.matrix @ delta, 4), (1e-12, 1e-4, 1e-4, 1e-4), strict=True):
+        sign = 1.0 if (own * each).sum() > 0 else -1.0
+        assert np.abs(own - sign * each).max() < near * max(1.0, np.abs(each).max())
+    assert np.array_equal(found.order, np.repeat([0, 1, 2, 1], len(share)))
     assert (found.owner == 0).all()
 
 
