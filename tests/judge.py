@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -65,11 +65,26 @@ def kernel_copy(source: Path, target: Path) -> Path:
     return target
 
 
-LOOSE = 1e-4, 0.01
-"""Gap, mm, that a seam that moved to the tolerance may have, and how much its angle may have grown, degrees."""
+GAP, LEAST, MORE = 1e-4, 1e-5, 0.02
+"""``--gap-tolerance``, mm; gap of any edge that counts for none, mm; share by which one may be wider that is as wide as
+may be."""
 
-SAMPLED = 1.05
-"""The gap of such a seam is not wider anywhere than it was at its widest; at the places of the measure it may be."""
+STEEPER = 0.01
+"""How much the angle of a smooth seam may grow beside faces that moved, degrees."""
+
+
+def allowed(source: Verdict, loose: Collection[tuple], held: Collection[tuple]) -> dict[tuple[int, int], float]:
+    """How wide seams may be, mm: of those that move to the tolerance, and of those that are held beside a face that
+    moves, which keep to the tolerances of their edges."""
+    found: dict[tuple[int, int], float] = defaultdict(float)
+    for measure in source.seams:
+        faces = min(measure.faces), max(measure.faces)
+        if faces in held:
+            tolerance = source.model.edges[measure.edge].tolerance
+            found[faces] = max(found[faces], min(max(tolerance, LEAST), GAP), (1 + MORE) * measure.gap)
+        if faces in loose:
+            found[faces] = max(found[faces], measure.gap + GAP)
+    return found
 
 
 def assert_as_good(
@@ -77,33 +92,29 @@ def assert_as_good(
     yardstick: Verdict,
     refined: Collection[int] = (),
     coupled: Collection[tuple] = (),
-    loose: Collection[tuple] = (),
-    source: Verdict | None = None,
+    widest: Mapping[tuple[int, int], float] | None = None,
 ) -> None:
     """The output is as good as the kernel's own copy of the input.
 
-    ``coupled`` are pairs of faces whose seams moved exactly, ``loose`` those whose seams moved to the tolerance: these
-    are as good as those of the ``source`` (the reader heals some seams of its own copy).  On ``refined`` faces the
-    reader lays new curves (within the old tolerance), and where the normal turns quickly it turns a few thousandths of
-    a degree at those.
+    ``coupled`` are pairs of faces whose seams moved exactly, ``widest`` says how wide others may be (:func:`allowed`).
+    On ``refined`` faces the reader lays new curves (within the old tolerance), and where the normal turns quickly it
+    turns a few thousandths of a degree at those.
     """
+    widest = widest or {}
     new, old = result.validity, yardstick.validity
     assert new.valid or not old.valid, new.failures[:5]
     assert (new.solids, new.shells, new.faces) == (old.solids, old.shells, old.faces)
     assert new.free_edges <= old.free_edges
-    assert result.tolerance <= max([yardstick.tolerance, *([LOOSE[0], source.tolerance] if loose else [])]) + 1e-7
+    assert result.tolerance <= max([yardstick.tolerance, *widest.values()]) + 1e-7
     ours, theirs = _by_faces(result.seams), _by_faces(yardstick.seams)
-    widest = {faces: max(m.gap for m in found) for faces, found in _by_faces(source.seams).items()} if loose else {}
     assert ours.keys() == theirs.keys()
     for faces, found in ours.items():
         before = theirs[faces]
         assert len(found) == len(before)
         for new_gap, old_gap in zip(*(sorted(m.gap for m in each) for each in (found, before)), strict=True):
-            limit = old_gap + (1e-6 if faces in coupled else 1e-7)
-            if faces in loose:
-                limit = max(limit, SAMPLED * widest[faces], LOOSE[0])
+            limit = max(old_gap + (1e-6 if faces in coupled else 1e-7), widest.get(faces, 0.0))
             assert new_gap <= limit, (faces, old_gap)
-        steeper = LOOSE[1] if faces in loose or not set(faces).isdisjoint(refined) else 1e-4
+        steeper = STEEPER if faces in widest or not set(faces).isdisjoint(refined) else 1e-4
         smooth = [sorted(m.angle for m in each if m.smooth) for each in (found, before)]
         for new_angle, old_angle in zip(*smooth, strict=True):
             assert new_angle <= old_angle + steeper, faces

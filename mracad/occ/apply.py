@@ -22,7 +22,7 @@ from mracad.occ.settings import quiet
 from mracad.occ.topology import edge_uses
 
 Array = np.ndarray
-_STILL = 1e-9  # mm: an edge that moves by less keeps its curve
+_STILL = 1e-9, 0.01  # mm, or of its tolerance: an edge that moves by less keeps its curve
 
 
 def apply(document: Document, model: Model, displacement: Displacement) -> None:
@@ -146,9 +146,10 @@ def _moved_edges(model: Model, displacement: Displacement) -> dict[int, int]:
             net = offset.over(model.surfaces[index].net)
             change = Net(net.u, net.v, offset.poles, net.weights)
             along = change.evaluate(np.concatenate([uv for *_, uv in sides[index]]))
-            far = np.linalg.norm(along, axis=1) > _STILL
             starts = np.cumsum([0, *(len(uv) for *_, uv in sides[index][:-1])])
-            beyond = np.logical_or.reduceat(far, starts)
+            far = np.maximum.reduceat(np.linalg.norm(along, axis=1), starts)
+            loose = np.array([model.edges[edge].tolerance for edge, *_ in sides[index]])
+            beyond = far > np.maximum(_STILL[0], _STILL[1] * loose)
             moved |= {edge: face for (edge, face, _), off in zip(sides[index], beyond, strict=True) if off}
     return dict(sorted(moved.items()))
 

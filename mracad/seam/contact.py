@@ -3,10 +3,10 @@
 They cannot be kept exactly without freezing all that meets the curve.  A displacement δ is instead asked, at Gauss
 points of every piece between knot lines of either side,
 
-    G0   δ_b = δ_a,      G1   D_c δ_b = D_c δ_a,  D_t δ_b = D_t δ_a      G2   D_c² δ_b + D_z δ_b = D_c² δ_a
+    G0   δ_b = δ_a,      G1   D_c δ_b = D_c δ_a,      G2   D_c² δ_b + D_z δ_b = D_c² δ_a
 
-(δ_b = 0 at a rim; directions as in :mod:`mracad.constraint.trimmed`, t along the trace: what is off by next to nothing
-still tilts a surface where its knots are close), weighted with the inverse square of what each may
+(δ_b = 0 at a rim, and with G1 D_t δ_a = 0, t along it: what is off by next to nothing still tilts a surface where its
+knots are close; directions as in :mod:`mracad.constraint.trimmed`), weighted with the inverse square of what each may
 lack: where the net can, it does, and where it cannot δ gives way.  What two noisy sides lack already is their noise:
 conditions are drawn towards surfaces that meet, the more gently the more they lacked.
 """
@@ -159,7 +159,7 @@ def rows(nets: Mapping[int, Net], contacts: Sequence[Contact]) -> Rows:
 def _asked(contact: Contact) -> list[tuple[int, bool]]:
     """The orders of the derivatives that are asked of a contact, those across it and that along it."""
     orders = range(contact.since, contact.order + 1)
-    return [*((order, False) for order in orders), *((order, True) for order in orders if order == 1)]
+    return [*((order, False) for order in orders), *((order, True) for order in orders if order == 1 and not contact.b)]
 
 
 def _sites(sides: Sequence[Trace], nets: Mapping[int, Net]) -> tuple[Array, Array]:

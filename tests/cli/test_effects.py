@@ -168,7 +168,7 @@ def folder(small, tmp_path_factory):
         (place / path.name).write_bytes(path.read_bytes())
     (place / "recipe.toml").write_text(declared.RECIPE)
     ruled_strip(place / "strip.step")
-    mracad.write(halves.document(*halves.quiet(0.3, (10, 20))), place / "halves.step")
+    mracad.write(halves.document(*halves.surfaces(0.05, (10, 14))[1:]), place / "halves.step")
     x, y = np.meshgrid(np.linspace(0, 10, 16), np.linspace(0, 10, 16), indexing="ij")
     near = [np.stack([x + dx, y, declared.heights(x + dx, y) + dz], axis=-1) for dx, dz in ((0, 0), (10, 4e-4))]
     bare = shapes.document(shapes.compound(*(shapes.face_on(shapes.bspline(poles)) for poles in near)))
