@@ -149,16 +149,17 @@ class _Placed:
 def _ladder(nets: Mapping[int, Net], creases: Mapping[int, Creases], members: Mapping[Direction, Map]) -> Ladder:
     """The ladder on the union of the members' own knots.
 
-    A level is as dense as those of the members are on average, and of the lowest degree whose splines all of them hold.
+    A level is the densest that is no denser than those of the members are on average, and of the lowest degree whose
+    splines all of them hold.
     """
     degrees = [(nets[i].u, nets[i].v)[axis].degree for i, axis in members]
     placed = [_placed(nets[m[0]], creases[m[0]][m[1]], m[1], way, min(degrees)) for m, way in members.items()]
     union, copies = _union(placed, [max(degrees) - degree for degree in degrees])
     rungs, each = union.rungs(), [(one, one.rungs()) for one in placed]
-    have, levels = np.array([union.density(rung) for rung in rungs]), [rungs[0]]
+    both, levels = [(rung, union.density(rung)) for rung in rungs], [rungs[0]]
     for level in range(1, max(len(those) for _, those in each)):
         wanted = np.mean([one.density(those[min(level, len(those) - 1)]) for one, those in each])
-        levels.append(rungs[int(np.abs(have - wanted).argmin())])
+        levels.append(next((rung for rung, density in both if density <= wanted + SAME), rungs[-1]))
     sharp = {m: one.sharp for m, one in zip(members, placed, strict=True)}
     return Ladder(members, levels, (max(degrees), max(min(degrees), max(degrees) + 1 - copies)), sharp)
 

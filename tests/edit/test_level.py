@@ -20,7 +20,7 @@ from mracad.wavelet.project import projection
 from tests.edit import halves, panels
 from tests.edit.models import sheet
 from tests.edit.test_fair import beside, rough
-from tests.edit.test_seams import other_degrees, other_senses, skewed
+from tests.edit.test_seams import other_degrees, other_knots, other_senses, skewed
 
 SPANS, NOISE = 16, 0.3
 
@@ -153,6 +153,12 @@ def test_a_level_of_patches_is_a_level_of_the_surface_they_make(shape, keep):
 @pytest.mark.parametrize("keep", ["g1", "g2"])
 def test_patches_that_differ_come_as_close(change, keep):
     assert figures((2, 3), keep, change) <= 1.02
+
+
+@pytest.mark.parametrize("keep", ["g1", "g2"])
+def test_patches_with_knots_of_their_own_come_close(keep):
+    """Their level is one of all knots along a strip, no denser than those of the patches are on average."""
+    assert figures((2, 3), keep, other_knots) <= 1.05
 
 
 def test_a_joint_of_varying_ratio_does_not_lock():
