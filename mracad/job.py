@@ -284,7 +284,7 @@ def _with_notes(
     after: list[SeamMeasure],
 ) -> Edit:
     """An edit with notes of what was to be mended and is not."""
-    reasons = {treatment.edge: treatment.reason for treatment in edit.edges if treatment.reason}
+    reasons = {treatment.edge: str(treatment.reason) for treatment in edit.edges if treatment.reason}
     return replace(edit, notes=(*edit.notes, *unmended(options, model.diagonal, movable, before, after, reasons)))
 
 

@@ -185,7 +185,7 @@ def edge_words(edges: tuple[Treatment, ...]) -> str:
     """What was done about the edges of the edited faces."""
     moved = sum(e.how != "frozen" for e in edges)
     loose = sum(e.how == "to tolerance" for e in edges)
-    why = Counter(e.reason for e in edges if e.reason)
+    why = Counter(str(e.reason) for e in edges if e.reason)
     reasons = ", ".join(f"{count} {reason}" for reason, count in why.most_common(REASONS))
     reasons += ", …" if len(why) > REASONS else ""
     words = f"{moved} of {plural(len(edges), 'edge')} moved with both faces"
@@ -246,6 +246,12 @@ def outcome(value: FaceOutcome) -> dict[str, Any]:
     return {**plain(value), "face": value.face + 1}
 
 
+def treatment(value: Treatment) -> dict[str, Any]:
+    """What was done about an edge; the edge and its faces by number."""
+    faces, reason = [i + 1 for i in value.faces], "" if value.reason is None else str(value.reason)
+    return {**plain(value), "edge": value.edge + 1, "faces": faces, "reason": reason}
+
+
 def seam(value: SeamMeasure) -> dict[str, Any]:
     """One seam; its faces by number."""
     return {
@@ -278,7 +284,7 @@ def report(value: Report) -> dict[str, Any]:
         "diagonal": value.model.diagonal,
         "counts": dict(Counter(o.status for o in value.edit.outcomes)),
         "faces": [outcome(o) for o in value.edit.outcomes],
-        "edges": [{**plain(e), "edge": e.edge + 1, "faces": [i + 1 for i in e.faces]} for e in value.edit.edges],
+        "edges": [treatment(e) for e in value.edit.edges],
         "copies": [{**plain(c), "faces": [i + 1 for i in c.faces]} for c in value.edit.copies],
         "control_points": dict(zip(("before", "after"), control_points(value), strict=True)),
         "notes": list(value.edit.notes),

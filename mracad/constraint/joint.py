@@ -17,14 +17,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mracad.constraint.border import SHARES, Border, Jet, outward
+from mracad.constraint.cause import Cause, Still
 from mracad.constraint.sides import between
 from mracad.constraint.wishes import Wishes
 from mracad.model import Model
 
 Array = np.ndarray
-
-UNEVEN = "parameters differ along the seam"
-"""Why a seam cannot move exactly whose joint has no law, though it may to a tolerance."""
 
 SLIP = 1e-4
 """Largest distance between points of equal parameter measured along the seam, as a share of its length."""
@@ -81,17 +79,17 @@ class Joint:
 
 def joint_of(
     model: Model, borders: tuple[Border, Border], found: tuple[Jet, Jet], order: int, wishes: Wishes
-) -> Joint | str:
+) -> Joint | Cause:
     """The joint between two borders, as much of an order as has a law; or why there is none."""
     (a, b), ((s, sn, st, snn), (t, tn, tt, tnn)) = borders, found
     length = np.linalg.norm(st, axis=1).mean()
     slip = np.abs(((s - t) * st).sum(axis=1) / np.maximum(np.linalg.norm(st, axis=1), 1e-12 * length)).max()
     if slip > SLIP * length:
-        return UNEVEN
+        return Cause(Still.UNEVEN)
     normals = outward(model, a, sn, st), outward(model, b, tn, tt)
     sizes = [np.linalg.norm(n, axis=1) for n in normals]
     if min(size.min() / max(size.max(), 1e-300) for size in sizes) < 1e-9:
-        return "degenerate along the seam"
+        return Cause(Still.DEGENERATE)
     close = wishes.close_gaps
     if order == 0:
         return Joint(0, np.ones(1), np.empty(0), close=close)

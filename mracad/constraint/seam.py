@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from mracad.constraint.border import SHARES, Border, border, jets, opened
+from mracad.constraint.cause import Cause, Still
 from mracad.constraint.coincide import apart, coinciding, length, reach, touching
 from mracad.constraint.frozen import CONTINUITY, ISO
 from mracad.constraint.joint import Joint, joint_of
@@ -16,13 +17,6 @@ from mracad.constraint.wishes import Wishes
 from mracad.model import Edge, Model, Side
 
 Array = np.ndarray
-
-TRIMMED = "trimmed"
-"""Why a seam cannot move exactly that is no parameter line of both surfaces, though it may to a tolerance."""
-
-HELD = "held by --hold"
-
-FREE, ELSEWHERE = "free edge", "touches another instance, which moves by itself"
 
 WHOLE = 1e-2
 """Edges that coincide and differ by less than this in length coincide as a whole."""
@@ -69,14 +63,14 @@ class Treatment:
         Faces that meet there.
     how : {"coupled", "to tolerance", "mended", "frozen"}
         ``mended``: it moves as a coupled one does, and its gap or tilt is pulled shut.
-    reason : str
+    reason : Cause or None
         Why it is frozen.
     """
 
     edge: int
     faces: tuple[int, ...]
     how: str
-    reason: str = ""
+    reason: Cause | None = None
 
 
 @dataclass(frozen=True)
@@ -114,7 +108,7 @@ class Seams:
         Those that can move exactly.
     closing : dict of int to (Border, Border)
         Closing edges inside a periodic direction, which its spline space keeps as smooth as its knots say by itself.
-    frozen : dict of int to str
+    frozen : dict of int to Cause
         Every other edge, and why it does not move.
     twins : dict of int to int
         Free edges that coincide with another one, as a whole.
@@ -124,7 +118,7 @@ class Seams:
 
     found: list[Seam] = field(default_factory=list)
     closing: dict[int, tuple[Border, Border]] = field(default_factory=dict)
-    frozen: dict[int, str] = field(default_factory=dict)
+    frozen: dict[int, Cause] = field(default_factory=dict)
     twins: dict[int, int] = field(default_factory=dict)
     meetings: dict[int, Meeting] = field(default_factory=dict)
 
@@ -154,8 +148,8 @@ def seams(model: Model, movable: Collection[int], wishes: Wishes) -> Seams:
     for edge, _, sides in unsewn:
         _unsewn(result, model, movable, wishes, edge, sides)
     for index in touching(model) & result.frozen.keys():
-        if result.frozen[index] == FREE:
-            result.frozen[index] = ELSEWHERE
+        if result.frozen[index].still is Still.FREE:
+            result.frozen[index] = Cause(Still.ELSEWHERE)
     return result
 
 
@@ -172,24 +166,24 @@ def _meetings(model: Model, wishes: Wishes, found: Sequence[tuple[Edge, Edge, Se
     return result
 
 
-def _still(edge: Edge, wishes: Wishes) -> str:
-    """Why an edge stays whatever its faces do; empty where it may move."""
+def _still(edge: Edge, wishes: Wishes) -> Cause | None:
+    """Why an edge stays whatever its faces do; None where it may move."""
     if edge.index in wishes.hold:
-        return HELD
+        return Cause(Still.HELD)
     if edge.degenerate:
-        return "pole"
+        return Cause(Still.POLE)
     if len(edge.sides) == 1:
-        return FREE
-    return "more than two faces" if len(edge.sides) > 2 else ""
+        return Cause(Still.FREE)
+    return Cause(Still.CROWDED) if len(edge.sides) > 2 else None
 
 
-def _sort(result: Seams, edge: Edge, seam: Seam | str | tuple[Border, Border]) -> None:
+def _sort(result: Seams, edge: Edge, seam: Seam | Cause | tuple[Border, Border]) -> None:
     """Put what is known of an edge where it belongs."""
     if isinstance(seam, Seam):
         result.found.append(seam)
         for each in (seam.edge, seam.twin):
             result.frozen.pop(each, None)
-    elif isinstance(seam, str):
+    elif isinstance(seam, Cause):
         result.frozen[edge.index] = seam
     else:
         result.closing[edge.index] = seam
@@ -203,11 +197,11 @@ def _unsewn(
     if edge.index not in result.frozen or (other and other.index not in result.frozen):
         return
     if other is None:
-        result.frozen[edge.index] = "coincides with a part of another edge"
+        result.frozen[edge.index] = Cause(Still.PART)
         return
     result.twins[edge.index] = other.index
     if wishes.hold & {edge.index, other.index}:
-        result.frozen.update(dict.fromkeys((edge.index, other.index), HELD))
+        result.frozen.update(dict.fromkeys((edge.index, other.index), Cause(Still.HELD)))
         return
     seam = _seam(result, model, movable, wishes, (edge, other), (sides[0], other.sides[0]))
     if not isinstance(seam, tuple):
@@ -240,18 +234,18 @@ def _seam(
     wishes: Wishes,
     edges: tuple[Edge, Edge],
     sides: Sequence[Side],
-) -> Seam | str | tuple[Border, Border]:
+) -> Seam | Cause | tuple[Border, Border]:
     """The seam, why there is none, or its borders where a periodic space closes it."""
     if reason := _fixed(model, movable, sides):
         return reason
     a, b = (border(model, edge, side, use) for use, (edge, side) in enumerate(zip(edges, sides, strict=True)))
     if a is None or b is None:
-        return TRIMMED
+        return Cause(Still.TRIMMED)
     if edges[0] is not edges[1] and runs_back(edges[0].points, edges[1].points):
         b = replace(b, start=b.stop, stop=b.start)
     fa, fb = model.faces[a.face], model.faces[b.face]
     if np.abs(fa.frame[:3, :3] - fb.frame[:3, :3]).max() > 1e-12:
-        return "faces are placed differently"
+        return Cause(Still.PLACED)
     if a.surface == b.surface and a.axis == b.axis:
         net = model.surfaces[a.surface].net
         knots = (net.u, net.v)[a.axis]
@@ -262,21 +256,21 @@ def _seam(
     if wishes.keep not in CONTINUITY:
         order = min(order, *(_room(model, border) for border in (a, b)))
     joint = joint_of(model, (a, b), found, order, wishes)
-    if isinstance(joint, str):
+    if isinstance(joint, Cause):
         return joint
     gap, angle = opened(model, (a, b), found)
     return Seam(edges[0].index, edges[1].index, a, b, joint, gap, angle, joint.order < order)
 
 
-def _fixed(model: Model, movable: Collection[int], sides: Sequence[Side]) -> str:
-    """Why one of two faces cannot move; empty where both can."""
+def _fixed(model: Model, movable: Collection[int], sides: Sequence[Side]) -> Cause | None:
+    """Why one of two faces cannot move; None where both can."""
     for side in sides:
         face = model.faces[side.face]
         if face.surface is None:
-            return f"{face.kind} neighbour"
+            return Cause(Still.ANALYTIC, face.kind)
         if side.face not in movable:
-            return "neighbour does not move"
-    return ""
+            return Cause(Still.NEIGHBOUR)
+    return None
 
 
 def _room(model: Model, border: Border) -> int:

@@ -18,7 +18,7 @@ import numpy as np
 
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.net import curvature
-from mracad.constraint.joint import UNEVEN
+from mracad.constraint.cause import Cause, Still
 from mracad.constraint.seam import Seam, runs_back
 from mracad.constraint.sides import across, between
 from mracad.constraint.trace import EVENLY, LOOKS, NEAR, Trace, along, crossings, trace_of
@@ -89,7 +89,7 @@ class TrimmedSeam:
         return share, (now / limit)[: self.order + 1].max(axis=0)
 
 
-def trimmed(model: Model, edge: Edge, twin: Edge, wishes: Wishes) -> TrimmedSeam | str:
+def trimmed(model: Model, edge: Edge, twin: Edge, wishes: Wishes) -> TrimmedSeam | Cause:
     """The seam of an edge between two NURBS faces along their trim curves, or why it cannot move.
 
     Parameters
@@ -101,14 +101,14 @@ def trimmed(model: Model, edge: Edge, twin: Edge, wishes: Wishes) -> TrimmedSeam
     """
     faces = [model.faces[i] for i in (edge.sides[0].face, twin.sides[-1].face)]
     if not np.allclose(faces[0].frame, faces[1].frame, rtol=0, atol=1e-12):
-        return "faces are placed differently"
+        return Cause(Still.PLACED)
     if faces[0] is faces[1]:
-        return "a face that meets itself"
+        return Cause(Still.ITSELF)
     a, b = (trace_of(model, face, _trim(face, each)) for face, each in zip(faces, (edge, twin), strict=True))
     if edge is not twin:
         fractions = _followed(model, a, b, runs_back(edge.points, twin.points))
         if (np.diff(fractions) * (fractions[-1] - fractions[0]) <= 0).any():
-            return UNEVEN
+            return Cause(Still.UNEVEN)
         b = replace(b, law=(EVENLY, fractions))
     return _judged(model, edge.index, twin.index, (a, b), wishes)
 
@@ -128,21 +128,21 @@ def _followed(model: Model, a: Trace, b: Trace, back: bool) -> Array:
     return np.concatenate([ends[:1], fractions[1:-1], ends[1:]])
 
 
-def beside(model: Model, seam: Seam, wishes: Wishes) -> TrimmedSeam | str:
+def beside(model: Model, seam: Seam, wishes: Wishes) -> TrimmedSeam | Cause:
     """What the joint of a seam does not keep, to the tolerance."""
     found = _judged(model, seam.edge, seam.twin, (along(seam.a), along(seam.b)), wishes)
     return replace(found, since=seam.joint.order + 1) if isinstance(found, TrimmedSeam) and seam.joint.order else found
 
 
-def _judged(model: Model, edge: int, twin: int, traces: tuple[Trace, Trace], wishes: Wishes) -> TrimmedSeam | str:
+def _judged(model: Model, edge: int, twin: int, traces: tuple[Trace, Trace], wishes: Wishes) -> TrimmedSeam | Cause:
     apart, angles, bends = _opened(model, traces, judged(model, traces))
     opening = np.array([apart.max(), angles.max(), np.abs(bends[0] - bends[1]).max()])
     angle = opening[1]
     if not np.isfinite(angle):
-        return "degenerate along the seam"
+        return Cause(Still.DEGENERATE)
     order = wishes.order(angles, *bends)
     if order == 2 and not np.isfinite(opening[2]):
-        return "no curvature along the seam"
+        return Cause(Still.FLAT)
     close, fit = wishes.close_gaps, order > 0 and bool(angle <= wishes.fit)
     return TrimmedSeam(edge, twin, *traces, order, opening, close, fit)
 

@@ -15,6 +15,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from mracad.bspline.net import Net
+from mracad.constraint.cause import Cause, Still
 from mracad.constraint.seam import Seam
 from mracad.constraint.trimmed import TrimmedSeam
 from mracad.edit.pose import Scene
@@ -32,9 +33,6 @@ ROUNDS = 4
 
 LEAST = 0.25
 """A surface of which less may be done is left, so that the others can do more."""
-
-APART, STAYS = "its faces get fairer each by itself", "a face there stays"
-"""Reasons for which a seam that could move does not."""
 
 FIRST = 2
 """Surfaces of a group of which each goes through by itself, so that all are tried together before the others are."""
@@ -162,14 +160,14 @@ def drive(scene: Scene, wish: Wish, progress: Callable[[int, int], None] | None 
     return Result(result, replace(used, frozen={**scene.joints.frozen, **_dropped(scene.joints, used, result)}))
 
 
-def _dropped(wanted: Joints, used: Joints, result: Mapping[int, Moved]) -> dict[int, str]:
+def _dropped(wanted: Joints, used: Joints, result: Mapping[int, Moved]) -> dict[int, Cause]:
     """Edges that could have moved and do not, and why."""
-    dropped: dict[int, str] = {}
+    dropped: dict[int, Cause] = {}
     every: list[Seam | TrimmedSeam] = [*wanted.exact, *wanted.loose]
     for seam in every:
         if seam.edge not in used.moving:
             both = all(side.surface in result and result[side.surface].amount > 0 for side in (seam.a, seam.b))
-            dropped |= dict.fromkeys((seam.edge, seam.twin), APART if both else STAYS)
+            dropped |= dict.fromkeys((seam.edge, seam.twin), Cause(Still.APART if both else Still.STAYS))
     return dropped
 
 

@@ -219,7 +219,7 @@ def _edit(model: Model, laid: Laid, scope: Scope) -> Edit:
         **dict.fromkeys(laid.moving, "coupled"),
     }
     edges = tuple(
-        Treatment(e, tuple(s.face for s in model.edges[e].sides), how, laid.frozen[e] if how == "frozen" else "")
+        Treatment(e, tuple(s.face for s in model.edges[e].sides), how, laid.frozen[e] if how == "frozen" else None)
         for e, how in sorted(ways.items())
     )
     return Edit(Displacement(laid.offsets), outcomes, edges=edges, copies=laid.copies)

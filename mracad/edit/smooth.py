@@ -6,9 +6,10 @@ import math
 from collections.abc import Callable, Collection
 from dataclasses import replace
 
-from mracad.constraint.seam import HELD, Treatment
+from mracad.constraint.cause import Cause, Still
+from mracad.constraint.seam import Treatment
 from mracad.constraint.wishes import Wishes
-from mracad.edit.driver import STAYS, Moved, Result
+from mracad.edit.driver import Moved, Result
 from mracad.edit.fair import Filter, faired
 from mracad.edit.level import Level
 from mracad.edit.result import Edit, FaceOutcome, Reason, Status, spared
@@ -19,9 +20,6 @@ from mracad.model import Face, Model
 from mracad.options import Smooth, length
 from mracad.select import Scope
 from mracad.select import scope as scope_of
-
-IDLE, FROZEN = "nothing to smooth on either side", "no edge moves"
-"""Reasons for which an edge stays that nothing else says anything of."""
 
 
 def smooth(
@@ -130,18 +128,18 @@ def treatments(model: Model, movable: set[int], result: Result, options: Smooth)
     """What was done about each edge of a face that could move, in edge order."""
     joints, frozen = result.joints, dict(result.joints.frozen)
     if options.edges == "frozen":
-        frozen = {edge: FROZEN if why == HELD else why for edge, why in frozen.items()}
+        frozen = {e: Cause(Still.FROZEN) if why.still is Still.HELD else why for e, why in frozen.items()}
     how = dict.fromkeys(joints.moving, "coupled")
     how |= {edge: "to tolerance" for seam in joints.loose for edge in (seam.edge, seam.twin)}
     how |= dict.fromkeys(result.mended, "mended")
     moved = {i for i, each in result.moved.items() if each.amount}
     still = {e for e in how if moved.isdisjoint(model.faces[side.face].surface for side in model.edges[e].sides)}
     how = {edge: way for edge, way in how.items() if edge not in still}
-    frozen |= dict.fromkeys(still, STAYS)
+    frozen |= dict.fromkeys(still, Cause(Still.STAYS))
     found = []
     for edge in model.edges:
         faces = tuple(side.face for side in edge.sides)
         if not movable.isdisjoint(faces):
-            why = "" if edge.index in how else frozen.get(edge.index, IDLE)
+            why = None if edge.index in how else frozen.get(edge.index, Cause(Still.IDLE))
             found.append(Treatment(edge.index, faces, how.get(edge.index, "frozen"), why))
     return tuple(found)

@@ -15,6 +15,7 @@ import numpy as np
 
 from mracad.bspline.net import Net
 from mracad.constraint.border import opening
+from mracad.constraint.cause import Cause, Still
 from mracad.constraint.frozen import separate
 from mracad.constraint.seam import Seam
 from mracad.constraint.trimmed import TrimmedSeam
@@ -44,9 +45,6 @@ TIGHT = 0.3
 HALVINGS, LARGEST = 3, 100_000
 """Most times that the spans under a trimmed seam are halved, and most control points of a net for which they are."""
 
-OPEN, BROKEN, UNSEWN = "trimmed: not within the tolerance", "would not hold", "trimmed and not sewn"
-BARE = "no copy beyond it"
-
 
 @dataclass(frozen=True, eq=False)
 class Laid:
@@ -57,7 +55,7 @@ class Laid:
     offsets : dict of int to Offset
         By surface, in its own frame.
     copies : tuple of Copy
-    frozen : dict of int to str
+    frozen : dict of int to Cause
         Edges of the faces under copies that do not move, and why.
     moving, loose : frozenset of int
         Edges that moved with both faces, exactly and to a tolerance.
@@ -65,7 +63,7 @@ class Laid:
 
     offsets: dict[int, Offset]
     copies: tuple[Copy, ...]
-    frozen: Mapping[int, str] = field(default_factory=dict)
+    frozen: Mapping[int, Cause] = field(default_factory=dict)
     moving: frozenset[int] = frozenset()
     loose: frozenset[int] = frozenset()
 
@@ -142,7 +140,8 @@ def laid(copies: Copies, wishes: Wishes, coupled: bool, clip: bool, removed: Map
                 halvings[each.seam.edge] += 1
             else:
                 crossings = [other for other in crossings if not other.edges & each.edges]
-                frozen |= dict.fromkeys(each.edges, BROKEN if isinstance(each.seam, Seam) else OPEN)
+                why = Still.BROKEN if isinstance(each.seam, Seam) else Still.OPEN
+                frozen |= dict.fromkeys(each.edges, Cause(why))
     taken = {i: over(task.model.surfaces[i].net, attempt.nets[i], each) for i, each in removed.items()}
     outcomes = {i: Outcome(attempt.nets[i], d - taken.get(i, 0.0), attempt.alone[i]) for i, d in attempt.done.items()}
     found = compared(copies, outcomes, task.shifts.matched)
@@ -173,7 +172,7 @@ def _sewn(joined: Joints) -> Joints:
     """Joints without the trimmed seams between edges that only coincide: which of their points belong together is not
     known to the tolerance of a copy."""
     loose = tuple(seam for seam in joined.loose if seam.edge == seam.twin)
-    apart = {edge: UNSEWN for seam in joined.loose if seam not in loose for edge in (seam.edge, seam.twin)}
+    apart = {edge: Cause(Still.UNSEWN) for seam in joined.loose if seam not in loose for edge in (seam.edge, seam.twin)}
     exact = tuple(seam for seam in joined.exact if seam.edge not in apart)
     return replace(joined, exact=exact, loose=loose, frozen={**joined.frozen, **apart})
 
@@ -181,8 +180,9 @@ def _sewn(joined: Joints) -> Joints:
 def _told(ground: Ground, under: Collection[int], joined: Joints) -> Joints:
     """Joints with what is to be said of edges beyond which a face could move if a copy lay there, too."""
     apart = ground.chosen - set(under)
+    bare = Cause(Still.BARE)
     sides = {e: {side.face for side in ground.model.edges[e].sides} for e in joined.frozen}
-    return replace(joined, frozen={e: BARE if sides[e] & apart else why for e, why in joined.frozen.items()})
+    return replace(joined, frozen={e: bare if sides[e] & apart else why for e, why in joined.frozen.items()})
 
 
 def _crossings(task: _Task) -> list[Crossing]:

@@ -14,9 +14,9 @@ import numpy as np
 
 from mracad.bspline.net import Net
 from mracad.constraint.border import Border
+from mracad.constraint.cause import Cause, Still
 from mracad.constraint.frozen import meeting, reached
-from mracad.constraint.joint import UNEVEN
-from mracad.constraint.seam import TRIMMED, Meeting, Seam, seams
+from mracad.constraint.seam import Meeting, Seam, seams
 from mracad.constraint.trace import trace_of
 from mracad.constraint.trimmed import TrimmedSeam, beside, trimmed
 from mracad.constraint.wishes import Wishes
@@ -31,6 +31,9 @@ RIM_POINTS = 65
 
 POLE = 2
 """Derivatives that are kept at a pole, where a side of a surface is one point: any motion there makes a cone of it."""
+
+LOOSE = Still.TRIMMED, Still.UNEVEN
+"""Why seams that may move to a tolerance cannot exactly: no parameter line of both sides, or a joint without a law."""
 
 END = 1e-9
 """Fraction of the domain within which a parameter line is its end."""
@@ -47,7 +50,7 @@ class Joints:
         Seams kept to a tolerance.
     closing : mapping of int to (Border, Border)
         Closing edges that a periodic space keeps smooth by itself.
-    frozen : mapping of int to str
+    frozen : mapping of int to Cause
         Edges that stay, and why.
     meetings : mapping of int to Meeting
         How edges meet what lies beyond them; where they stay, they keep that.
@@ -56,7 +59,7 @@ class Joints:
     exact: tuple[Seam, ...] = ()
     loose: tuple[TrimmedSeam, ...] = ()
     closing: Mapping[int, tuple[Border, Border]] = field(default_factory=dict)
-    frozen: Mapping[int, str] = field(default_factory=dict)
+    frozen: Mapping[int, Cause] = field(default_factory=dict)
     meetings: Mapping[int, Meeting] = field(default_factory=dict)
 
     @property
@@ -93,10 +96,10 @@ def joints(model: Model, movable: Collection[int], wishes: Wishes) -> Joints:
     """The joints of faces that may move."""
     known = seams(model, movable, wishes)
     exact, frozen, loose = list(known.found), dict(known.frozen), []
-    for index, reason in known.frozen.items():
+    for index, cause in known.frozen.items():
         edge = model.edges[index]
         twin = model.edges[known.twins.get(index, index)]
-        if reason in (TRIMMED, UNEVEN) and len({edge.index, twin.index}) + len(edge.sides) == 3:
+        if cause.still in LOOSE and len({edge.index, twin.index}) + len(edge.sides) == 3:
             found = trimmed(model, edge, twin, wishes)
             if isinstance(found, TrimmedSeam):
                 loose.append(found)

@@ -12,8 +12,8 @@ from OCP.TopLoc import TopLoc_Location
 from mracad import job, occ
 from mracad.audit.continuity import seams
 from mracad.bspline.net import Net
+from mracad.constraint.cause import Cause, Still
 from mracad.constraint.coincide import TORN, coinciding, touching
-from mracad.constraint.seam import ELSEWHERE
 from mracad.edit.smooth import smooth
 from mracad.occ.document import Document, empty
 from mracad.occ.load import Text
@@ -100,7 +100,7 @@ def test_instances_that_touch_are_said_to_be_separate():
         assert len(touching(model)) == count and not seams(model)
         edit = smooth(model, Smooth(level=1))
         assert edit.faces("edited")
-        assert sum(t.reason == ELSEWHERE for t in edit.edges) == count
+        assert sum(t.reason == Cause(Still.ELSEWHERE) for t in edit.edges) == count
 
 
 def test_products_placed_apart_are_said_to_be_separate():
@@ -113,4 +113,4 @@ def test_products_placed_apart_are_said_to_be_separate():
     model = view(made)
     assert len(set(model.spaces)) == 2 and not seams(model)
     treatments = smooth(model, Smooth(level=1)).edges
-    assert sorted(t.faces[0] for t in treatments if t.reason == ELSEWHERE) == [0, 1]
+    assert sorted(t.faces[0] for t in treatments if t.reason == Cause(Still.ELSEWHERE)) == [0, 1]

@@ -8,6 +8,7 @@ import pytest
 
 import mracad
 from mracad import job
+from mracad.constraint.cause import Cause, Still
 from mracad.errors import UsageError
 from mracad.occ.step import read_step, write_step
 from mracad.occ.view import view
@@ -47,7 +48,7 @@ def test_a_held_edge_stays_and_the_rest_moves(sewn):
         assert {o.status for o in report.edit.outcomes} == {"edited"}
     (how, _, free), (held, reason, still) = found.values()
     assert how == "coupled" and free > 0.01
-    assert held == "frozen" and reason == "held by --hold" and still == 0.0
+    assert held == "frozen" and reason == Cause(Still.HELD) and still == 0.0
 
 
 def test_a_held_edge_stays_under_a_copy_of_a_feature():

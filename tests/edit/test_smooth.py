@@ -2,17 +2,21 @@
 
 import dataclasses
 
+import msgspec
 import numpy as np
 import pytest
 
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.net import Net
+from mracad.edit.fair import Filter
 from mracad.edit.result import Reason
 from mracad.edit.smooth import smooth
 from mracad.errors import UsageError
+from mracad.occ.view import view
 from mracad.options import Smooth
 from mracad.select import Scope
 from tests.edit.models import rotation, sheet
+from tests.occ import shapes
 
 SPANS = (16, 12)
 
@@ -117,6 +121,32 @@ def test_what_is_fair_at_a_scale_stays_and_says_so():
         edit = smooth(model, Smooth(scale=scale))
         assert (edit.outcomes[0].status, edit.outcomes[0].reason) == ("unchanged", Reason.FAIR)
         assert not edit.displacement.offsets
+
+
+def test_a_face_that_nothing_admissible_makes_fairer_says_that_its_edges_hold_it(monkeypatch):
+    """Nothing but staying put is left of what is wanted, and the judge took nothing off it."""
+    monkeypatch.setattr(Filter, "ways", lambda self, problem, target, width: [[0.0 * target]])
+    edit = smooth(sheet(rough(noise=0.1)), Smooth(scale="4mm"))
+    assert (edit.outcomes[0].status, edit.outcomes[0].reason) == ("left", Reason.RIM)
+    assert edit.outcomes[0].words == "cannot get fairer with its edges held" and not edit.displacement.offsets
+
+
+def test_a_face_whose_seams_take_all_its_control_points_says_so():
+    """The middle one of three strips under one zigzag keeps the curvature at both: two times three rows of six."""
+    x = np.linspace(0, 60, 33)
+    nets = [
+        np.stack([*np.meshgrid(x, start + np.linspace(0, 12, 6), indexing="ij"), np.tile(zigzag(33), (6, 1)).T], -1)
+        for start in (0.0, 12.0, 24.0)
+    ]
+    model = view(shapes.document(shapes.sewn(*(shapes.face_on(shapes.bspline(net)) for net in nets))))
+    options = Smooth(scale="8mm", refine="never", faces=("#2",))
+    outcome = smooth(model, options).outcomes[1]
+    assert (outcome.status, outcome.reason, outcome.free) == ("left", Reason.NO_FREE, 0)
+    assert smooth(model, msgspec.structs.replace(options, keep="g1")).outcomes[1].status == "edited"
+
+
+def zigzag(count):
+    return 0.4 * (-1.0) ** np.arange(count)
 
 
 def flat():

@@ -7,6 +7,7 @@ import pytest
 
 from mracad import job
 from mracad.audit.continuity import seams
+from mracad.constraint.cause import Cause, Still
 from mracad.constraint.wishes import Wishes
 from mracad.edit.features import extract, move, repeat
 from mracad.errors import EditError
@@ -75,7 +76,7 @@ def test_a_copy_lies_over_a_trimmed_seam(feature, place):
     before = view(paper)
     report = job.run(paper, repeat, Repeat(feature=feature, at=(word(place),)))
     after = read_back(paper)
-    assert report.valid_after.valid and how(report) == ("to tolerance", "")
+    assert report.valid_after.valid and how(report) == ("to tolerance", None)
     (copy,) = report.edit.copies
     (old,), (new,) = seams(before), seams(after)
     print(f"gap {new.gap:.1e} mm, angle {new.angle:.1e}°, off by {copy.deviation:.1e} mm, lost {copy.lost:.1e} mm")
@@ -99,7 +100,7 @@ def test_a_feature_is_moved_off_a_trimmed_seam(feature):
     report = job.run(paper, move, Move(feature=f"near:{word(top)},radius:20", to=word(on_seam(100.0, -45.0))))
     after = read_back(paper)
     (new,) = seams(after)
-    assert how(report) == ("to tolerance", "") and new.gap <= 1e-4 and new.angle <= 0.012
+    assert how(report) == ("to tolerance", None) and new.gap <= 1e-4 and new.angle <= 0.012
     for one, two, uv in zip(before.surfaces, after.surfaces, visible(), strict=True):
         points = one.net.evaluate(uv)
         near = np.linalg.norm(points - on_seam(100.0), axis=1) < 16
@@ -127,7 +128,7 @@ def test_a_trimmed_seam_that_is_not_sewn_takes_its_part_and_says_so(feature):
     with pytest.raises(EditError, match="do not move take"):
         job.run(document(sewn=False), repeat, Repeat(feature=feature, at=(place,)))
     report = job.run(document(sewn=False), repeat, Repeat(feature=feature, at=(place,), clip=True))
-    assert {t.reason for t in report.edit.edges} == {"free edge", "trimmed and not sewn"}
+    assert {t.reason for t in report.edit.edges} == {Cause(Still.FREE), Cause(Still.UNSEWN)}
 
 
 def test_a_seam_is_no_worse_than_itself_on_finer_nets():
@@ -146,4 +147,4 @@ def test_a_seam_is_no_worse_than_itself_on_finer_nets():
 
 def test_edges_beyond_which_no_copy_lies_are_told_as_such(feature):
     report = job.run(document(), repeat, Repeat(feature=feature, at=(word(on_seam(100.0, -45.0)),)))
-    assert how(report) == ("frozen", "no copy beyond it")
+    assert how(report) == ("frozen", Cause(Still.BARE))
