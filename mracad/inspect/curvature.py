@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
+from functools import cache
+from types import FunctionType
+from typing import cast
 
 import numpy as np
 
@@ -14,6 +17,10 @@ THIN = 1e-6
 
 VOID = 1e-40
 """|S_u × S_v| up to which it does, too: powers of less are no numbers."""
+
+
+MANY = 4_000_000
+"""Points after which those that follow are worth the import of a compiler."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,51 +65,92 @@ class Forms:
         return cls(*(np.concatenate([getattr(part, each.name) for part in parts], axis=-1) for each in fields(cls)))
 
 
+class _Work:
+    """Points gone through in this process."""
+
+    done = 0
+
+
 def forms(jet: Array) -> Forms:
     """The forms of a surface with derivatives ``jet``, see :func:`mracad.inspect.jets.jets`.
+
+    They are the same bits however many points there are.
+    """
+    points = jet.shape[2]
+    _Work.done += points
+    if _Work.done < MANY:
+        n, density, speeds, bending, variation, largest, regular = _figures(THIN, VOID, *jet[1:])
+        return Forms(np.stack(n), density, np.stack(speeds), bending, variation, largest, regular)
+    density, bending, variation, largest = np.empty((4, points))
+    regular = np.empty(points, bool)
+    found = Forms(np.empty((3, points)), density, np.empty((2, points)), bending, variation, largest, regular)
+    _compiled()(np.ascontiguousarray(jet), THIN, VOID, *(getattr(found, each.name) for each in fields(found)))
+    return found
+
+
+def _figures(thin, void, su, sv, suu, suv, svv, suuu, suuv, suvv, svvv):
+    """What :class:`Forms` holds, of derivatives whose coordinates are numbers or arrays of them.
 
     Notes
     -----
     do Carmo, *Differential Geometry of Curves and Surfaces*, §3.3: H = (e G − 2 f F + g E) / 2 (E G − F²), the
     derivatives of the normal by Weingarten's equations.
     """
-    _, su, sv, suu, suv, svv, suuu, suuv, suvv, svvv = jet
-    ee, ff, gg = _dot(su, su), _dot(su, sv), _dot(sv, sv)
-    normal = _cross(su, sv)
-    density = np.sqrt(_dot(normal, normal))
-    regular = density > np.maximum(THIN * np.sqrt(ee * gg), VOID)
-    safe = np.where(regular, density, 1.0)
-    normal = normal * np.where(regular, 1 / safe, 0.0)
+
+    def dot(a, b):
+        return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+    ee, ff, gg = dot(su, su), dot(su, sv), dot(sv, sv)
+    n = su[1] * sv[2] - su[2] * sv[1], su[2] * sv[0] - su[0] * sv[2], su[0] * sv[1] - su[1] * sv[0]
+    size = np.sqrt(dot(n, n))
+    regular = size > np.maximum(thin * np.sqrt(ee * gg), void)
+    share = 1.0 * regular
+    safe = share * size + (1.0 - share)
+    scale = share / safe
+    n = n[0] * scale, n[1] * scale, n[2] * scale
     area2 = safe * safe
-    e, f, g = _dot(normal, suu), _dot(normal, suv), _dot(normal, svv)
+    e, f, g = dot(n, suu), dot(n, suv), dot(n, svv)
     mean = 0.5 * (e * gg - 2 * f * ff + g * ee) / area2
     gauss = (e * g - f * f) / area2
-    tangent = (_dot(su, suu), _dot(su, suv), _dot(su, svv)), (_dot(sv, suu), _dot(sv, suv), _dot(sv, svv))
-    slopes = []
-    for axis, third in enumerate(((suuu, suuv, suvv), (suuv, suvv, svvv))):
-        pull, push = (e, f) if axis == 0 else (f, g)
+    uu_u, uv_u, vv_u = dot(su, suu), dot(su, suv), dot(su, svv)
+    uu_v, uv_v, vv_v = dot(sv, suu), dot(sv, suv), dot(sv, svv)
+
+    def slope(pull, push, thirds, dee, dff, dgg):
         a, b = (push * ff - pull * gg) / area2, (pull * ff - push * ee) / area2  # n_x = a S_u + b S_v
-        de, df, dg = (_dot(normal, third[i]) + a * tangent[0][i] + b * tangent[1][i] for i in range(3))
-        dee, dgg = 2 * tangent[0][axis], 2 * tangent[1][axis + 1]
-        dff = tangent[1][axis] + tangent[0][axis + 1]
+        de = dot(n, thirds[0]) + a * uu_u + b * uu_v
+        df = dot(n, thirds[1]) + a * uv_u + b * uv_v
+        dg = dot(n, thirds[2]) + a * vv_u + b * vv_v
         numerator = de * gg + e * dgg - 2 * (df * ff + f * dff) + dg * ee + g * dee
-        slopes.append((0.5 * numerator - mean * (dee * gg + ee * dgg - 2 * ff * dff)) / area2)
-    hu, hv = slopes
+        return (0.5 * numerator - mean * (dee * gg + ee * dgg - 2 * ff * dff)) / area2
+
+    hu = slope(e, f, (suuu, suuv, suvv), 2 * uu_u, uu_v + uv_u, 2 * uv_v)
+    hv = slope(f, g, (suuv, suvv, svvv), 2 * uv_u, uv_v + vv_u, 2 * vv_v)
     variation = (gg * hu * hu - 2 * ff * hu * hv + ee * hv * hv) / area2
-    return Forms(
-        normal,
-        density * regular,
-        np.sqrt(np.stack([ee, gg])),
-        (4 * mean * mean - 2 * gauss) * regular,
-        np.maximum(variation, 0.0) * regular,
-        (np.abs(mean) + np.sqrt(np.maximum(mean * mean - gauss, 0.0))) * regular,
-        regular,
-    )
+    largest = np.abs(mean) + np.sqrt(np.maximum(mean * mean - gauss, 0.0))
+    return (
+        n, size * share, (np.sqrt(ee), np.sqrt(gg)), (4 * mean * mean - 2 * gauss) * share,
+        np.maximum(variation, 0.0) * share, largest * share, regular,
+    )  # fmt: skip
 
 
-def _dot(a: Array, b: Array) -> Array:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+def _swept(jet, thin, void, normal, density, speeds, bending, variation, largest, regular):
+    """Fill in the figures point by point."""
+
+    def at(order, p):
+        return jet[order, 0, p], jet[order, 1, p], jet[order, 2, p]
+
+    for p in range(jet.shape[2]):
+        n, density[p], (speeds[0, p], speeds[1, p]), bending[p], variation[p], largest[p], regular[p] = _figures(
+            thin, void, at(1, p), at(2, p), at(3, p), at(4, p), at(5, p), at(6, p), at(7, p), at(8, p), at(9, p)
+        )
+        normal[0, p], normal[1, p], normal[2, p] = n
 
 
-def _cross(a: Array, b: Array) -> Array:
-    return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+@cache
+def _compiled() -> Callable[..., None]:
+    """:func:`_swept`, compiled: once, and kept on disk as long as this file stays what it is."""
+    from numba import njit
+
+    figures = njit(error_model="numpy")(_figures)
+    swept = FunctionType(_swept.__code__, {**globals(), "_figures": figures}, _swept.__name__)
+    return cast(Callable[..., None], njit(cache=True, error_model="numpy")(swept))

@@ -92,15 +92,17 @@ class Constrained:
             begun = start[self.free] / self.scale[:, None]
             owed, size = owed - self.rows @ begun, float(np.abs(begun).max(initial=0.0))
         x, y = np.zeros_like(b), np.zeros_like(owed)
-        missed = np.inf
-        for _ in range((MOST if exactly else PASSES) if len(y) else 1):
-            residual = b - self.form @ x - self.rows.T @ y
-            step = self._solve(np.concatenate([residual, owed - self.rows @ x]))
+        most = (MOST if exactly else PASSES) if len(y) else 1
+        residual, lacking, missed = b, owed, np.inf
+        for done in range(1, most + 1):
+            step = self._solve(np.concatenate([residual, lacking]))
             x += step[: len(x)]
             y += step[len(x) :]
-            last, missed = missed, float(np.abs(owed - self.rows @ x).max(initial=0.0))
-            if missed <= MET * max(size, np.abs(x).max(initial=0.0)) or not missed < last:
+            lacking = owed - self.rows @ x
+            last, missed = missed, float(np.abs(lacking).max(initial=0.0))
+            if done == most or missed <= MET * max(size, np.abs(x).max(initial=0.0)) or not missed < last:
                 break
+            residual = b - self.form @ x - self.rows.T @ y
         return self._whole(x)
 
     def settled(self, x: Array) -> Array:

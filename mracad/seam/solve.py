@@ -219,8 +219,8 @@ class Problem:
         if len(self.spaces) > 1 and free.sum() > DIRECT:
             layout = self._layout(stiffness)
             joined = joints(layout, self.rows, soft, free)
-            along = strips(layout, joined, free)
-            if sum(map(len, along)) <= OVERLAP * free.sum():
+            along = strips(layout, joined, free, OVERLAP * free.sum())
+            if along is not None:
                 diagonals = [each.diagonal() for each in (self.mass, self.bending, self.creases)]
                 diagonal = diagonals[0] + stiffness * (diagonals[1] + diagonals[2])
                 return Divided(parts, diagonal, soft, self.rows, free, layout, joined, along)

@@ -57,8 +57,11 @@ def joints(layout: Layout, rows: Any, soft: Any, free: Array) -> dict[tuple[int,
     return {divmod(key, len(layout.reach)): np.unique(own) for key, own in zip(keys.tolist(), each, strict=False)}
 
 
-def strips(layout: Layout, joined: dict[tuple[int, int], Array], free: Array) -> list[Array]:
-    """The free points near the points of each joint, of its surfaces and of those that others join to them."""
+def strips(layout: Layout, joined: dict[tuple[int, int], Array], free: Array, most: float) -> list[Array] | None:
+    """The free points near the points of each joint, of its surfaces and of those that others join to them.
+
+    None where these are more than ``most`` in all.
+    """
     from scipy.spatial import cKDTree
 
     beside: dict[int, set[int]] = {}
@@ -66,7 +69,8 @@ def strips(layout: Layout, joined: dict[tuple[int, int], Array], free: Array) ->
         beside.setdefault(a, {a}).add(b)
         beside.setdefault(b, {b}).add(a)
     boxes = [_box(layout.places[begin:end]) for begin, end in pairwise(layout.ends.tolist())]
-    found = []
+    found: list[Array] = []
+    total = 0
     for (a, b), points in joined.items():
         near, (low, high) = [], _box(layout.places[points])
         for surface in sorted(beside[a] | beside[b]):
@@ -79,6 +83,9 @@ def strips(layout: Layout, joined: dict[tuple[int, int], Array], free: Array) ->
         point, reach = (np.concatenate(each) for each in zip(*near, strict=True))
         away = cKDTree(layout.places[points]).query(layout.places[point])[0]
         found.append(_along(layout.places, point[away <= reach]))
+        total += len(found[-1])
+        if total > most:
+            return None
     return found
 
 

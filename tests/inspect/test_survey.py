@@ -1,6 +1,6 @@
 """Roughness by closed forms, its invariances, and what counts as worse."""
 
-from dataclasses import astuple
+from dataclasses import astuple, fields
 
 import numpy as np
 import pytest
@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.net import Net
+from mracad.inspect import curvature
 from mracad.inspect.curvature import forms
 from mracad.inspect.roughness import Change, Growth, Rougher, Roughness, worse
 from mracad.inspect.survey import POINTS, RIPPLE, STEEP, changes, surveys
@@ -54,14 +55,29 @@ def test_a_sphere(radius):
     assert found.kink < 1e-5
 
 
+@pytest.mark.parametrize("many", [0, np.inf])
 @pytest.mark.parametrize("size", [0.0, 1e-300, 1e-120, 1e-60])
-def test_what_rounding_leaves_of_a_pole_is_no_curvature(size):
+def test_what_rounding_leaves_of_a_pole_is_no_curvature(size, many, monkeypatch):
     """S_u as good as nothing at right angles to S_v: powers of it would be no numbers, which nothing compares with."""
+    monkeypatch.setattr(curvature, "MANY", many)
     jet = np.random.default_rng(0).standard_normal((10, 3, 1))
     jet[1, :, 0], jet[2, :, 0] = (size, 0, 0), (0, 1, 0)
     found = forms(jet)
     assert not found.regular.any()
     assert (found.bending, found.variation, found.largest) == (0, 0, 0)
+
+
+def test_many_points_have_the_same_bits_as_few(monkeypatch):
+    """What is compiled for many rounds as what is not: no verdict depends on what a process has done before."""
+    jet = np.random.default_rng(1).standard_normal((10, 3, 1000))
+    jet[1:3, :, 7], jet[2, :, 8], jet[3:, :, 9] = 0.0, 3 * jet[1, :, 8], 0.0
+    monkeypatch.setattr(curvature, "MANY", np.inf)
+    few = forms(jet)
+    monkeypatch.setattr(curvature, "MANY", 0)
+    many = forms(np.asfortranarray(jet))
+    assert few.regular.sum() == 998
+    for each in fields(few):
+        assert getattr(few, each.name).tobytes() == getattr(many, each.name).tobytes()
 
 
 def test_a_cylinder():
