@@ -9,7 +9,7 @@ together, the others need not be looked at alone.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -18,7 +18,7 @@ from mracad.bspline.net import Net
 from mracad.constraint.cause import Cause, Still
 from mracad.constraint.seam import Seam
 from mracad.constraint.trimmed import TrimmedSeam
-from mracad.edit.pose import Scene
+from mracad.edit.pose import Scene, beside_rims
 from mracad.edit.target import Sheet, Wish
 from mracad.edit.tolerances import Tolerances
 from mracad.edit.trial import ENOUGH, Trial, Verdict, Watch, amounts, displaced
@@ -36,6 +36,9 @@ LEAST = 0.25
 
 FIRST = 2
 """Surfaces of a group of which each goes through by itself, so that all are tried together before the others are."""
+
+PRICE = 0.01
+"""Share of what is wanted that as many control points again as a surface has must bring nearer to be added."""
 
 CLOSER = 9
 """Points a span at which a result is looked at again."""
@@ -90,6 +93,16 @@ class Moved:
         """Largest motion, mm."""
         return max((each.motion for each in self.changes.values()), default=0.0)
 
+    @property
+    def finer(self) -> bool:
+        """Whether it has more control points than the surface."""
+        return self.net is not self.sheet.net and (self.net.u, self.net.v) != (self.sheet.net.u, self.sheet.net.v)
+
+    @property
+    def share(self) -> float:
+        """How much of the way to what was wanted was gone."""
+        return self.gain / self.wanted if self.wanted > 0.0 else 0.0
+
     def scaled(self, amount: float) -> Moved:
         """The same with another share of it done."""
         if amount == self.amount:
@@ -97,6 +110,11 @@ class Moved:
         offset = self.offset * (amount / self.amount)
         now = self._watch().changes({0: displaced(self.net, offset)})[0]
         return replace(self, offset=offset, amount=amount, changes=now)
+
+    def undone(self) -> Moved:
+        """Nothing done instead."""
+        still = {face: change.undone() for face, change in self.changes.items()}
+        return replace(self, offset=np.zeros_like(self.offset), amount=0.0, changes=still, limits=(), gain=0.0)
 
     def confirmed(self, tolerances: Tolerances) -> Moved:
         """What a closer look leaves of it: what grows between the points of the first is taken back."""
@@ -179,11 +197,17 @@ def _alone(
     tried: dict[tuple[int, ...], dict[int, Moved]] = {}
     for i in group:
         if len(alone) == FIRST and _through(alone):
-            whole = tried[tuple(group)] = _attempt(scene, wish, group, scene.joints.among(group))
+            whole = tried[tuple(group)] = _attempt(scene, wish, group, scene.joints.among(group), _finer(group, alone))
             if _through(whole) and not _less(whole, alone):
                 break
-        alone |= _attempt(scene, wish, [i], scene.joints.among({i}))
+        alone[i] = _by_itself(scene, wish, i)
     return alone, tried
+
+
+def _finer(group: Iterable[int], alone: Mapping[int, Moved]) -> set[int]:
+    """Surfaces for which more control points pay, as far as that is known; of others, where it does for any."""
+    known = {i for i, moved in alone.items() if moved.finer}
+    return {i for i in group if i in known or (known and i not in alone)}
 
 
 def _through(moved: Mapping[int, Moved]) -> bool:
@@ -215,7 +239,7 @@ def _together(
         joined = scene.joints.among(part)
         if len(part) < 2 or not rounds:
             continue
-        found = tried.get(tuple(part)) or _attempt(scene, wish, part, joined)
+        found = tried.get(tuple(part)) or _attempt(scene, wish, part, joined, _finer(part, alone))
         good = [i for i, moved in found.items() if moved.amount >= LEAST]
         if len(good) < len(part):
             waiting += [(each, rounds - 1) for each in groups(good, scene.joints.among(good))]
@@ -246,10 +270,30 @@ def groups(surfaces: Iterable[int], joined: Joints) -> list[list[int]]:
     return list(found.values())
 
 
-def _attempt(scene: Scene, wish: Wish, surfaces: Iterable[int], joined: Joints) -> dict[int, Moved]:
-    """The best that can be done to surfaces that move together; amounts may differ."""
+def _by_itself(scene: Scene, wish: Wish, i: int) -> Moved:
+    """The best that can be done to a surface by itself: with control points beside its rims where these pay."""
+    joined, sheet = scene.joints.among({i}), scene.sheets[i]
+    plain = _attempt(scene, wish, [i], joined)[i]
+    size = _points(beside_rims(sheet, joined)) / _points(sheet.net) if scene.refine else 1.0
+    least = plain.share + PRICE * (size - 1.0)
+    if size == 1.0 or least >= 1.0:
+        return plain
+    finer = _attempt(scene, wish, [i], joined, {i})[i]
+    if finer.share > least or not (plain.amount or finer.amount):
+        return finer
+    return plain if plain.amount else finer.undone()
+
+
+def _points(net: Net) -> int:
+    return net.u.count * net.v.count
+
+
+def _attempt(
+    scene: Scene, wish: Wish, surfaces: Iterable[int], joined: Joints, finer: Collection[int] = ()
+) -> dict[int, Moved]:
+    """The best that can be done to surfaces that move together, some with more control points; amounts may differ."""
     members = {i: scene.sheets[i] for i in surfaces}
-    trial = Trial(scene, members, joined)
+    trial = Trial(scene, members, joined, finer)
     target = wish.target(trial.problem, members, joined)
     best, found = trial.nothing(), []
     for batch in wish.ways(trial.problem, target, trial.width) if trial.problem.free.any() else ():

@@ -110,9 +110,9 @@ def _yielding(joined: Joints) -> Joints:
 def _shut(scene: Scene, members: Mapping[int, Sheet], joined: Joints, wide: float) -> tuple[Pose, Array]:
     """The problem of surfaces, and the displacement by which joints are shut."""
     width = max(sheet.wavelength for sheet in members.values())
-    longest = np.inf
+    longest, finer = np.inf, members if scene.refine else ()
     for halving in range(HALVINGS + 1):
-        found = pose(scene, members, joined, width, DETAIL * wide, longest)
+        found = pose(scene, members, joined, width, DETAIL * wide, finer=finer, longest=longest)
         delta = found.problem.nearest(np.zeros_like(found.problem.f), stiffness(width))
         for _ in range(PASSES):  # rows that depend on each other leave something of what they ask
             delta = found.problem.settled(delta, stiffness(width))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -105,7 +105,14 @@ class Pose:
 
 
 def pose(
-    scene: Scene, members: Mapping[int, Sheet], joined: Joints, width: float, detail: float, longest: float = np.inf
+    scene: Scene,
+    members: Mapping[int, Sheet],
+    joined: Joints,
+    width: float,
+    detail: float,
+    *,
+    finer: Collection[int] = (),
+    longest: float = np.inf,
 ) -> Pose:
     """The problem of surfaces that move together.
 
@@ -118,11 +125,16 @@ def pose(
         Within which displacements fade, mm.
     detail : float
         Size of the displacements that are wanted, mm: the larger, the more contacts weigh.
+    finer : collection of int
+        Surfaces that get control points beside rims where they have few.
     longest : float
         Longest knot spans beside seams along trim curves, mm.
     """
     movable = {face for sheet in members.values() for face in sheet.movable}
-    nets = matched({i: _space(scene, sheet, joined, longest) for i, sheet in members.items()}, joined.exact)
+    nets = {i: beside_rims(sheet, joined) if i in finer else sheet.net for i, sheet in members.items()}
+    if np.isfinite(longest):
+        nets = {i: _beside_seams(net, members[i], joined, longest) for i, net in nets.items()}
+    nets = matched(nets, joined.exact)
     nets = matched(doubled(nets, joined.exact), joined.exact)
     spaces, contacts = {}, [contact(seam) for seam in joined.loose]
     for i, net in nets.items():
@@ -155,13 +167,13 @@ def pose(
     return Pose(problem, found, [each.surfaces for each in contacts], opened, limits, trimmed)
 
 
-def _space(scene: Scene, sheet: Sheet, joined: Joints, longest: float) -> Net:
-    """The surface with control points enough beside its rims, and beside seams along trim curves."""
-    if not scene.refine:
-        return sheet.net
-    trims = [(face, trim) for face in sheet.faces for trim in face.trims]
-    net = refined(sheet.net, [each for each in trims if each[1].edge not in joined.moving], sheet.wavelength / 4)
-    if not np.isfinite(longest):
-        return net
+def beside_rims(sheet: Sheet, joined: Joints) -> Net:
+    """A surface with knot spans of at most a quarter of the wavelength beside its rims."""
+    trims = [(face, trim) for face in sheet.faces for trim in face.trims if trim.edge not in joined.moving]
+    return refined(sheet.net, trims, sheet.wavelength / 4)
+
+
+def _beside_seams(net: Net, sheet: Sheet, joined: Joints, longest: float) -> Net:
+    """A surface with knot spans of at most a length (mm) beside seams along trim curves."""
     loose = {edge for seam in joined.loose if not seam.since for edge in (seam.edge, seam.twin)}
-    return refined(net, [each for each in trims if each[1].edge in loose], longest)
+    return refined(net, [(face, trim) for face in sheet.faces for trim in face.trims if trim.edge in loose], longest)

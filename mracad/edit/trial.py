@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -79,10 +79,11 @@ class Verdict:
 class Trial:
     """Surfaces that move together: their problem, and the judge of what is done to them."""
 
-    def __init__(self, scene: Scene, members: Mapping[int, Sheet], joined: Joints) -> None:
+    def __init__(self, scene: Scene, members: Mapping[int, Sheet], joined: Joints, finer: Collection[int] = ()) -> None:
         self.width = max(sheet.wavelength for sheet in members.values())
         self.tolerances = scene.tolerances
-        self.pose = pose(scene, members, joined, self.width, max(sheet.detail for sheet in members.values()))
+        detail = max(sheet.detail for sheet in members.values())
+        self.pose = pose(scene, members, joined, self.width, detail, finer=finer)
         self.problem = self.pose.problem
         self.watch = Watch.of([(space.net, members[i].faces) for i, space in self.problem.spaces.items()], self.width)
 

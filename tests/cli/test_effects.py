@@ -9,7 +9,6 @@ import pytest
 
 import mracad
 from tests.cli import declared
-from tests.cli.shapes import ruled_strip
 from tests.edit import halves
 from tests.occ import shapes
 
@@ -113,7 +112,7 @@ WAYS = {
     "along": ("--along edge#1,1,3",),
     "record": ("--record",),
     "reference_unit": ("--reference-unit in",),
-    "refine": ("--refine never", "IN strip.step --scale 8mm"),
+    "refine": ("--refine never", "IN strips.step --scale 8mm --faces #2"),
     "report": ("--report a.json",),
     "rotate": ("--rotate 40",),
     "sarif": ("--sarif a.sarif",),
@@ -167,7 +166,7 @@ def folder(small, tmp_path_factory):
     for path in small:
         (place / path.name).write_bytes(path.read_bytes())
     (place / "recipe.toml").write_text(declared.RECIPE)
-    ruled_strip(place / "strip.step")
+    shapes.save(shapes.zigzag_strips(6, 6, 6), place / "strips.step")
     mracad.write(halves.document(*halves.surfaces(0.05, (10, 14))[1:]), place / "halves.step")
     x, y = np.meshgrid(np.linspace(0, 10, 16), np.linspace(0, 10, 16), indexing="ij")
     near = [np.stack([x + dx, y, declared.heights(x + dx, y) + dz], axis=-1) for dx, dz in ((0, 0), (10, 4e-4))]

@@ -78,12 +78,7 @@ def test_roughness_before_and_after_is_what_the_files_have(mracad, rippled, tmp_
 @pytest.fixture
 def strips(tmp_path):
     """Three strips side by side under one wavy profile; the tangents along its seams take all of #2."""
-    profile = 0.4 * (-1.0) ** np.arange(33)
-    nets = []
-    for start, rows in ((0.0, 9), (12.0, 4), (24.0, 9)):
-        x, y = np.meshgrid(np.linspace(0, 60, 33), start + np.linspace(0, 12, rows), indexing="ij")
-        nets.append(np.stack([x, y, profile[:, None] + 0 * x], axis=-1))
-    return shapes.save(shapes.sewn(*(shapes.face_on(shapes.bspline(net)) for net in nets)), tmp_path / "strips.step")
+    return shapes.save(shapes.zigzag_strips(9, 4, 9), tmp_path / "strips.step")
 
 
 def test_what_was_asked_for_one_by_one_and_cannot_be_done_is_an_error(mracad, strips, tmp_path):

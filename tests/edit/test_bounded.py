@@ -31,8 +31,8 @@ def test_groups_are_solved_a_bounded_number_of_times(side, monkeypatch):
     tried, refused = [], set()
     attempt = driver._attempt
 
-    def refusing(scene, wish, members, joined):
-        found = attempt(scene, wish, members, joined)
+    def refusing(scene, wish, members, joined, finer=()):
+        found = attempt(scene, wish, members, joined, finer)
         if len(members) > 1:
             tried.append(len(members))
             refused.add(min(members))
@@ -50,12 +50,12 @@ def test_groups_are_solved_a_bounded_number_of_times(side, monkeypatch):
 @pytest.mark.parametrize(("spans", "scale", "solved"), [(10, "30mm", [1, 1, 9]), (6, "60mm", [1, 1, 9, *[1] * 7])])
 def test_surfaces_that_go_through_together_are_not_all_tried_alone(spans, scale, solved, monkeypatch):
     """What comes of them is what would have come of them; at 60 mm nothing does, and is not tried again."""
-    model, options, tried = panel(3, spans), Smooth(scale=scale), []
+    model, options, tried = panel(3, spans), Smooth(scale=scale, refine="never"), []
     attempt = driver._attempt
 
-    def counted(scene, wish, members, joined):
+    def counted(scene, wish, members, joined, finer=()):
         tried.append(len(members))
-        return attempt(scene, wish, members, joined)
+        return attempt(scene, wish, members, joined, finer)
 
     monkeypatch.setattr(driver, "_attempt", counted)
     some = smooth(model, options)

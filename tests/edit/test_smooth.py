@@ -8,6 +8,7 @@ import pytest
 
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.net import Net
+from mracad.edit import driver
 from mracad.edit.fair import Filter
 from mracad.edit.result import Reason
 from mracad.edit.smooth import smooth
@@ -131,22 +132,25 @@ def test_a_face_that_nothing_admissible_makes_fairer_says_that_its_edges_hold_it
     assert edit.outcomes[0].words == "cannot get fairer with its edges held" and not edit.displacement.offsets
 
 
-def test_a_face_whose_seams_take_all_its_control_points_says_so():
+def test_a_face_whose_seams_take_all_its_control_points_says_so_or_gets_some():
     """The middle one of three strips under one zigzag keeps the curvature at both: two times three rows of six."""
-    x = np.linspace(0, 60, 33)
-    nets = [
-        np.stack([*np.meshgrid(x, start + np.linspace(0, 12, 6), indexing="ij"), np.tile(zigzag(33), (6, 1)).T], -1)
-        for start in (0.0, 12.0, 24.0)
-    ]
-    model = view(shapes.document(shapes.sewn(*(shapes.face_on(shapes.bspline(net)) for net in nets))))
+    model = view(shapes.document(shapes.zigzag_strips(6, 6, 6)))
     options = Smooth(scale="8mm", refine="never", faces=("#2",))
     outcome = smooth(model, options).outcomes[1]
     assert (outcome.status, outcome.reason, outcome.free) == ("left", Reason.NO_FREE, 0)
     assert smooth(model, msgspec.structs.replace(options, keep="g1")).outcomes[1].status == "edited"
+    outcome = smooth(model, msgspec.structs.replace(options, refine="auto")).outcomes[1]
+    assert outcome.status == "edited" and 0 < outcome.inserted < 12
 
 
-def zigzag(count):
-    return 0.4 * (-1.0) ** np.arange(count)
+def test_points_that_bring_next_to_nothing_nearer_are_not_added(monkeypatch):
+    """The price of control points decides: as it is, with one that nobody pays, and for nothing."""
+    model, options = view(shapes.document(shapes.zigzag_strips(6, 6, 6))), Smooth(scale="8mm", faces=("#2",))
+    for price, inserted in ((driver.PRICE, True), (1.0, False), (0.0, True)):
+        monkeypatch.setattr(driver, "PRICE", price)
+        outcome = smooth(model, options).outcomes[1]
+        assert (outcome.inserted > 0) == inserted
+        assert (outcome.status, outcome.reason) == (("edited", None) if inserted else ("left", Reason.RIM))
 
 
 def flat():
@@ -154,8 +158,8 @@ def flat():
     return Net(net.u, net.v, np.concatenate([net.poles[..., :2], 0 * net.poles[..., :1]], axis=-1))
 
 
-def test_points_are_added_where_a_face_has_none_that_are_free():
-    """A ruled strip with a wave between straight edges: both rows of its net lie on edges."""
+def test_points_are_not_added_where_a_face_does_as_well_without_them():
+    """A ruled strip with a wave between straight edges: its rows move once its degree is raised."""
     u = KnotVector.clamped(np.arange(33.0), 3)
     x = u.greville()
     rows = [np.stack([x, 6 * i + 0 * x, 0.05 * np.sin(2 * np.pi * x / 3)], axis=-1) for i in (0, 1)]
@@ -163,7 +167,7 @@ def test_points_are_added_where_a_face_has_none_that_are_free():
     for refine in ("never", "auto"):
         result, outcome = smoothed(strip, scale="8mm", refine=refine)
         assert outcome.status == "edited" and outcome.detail > 0.01
-        assert (outcome.inserted > 0) == (refine == "auto")
+        assert outcome.inserted == 0
         assert motion(strip, result)[:, [0, -1]].max() < 1e-12 < motion(strip, result).max()
 
 

@@ -118,3 +118,15 @@ def _net(poles: np.ndarray) -> TColgp_Array2OfPnt:
     for i, j in np.ndindex(*poles.shape[:2]):
         net.SetValue(i + 1, j + 1, gp_Pnt(*poles[i, j].tolist()))
     return net
+
+
+def zigzag_strips(*rows: int) -> TopoDS_Shape:
+    """Strips of 60 mm × 12 mm side by side under one zigzag profile, each of so many rows of control points.
+
+    As smooth as the seams are, they take all points of a strip of few rows.
+    """
+    nets = []
+    for place, count in enumerate(rows):
+        x, y = np.meshgrid(np.linspace(0, 60, 33), 12 * place + np.linspace(0, 12, count), indexing="ij")
+        nets.append(np.stack([x, y, np.broadcast_to(0.4 * (-1.0) ** np.arange(33)[:, None], x.shape)], axis=-1))
+    return sewn(*(face_on(bspline(net)) for net in nets))
