@@ -5,9 +5,10 @@ displacement δ, at the Greville points of the splines along it,
 
     G0   δ_b = δ_a,   G1   ∂_n δ_b = a ∂_n δ_a + b ∂_t δ_a,   G2   ∂_nn δ_b = a² ∂_nn δ_a + r ∂_n δ_a + s ∂_t δ_a
 
-(a, b, r, s of the input's joint: :class:`mracad.constraint.joint.Joint`).  As many conditions as the space has
-functions are exact where the joint's coefficients are constant, and never lock where they vary.  Along double knots
-(:func:`doubled`) there is room for conditions that are exact where they vary, too.
+(a, b, r, s of the input's joint: :class:`mracad.constraint.joint.Joint`), or what comes to the same with fewer control
+points in each condition.  As many conditions as the space has functions are exact where the joint's coefficients are
+constant, and never lock where they vary.  Along double knots (:func:`doubled`) there is room for conditions that are
+exact where they vary, too.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from mracad.bspline.basis import basis
 from mracad.bspline.functions import functions
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.net import Net
@@ -25,6 +27,12 @@ from mracad.constraint.joint import Joint
 from mracad.constraint.seam import Seam
 
 Array = np.ndarray
+
+ROUNDING = 1e-13
+"""Share of the largest entry of the conditions of a seam that counts for nothing."""
+
+MOST_PLAIN = 1_000_000
+"""Most entries of a dense matrix in which they are made plain."""
 
 SAME = 1e-9
 """Fraction of a seam within which knots of its two sides are the same."""
@@ -157,17 +165,50 @@ def rows(
     count, mended = 0, [np.empty(0, bool)]
     for seam in seams:
         for order in range(seam.joint.order + 1):
-            share = _sites(spaces, seam, order if everywhere else 0)
+            knots = _asked(spaces, seam, order if everywhere else 0)
+            share = knots.greville()
             sides = [(_sided(nets[b.surface], b, share), first[b.surface]) for b in (seam.b, seam.a)]
-            row = count + np.arange(len(share))
-            for ((index, _), begin), value in zip(sides, _terms(seam.joint, order, share, sides), strict=True):
-                entries.append((np.repeat(row, index.shape[1]), begin + index.ravel(), value.ravel()))
+            column = np.concatenate([begin + index for (index, _), begin in sides], axis=1)
+            value = np.concatenate(_terms(seam.joint, order, share, sides), axis=1)
+            row, column, value = _plain(knots, column, value)
+            entries.append((count + row, column, value))
             mended.append(np.full(len(share), (seam.joint.close, seam.joint.fit, False)[order]))
             count += len(share)
     row, column, value = (np.concatenate(part) for part in zip(*entries, strict=True))
-    found = csr_array((value, (row, column)), shape=(count, total))
-    found.eliminate_zeros()
-    return found, np.concatenate(mended)
+    return csr_array((value, (row, column)), shape=(count, total)), np.concatenate(mended)
+
+
+def _plain(knots: KnotVector, column: Array, value: Array) -> tuple[Array, Array, Array]:
+    """Conditions at the Greville points as such on the coefficients of the spline through what they take, if fewer.
+
+    Where both sides are of the same make across their seam, a condition is then one on a few control points.
+
+    Parameters
+    ----------
+    knots : KnotVector
+    column : ndarray (q, k) of int
+    value : ndarray (q, k)
+
+    Returns
+    -------
+    row, column, value : ndarray
+        Entries that are not zero.
+    """
+    used, place = np.unique(column, return_inverse=True)
+    asked: Array = np.zeros((len(column), len(used)))
+    np.add.at(asked, (np.arange(len(column))[:, None], place.reshape(column.shape)), value)
+    if asked.size <= MOST_PLAIN:
+        first, local = basis(knots, knots.greville())
+        table = np.zeros((knots.count, knots.count))
+        table[np.arange(knots.count)[:, None], first[:, None] + np.arange(local.shape[1])] = local
+        plain: Array = np.linalg.solve(table, asked)
+        plain += np.linalg.solve(table, asked - table @ plain)
+        plain[np.abs(plain) <= ROUNDING * np.abs(plain).max(initial=0.0)] = 0.0
+        same = np.abs(table @ plain - asked).max(initial=0.0) <= ROUNDING * np.abs(asked).max(initial=0.0)
+        if same and np.count_nonzero(plain) < np.count_nonzero(asked):
+            asked = plain
+    row, place = np.nonzero(asked)
+    return row, used[place], asked[row, place]
 
 
 def _terms(joint: Joint, order: int, share: Array, sides: Sequence[Any]) -> tuple[Array, Array]:
@@ -185,10 +226,11 @@ def _law(coefficients: Array, share: Array) -> Array:
     return np.polynomial.polynomial.polyval(share, np.append(coefficients, 0.0))[:, None]
 
 
-def _sites(spaces: Mapping[int, tuple[KnotVector, KnotVector]], seam: Seam, order: int) -> Array:
-    """Fractions of the seam at which conditions are asked: the Greville points of the larger space on it.
+def _asked(spaces: Mapping[int, tuple[KnotVector, KnotVector]], seam: Seam, order: int) -> KnotVector:
+    """The larger of the spaces of both sides along a seam, over its fractions: conditions are asked at its Greville
+    points.
 
-    For an order above 0 those of the space in which the condition of that order lies.
+    For an order above 0 that in which the condition of that order lies.
     """
     more, lost = (order * (len(seam.joint.across) - 1), _lost(seam.joint)) if order else (0, 0)
     found = []
@@ -196,8 +238,8 @@ def _sites(spaces: Mapping[int, tuple[KnotVector, KnotVector]], seam: Seam, orde
         knots = spaces[border.surface][1 - border.axis]
         degree, inner = knots.degree + more, _inner(knots, border)
         counts = [degree + 1, *(min(n + more + lost, degree) for n in inner.values()), degree + 1]
-        found.append(KnotVector.from_multiplicities([0.0, *inner, 1.0], counts, degree).greville())
-    return max(found, key=len)
+        found.append(KnotVector.from_multiplicities([0.0, *inner, 1.0], counts, degree))
+    return max(found, key=lambda each: each.count)
 
 
 def _sided(net: Net, border: Border, share: Array) -> tuple[Array, dict[str, Array]]:

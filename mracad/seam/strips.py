@@ -62,13 +62,17 @@ def strips(layout: Layout, joined: dict[tuple[int, int], Array], free: Array, mo
 
     None where these are more than ``most`` in all.
     """
+    boxes = [_box(layout.places[begin:end]) for begin, end in pairwise(layout.ends.tolist())]
+    size = np.array([np.linalg.norm(high - low) for low, high in boxes])
+    points = np.add.reduceat(free, layout.ends[:-1], dtype=int) * np.minimum(layout.reach / (size + 1e-300), 1.0)
+    if sum(points[i] for pair in joined for i in set(pair)) > most:  # without those of other surfaces
+        return None
     from scipy.spatial import cKDTree
 
     beside: dict[int, set[int]] = {}
     for a, b in joined:
         beside.setdefault(a, {a}).add(b)
         beside.setdefault(b, {b}).add(a)
-    boxes = [_box(layout.places[begin:end]) for begin, end in pairwise(layout.ends.tolist())]
     found: list[Array] = []
     total = 0
     for (a, b), points in joined.items():
