@@ -175,14 +175,17 @@ class Divided:
         b, owed = self.scale[:, None] * right, np.zeros((len(self.there), right.shape[1]))
         if goal is not None:
             owed += goal[self.there] / self.length[:, None]
+        size = 0.0
         if start is not None:
-            owed -= self.rows @ self._scaled(start)
-        begun = self._met(owed, 0.0, b) if owed.any() else None
+            scaled = self._scaled(start)
+            owed -= self.rows @ scaled
+            size = float(np.abs(scaled).max(initial=0.0))
+        begun = self._met(owed, size, b) if owed.any() else None
         found = self._within(b)
         if begun is not None:
             found += begun
         if exactly and len(owed):
-            found += self._met(owed - self.rows @ found, float(np.abs(found).max(initial=0.0)))
+            found += self._met(owed - self.rows @ found, max(size, float(np.abs(found).max(initial=0.0))))
         found *= self.scale[:, None]
         return found
 
@@ -229,6 +232,8 @@ class Divided:
         """What meets conditions beside a displacement of a size; what the form makes of it is taken from ``right``."""
         found = np.zeros((self.size, owed.shape[1]))
         for _ in range(MOST):
+            if np.abs(owed).max(initial=0.0) <= MET * max(size, np.abs(found).max(initial=0.0)):
+                break
             for colour in self.colours:
                 pull = PENALTY * (colour.rows.T @ owed)
                 moved = colour(pull)
@@ -238,8 +243,6 @@ class Divided:
                 if right is not None:
                     right[self.about[colour.points]] -= pull
                     right[self.about] -= colour.outside @ moved - PENALTY * (self.conditions.T @ met)
-            if np.abs(owed).max(initial=0.0) <= MET * max(size, np.abs(found).max(initial=0.0)):
-                break
         return found
 
 

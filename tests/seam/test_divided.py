@@ -9,7 +9,7 @@ from scipy.sparse import csr_array
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.net import Net
 from mracad.inspect.cells import quadrature
-from mracad.seam.divided import LEFT, Divided
+from mracad.seam.divided import LEFT, Divided, _Colour
 from mracad.seam.energy import forms
 from mracad.seam.solve import Problem, Space
 from tests.edit.models import rotation
@@ -103,6 +103,16 @@ def test_nearest_is_that_of_the_whole_system(both):
     p, found, direct = both(lambda p: p.nearest(wanted))
     assert size(found - direct) < 1e-6 * size(direct)
     assert size(p.rows @ found) < 1e-12 * size(found) and not found[~p.free].any()
+
+
+def test_what_obeys_already_is_not_made_to(monkeypatch):
+    """Rounding that is left of conditions is not taken for what is lacking."""
+    p, calls = problem(monkeypatch, 0), []
+    obeys = p.nearest(0.1 * np.random.default_rng(3).standard_normal((SIDE**2 * KNOTS.count**2, 3)))
+    step = _Colour.__call__
+    monkeypatch.setattr(_Colour, "__call__", lambda colour, right: calls.append(colour) or step(colour, right))
+    assert size(p.nearest(obeys) - obeys) < 1e-9 * size(obeys)
+    assert len(calls) <= 3 * len(set(calls))
 
 
 def test_conditions_are_mended_by_what_is_asked(both):
