@@ -28,8 +28,9 @@ TIGHT = 0.3
 """Share of what a contact may lack at which its conditions aim."""
 
 EASY = 30.0
-"""How much more contacts between surfaces may lack in what an edit wants: splines of unrelated knots that had to agree
-closely along a curve could hardly follow what is wanted beside it."""
+"""How much more smooth contacts between surfaces may lack in what an edit wants: splines of unrelated knots that had to
+agree closely along a curve could hardly follow what is wanted beside it.  At creases each side is on its own: what
+slides along one would push the other."""
 
 
 WITHIN = 0.8
@@ -161,7 +162,8 @@ def pose(
     weight = (detail / TIGHT) ** 2 * width
     shut = np.where(mends[:, None], opened, 0.0) if joined.mended else opened
     soft, pull = (weight * found.form(limits), -weight * found.pull(shut, limits)) if contacts else (None, None)
-    between = weight * found.form(np.where(pairs, EASY * limits, np.inf)) if pairs.any() else None
+    smooth = pairs & np.array([each.order > 0 for each in contacts], bool)[found.owner]
+    between = weight * found.form(np.where(smooth, EASY * limits, np.inf)) if smooth.any() else None
     trimmed = mends & np.array([not each.since for each in contacts], bool)[found.owner]
     problem = Problem(spaces, rows, np.where(goal[:, None], -(rows @ f), 0.0), soft, pull, between)
     return Pose(problem, found, [each.surfaces for each in contacts], opened, limits, trimmed)

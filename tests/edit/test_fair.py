@@ -12,10 +12,14 @@ from mracad.bspline.net import Net
 from mracad.constraint.wishes import Wishes
 from mracad.edit.driver import groups
 from mracad.edit.fair import Filter, faired
+from mracad.edit.pose import Scene
+from mracad.edit.target import sheets
 from mracad.edit.tolerances import Tolerances
+from mracad.edit.trial import Trial
 from mracad.inspect.roughness import Growth, worse
 from mracad.inspect.survey import changes, surveys
 from mracad.occ.view import view
+from mracad.seam.interface import joints
 from tests.edit import halves, panels
 from tests.edit.models import fitted, rotation, sheet
 from tests.inspect.shapes import cylinder
@@ -230,6 +234,23 @@ def test_halves_that_meet_along_a_trim_curve_come_close_to_the_unsplit_surface(s
     rms = beside([surface.net for surface in after.surfaces], clean)
     print(f"{keep} at {scale}: {rms / whole:.3f} of the unsplit surface's error")
     assert rms <= 1.05 * whole
+
+
+@pytest.mark.parametrize(("spans", "smooth"), [((15, 30), False), ((30, 60), True)])
+def test_what_is_wanted_of_halves_knows_where_they_meet_smoothly(spans, smooth):
+    """At a crease (the coarse half cannot follow the noise) each side is wanted as if it were alone."""
+    _, left, right = halves.surfaces(0.2, spans)
+    model = view(halves.document(left, right))
+    wish = Filter(30.0)
+    every, joined = sheets(model, {0, 1}, wish), joints(model, {0, 1}, Wishes())
+    scene, found = Scene(model, every, joined, Tolerances(1e-3), refine=False), []
+    for group in ({0, 1}, {0}, {1}):
+        members = {i: every[i] for i in group}
+        trial = Trial(scene, members, joined.among(group))
+        found.append(wish.target(trial.problem, members, joined.among(group)))
+    assert [seam.order > 0 for seam in joined.loose] == [smooth]
+    off = np.abs(found[0] - np.concatenate(found[1:])).max()
+    assert off > 0.01 if smooth else off < 1e-9
 
 
 def test_what_suits_one_surface_and_another_is_put_together():
