@@ -73,7 +73,7 @@ class Treatment:
     reason: Cause | None = None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Meeting:
     """How two faces meet at an edge.
 
@@ -81,21 +81,26 @@ class Meeting:
     ----------
     order : {0, 1, 2}
         Derivatives that it keeps with what lies beyond it.
-    gap : float
-        Largest distance between them, mm.
+    gap, bend : float
+        Largest distance between them, mm, and jump of the curvature across it, 1/mm.
     faces : tuple of int
+    sides : tuple of Side
+        Where both pass the samples of the edge; empty for the longer one at a T-junction.
     """
 
     order: int
     gap: float
+    bend: float
     faces: tuple[int, ...]
+    sides: tuple[Side, ...] = ()
 
     def with_(self, other: Meeting | None) -> Meeting:
         """The same with what is known of it elsewhere along the edge."""
         if other is None:
             return self
         faces = (*self.faces, *(face for face in other.faces if face not in self.faces))
-        return Meeting(max(self.order, other.order), max(self.gap, other.gap), faces)
+        order, gap, bend = (max(getattr(each, name) for each in (self, other)) for name in ("order", "gap", "bend"))
+        return Meeting(order, gap, bend, faces, other.sides or self.sides)
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,9 +165,10 @@ def _meetings(model: Model, wishes: Wishes, found: Sequence[tuple[Edge, Edge, Se
     for (edge, other, sides), a, b in zip(found, looks[::2], looks[1::2], strict=True):
         order = wishes.order(between(a[:, 3:6], b[:, 3:6]), a[:, 6], b[:, 6])
         gap = float(np.linalg.norm(across(a[:, :3] - b[:, :3], edge.tangents), axis=1).max())
-        for each in (edge, other):
-            meeting = Meeting(order, gap, tuple(side.face for side in sides))
-            result[each.index] = meeting.with_(result.get(each.index))
+        jump = float(np.nanmax(np.abs(a[:, 6] - b[:, 6]), initial=0.0))
+        for each in {edge.index: edge, other.index: other}.values():
+            met = Meeting(order, gap, jump, tuple(s.face for s in sides), tuple(sides) if each is edge else ())
+            result[each.index] = met.with_(result.get(each.index))
     return result
 
 

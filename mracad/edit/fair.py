@@ -35,9 +35,6 @@ Array = np.ndarray
 SHARP = 0.2, 0.5
 """Curvatures over ℓ from which on less is done, and from which on nothing: there the filter takes shape."""
 
-CONTINUOUS = 10.0
-"""Jumps of curvature along edges of up to so many times what an edit may add count for none: more shows beside them."""
-
 DETAIL = 1e-7, 1e-6
 """Least displacement that counts as detail: the tolerance of coincidence, mm, and a share of the wavelength."""
 
@@ -118,7 +115,7 @@ def faired(
     """
     every = sheets(model, movable, wish)
     width = max((each.wavelength for each in every.values()), default=1.0)
-    wishes = replace(wishes, bend=CONTINUOUS * tolerances.bend / width)
+    wishes = replace(wishes, bend=tolerances.jump / width)
     mends = Mended(model)
     if wishes.close_gaps or wishes.fit > 0.0:
         mends = mended(Scene(model, every, joints(model, _faces(every), wishes), tolerances, refine))

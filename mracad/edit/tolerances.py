@@ -30,6 +30,8 @@ class Tolerances:
         What any edge may gape, mm, however exact it is.
     angle, bend : float
         By which the angle (radians) and the curvature (over the wavelength of the edit) along an edge may grow.
+    jump : float
+        Jumps of curvature along edges, over the wavelength, that count for none: more shows beside them.
     growth : Growth
         Of roughness.
     deviation : float
@@ -40,6 +42,7 @@ class Tolerances:
     least: float = 1e-5
     angle: float = math.radians(0.01)
     bend: float = 1e-3
+    jump: float = 1e-2
     growth: Growth = GROWTH
     deviation: float = np.inf
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mracad.bspline.net import Net, cross
+from mracad.edit.jumps import Jumps
 from mracad.edit.pose import Scene, pose
 from mracad.edit.target import Sheet, eased, stiffness
 from mracad.edit.tolerances import Tolerances
@@ -85,6 +86,7 @@ class Trial:
         detail = max(sheet.detail for sheet in members.values())
         self.pose = pose(scene, members, joined, self.width, detail, finer=finer)
         self.problem = self.pose.problem
+        self.jumps = Jumps(scene, members, joined, self.width)
         self.watch = Watch.of([(space.net, members[i].faces) for i, space in self.problem.spaces.items()], self.width)
 
     def nothing(self) -> Verdict:
@@ -129,6 +131,10 @@ class Trial:
         for surfaces, most in zip(self.pose.owners, room, strict=True):
             for i in surfaces & ceiling.keys():
                 ceiling[i] = min(ceiling[i], most)
+        both = zip(self.problem.spaces.items(), self.problem.split(delta).values(), strict=True)
+        moved = {i: displaced(space.net, part) for (i, space), part in both}
+        for i, most in self.jumps.room(moved).items():
+            ceiling[i] = min(ceiling[i], most)
         return np.array(list(ceiling.values()))
 
 

@@ -181,6 +181,7 @@ def _compared(target: Sheet, ideal: Carried, knots: Knots, poles: Array, gone: A
         float(missed.max()),
         float(np.sqrt((missed**2).mean())),
         float(lost.max()),
+        float(missed.max()),
         False,
     )
 

@@ -16,6 +16,9 @@ from mracad.feature.sheet import Sheet
 
 Array = np.ndarray
 
+SHORT = 0.1
+"""Share of its height by which a copy may be off the ideal where nothing is held."""
+
 
 @dataclass(frozen=True)
 class Copy:
@@ -32,6 +35,8 @@ class Copy:
         Largest and mean square distance from the ideal copy, mm, constraints included.
     lost : float
         Largest part of it that constraints took away, mm.
+    short : float
+        Largest part of it that the control points there cannot hold, mm.
     exact : bool
         Whether it is an exact shift of control points.
     """
@@ -42,6 +47,7 @@ class Copy:
     deviation: float
     rms: float
     lost: float
+    short: float
     exact: bool
 
 
@@ -68,13 +74,14 @@ class _Tally:
     """Distances from the ideal, by copy."""
 
     def __init__(self, count: int) -> None:
-        self.worst, self.lost, self.squares, self.samples = (np.zeros(count) for _ in range(4))
+        self.worst, self.lost, self.short, self.squares, self.samples = (np.zeros(count) for _ in range(5))
         self.faces: list[set[int]] = [set() for _ in range(count)]
 
-    def add(self, copy: int, missed: Array, lost: Array, faces: Array) -> None:
+    def add(self, copy: int, missed: Array, lost: Array, short: Array, faces: Array) -> None:
         """Count points of a copy."""
         self.worst[copy] = max(self.worst[copy], missed.max())
         self.lost[copy] = max(self.lost[copy], lost.max())
+        self.short[copy] = max(self.short[copy], short.max())
         self.squares[copy] += (missed**2).sum()
         self.samples[copy] += len(missed)
         self.faces[copy].update(faces.tolist())
@@ -110,14 +117,16 @@ def compared(copies: Copies, outcomes: Mapping[int, Outcome], exact: Array) -> l
             float(tally.worst[k]),
             float(rms[k]),
             float(tally.lost[k]),
+            float(tally.short[k]),
             bool(exact[k]),
         )
         for k, place in enumerate(copies.places)
     ]
 
 
-def _missed(copies: Copies, sheet: Sheet, outcome: Outcome) -> Iterator[tuple[int, Array, Array, Array]]:
-    """For copies on a sheet: distances from the ideal, what constraints took, and faces, at points of it."""
+def _missed(copies: Copies, sheet: Sheet, outcome: Outcome) -> Iterator[tuple[int, Array, Array, Array, Array]]:
+    """For copies on a sheet: distances from the ideal, what constraints took, what control points cannot hold, and
+    faces, at points of it."""
     from scipy.spatial import cKDTree
 
     net, some = outcome.net, copies.on(sheet)
@@ -135,11 +144,25 @@ def _missed(copies: Copies, sheet: Sheet, outcome: Outcome) -> Iterator[tuple[in
         values = np.asarray(pair.evaluate(uv))
         missed = np.linalg.norm(values[:, :3] - wanted, axis=1)
         gone = np.linalg.norm(values[:, :3] - values[:, 3:], axis=1)
+        short = np.linalg.norm(values[:, 3:] - wanted, axis=1)
         chosen = np.flatnonzero(some)
         hits = cKDTree(points).query_ball_point(copies.charts.origin[chosen], copies.reach[chosen])
         for k, hit in zip(chosen.tolist(), hits, strict=True):
             if hit:
-                yield k, missed[hit], gone[hit], on[hit]
+                yield k, missed[hit], gone[hit], short[hit], on[hit]
+
+
+def refuse_short(copies: Copies, found: Sequence[Copy]) -> None:
+    """Raise EditError for a copy of which the ground cannot hold enough."""
+    for copy, place in zip(found, copies.places, strict=True):
+        share = copy.short / (copies.feature.height * abs(place.height))
+        if share > SHORT:
+            numbers = " ".join(f"#{i + 1}" for i in copy.faces)
+            raise EditError(
+                f"{copy.place}: the faces there cannot hold the copy: it would be off by {100 * share:.0f} % of its "
+                f"height ({numbers})",
+                "make it smaller with --size, or choose another place",
+            )
 
 
 def refuse_clipped(copies: Copies, found: Sequence[Copy]) -> None:

@@ -20,7 +20,7 @@ from mracad.constraint.frozen import separate
 from mracad.constraint.seam import Seam
 from mracad.constraint.trimmed import TrimmedSeam
 from mracad.constraint.wishes import Wishes
-from mracad.feature.compared import Copy, Outcome, compared, refuse_clipped
+from mracad.feature.compared import Copy, Outcome, compared, refuse_clipped, refuse_short
 from mracad.feature.crossing import Crossing, crossing, reached, refined
 from mracad.feature.fine import MISSED, Fit
 from mracad.feature.ground import Ground
@@ -145,6 +145,7 @@ def laid(copies: Copies, wishes: Wishes, coupled: bool, clip: bool, removed: Map
     taken = {i: over(task.model.surfaces[i].net, attempt.nets[i], each) for i, each in removed.items()}
     outcomes = {i: Outcome(attempt.nets[i], d - taken.get(i, 0.0), attempt.alone[i]) for i, d in attempt.done.items()}
     found = compared(copies, outcomes, task.shifts.matched)
+    refuse_short(copies, found)
     if not clip:
         refuse_clipped(copies, found)
     moving, loose = (

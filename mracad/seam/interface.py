@@ -15,7 +15,7 @@ import numpy as np
 from mracad.bspline.net import Net
 from mracad.constraint.border import Border
 from mracad.constraint.cause import Cause, Still
-from mracad.constraint.frozen import meeting, reached
+from mracad.constraint.frozen import CONTINUITY, meeting, reached
 from mracad.constraint.seam import Meeting, Seam, seams
 from mracad.constraint.trace import trace_of
 from mracad.constraint.trimmed import TrimmedSeam, beside, trimmed
@@ -54,6 +54,8 @@ class Joints:
         Edges that stay, and why.
     meetings : mapping of int to Meeting
         How edges meet what lies beyond them; where they stay, they keep that.
+    jumps : bool
+        Whether jumps of curvature along them must not grow.
     """
 
     exact: tuple[Seam, ...] = ()
@@ -61,6 +63,7 @@ class Joints:
     closing: Mapping[int, tuple[Border, Border]] = field(default_factory=dict)
     frozen: Mapping[int, Cause] = field(default_factory=dict)
     meetings: Mapping[int, Meeting] = field(default_factory=dict)
+    jumps: bool = False
 
     @property
     def moving(self) -> frozenset[int]:
@@ -114,7 +117,7 @@ def joints(model: Model, movable: Collection[int], wishes: Wishes) -> Joints:
         elif not seam.joint.order:
             exact.remove(seam)
             frozen |= dict.fromkeys((seam.edge, seam.twin), rest)
-    return Joints(tuple(exact), tuple(loose), known.closing, frozen, known.meetings)
+    return Joints(tuple(exact), tuple(loose), known.closing, frozen, known.meetings, wishes.keep not in CONTINUITY)
 
 
 def contact(seam: TrimmedSeam) -> Contact:

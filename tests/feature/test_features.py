@@ -1,6 +1,7 @@
 """Features through the command line: closed forms of a bump on grounds of known geometry, read back from the file."""
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,6 +14,8 @@ from mracad.audit.continuity import seams
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.net import Net
 from mracad.edit.features import extract, repeat
+from mracad.errors import Code, EditError
+from mracad.feature.compared import Copy, refuse_short
 from mracad.occ.step import read_step, write_step
 from mracad.occ.view import view
 from mracad.options import Repeat
@@ -432,6 +435,34 @@ def test_samples_that_coincide_along_a_seam_count_once():
     window = "near:2188.86,-382.397,-287.284,radius:300"
     edit = repeat(model, Repeat(feature=window, at=("1948.27,-466.698,-330.851",)))
     assert edit.faces("edited")
+
+
+@pytest.mark.skipif(CORPUS is None, reason="MRACAD_CORPUS does not name a folder of STEP models")
+@pytest.mark.parametrize(("size", "short"), [(1.0, False), (3.0, True), (5.0, True)])
+def test_a_copy_larger_than_its_ground_allows_is_refused(size, short):
+    """Whatever may be taken from it where it meets edges that stay."""
+    model = view(read_step(CORPUS / "engine_nacelle_openshell_tigl.step"))
+    feature, place = "near:2188.86,-382.397,-287.284,radius:300", "1948.27,-466.698,-330.851"
+    options = Repeat(feature=feature, at=(place,), size=size, clip=True)
+    if not short:
+        assert 0 < repeat(model, options).copies[0].short < 0.05 * 8.8
+        return
+    with pytest.raises(EditError, match=f"place 1 .{place}.: the faces there cannot hold the copy") as caught:
+        repeat(model, options)
+    assert caught.value.code == Code.CANNOT_EDIT
+
+
+def test_copies_that_are_off_by_a_tenth_of_their_height_are_named():
+    places = [SimpleNamespace(height=height) for height in (1.0, -2.0)]
+    copies = SimpleNamespace(places=places, feature=SimpleNamespace(height=3.0))
+
+    def copy(name, short):
+        return Copy(name, (0.0, 0.0, 0.0), (4,), 9.0, 9.0, 9.0, short, False)
+
+    refuse_short(copies, [copy("one", 0.29), copy("two", 0.59)])
+    with pytest.raises(EditError, match=r"two: .* cannot hold the copy: .* by 11 % .* .#5.") as caught:
+        refuse_short(copies, [copy("one", 0.29), copy("two", 0.66)])
+    assert caught.value.code == Code.CANNOT_EDIT
 
 
 @pytest.mark.parametrize("angle", [0.0, 1.0])

@@ -29,7 +29,7 @@ def trimmed(net, curves):
 
 
 def held_by(model, net, moving=(), orders=(), movable=(0,)):
-    meetings = {edge: Meeting(order, 0.0, ()) for edge, order in dict(orders).items()}
+    meetings = {edge: Meeting(order, 0.0, 0.0, ()) for edge, order in dict(orders).items()}
     joined = Joints(closing=dict.fromkeys(moving), meetings=meetings)
     return rims(model, net, model.faces, set(movable), joined)
 
