@@ -189,7 +189,7 @@ def test_defects_are_carried_or_mended(sewn):
     assert gap > 3e-3 and 0.05 < angle < 1
     for options in ({}, {"close_gaps": True}, {"fit_g1": 1.0}, {"close_gaps": True, "fit_g1": 1.0}):
         document = torn(patches, sewn)
-        report = job.run(document, smooth, Smooth(level=1, **options))
+        report = job.run(document, smooth, Smooth(level=1, keep="g1", **options))  # jumps of curvature may grow
         assert coupled(report) == (4 if sewn else 8)
         now = seams(view(document))
         share, wider, steeper = (0.1, 1e-4, 0.1) if options else (0.0, 1e-6, 0.008)
