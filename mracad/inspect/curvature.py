@@ -19,7 +19,7 @@ VOID = 1e-40
 """|S_u × S_v| up to which it does, too: powers of less are no numbers."""
 
 
-MANY = 4_000_000
+MANY = 7_000_000
 """Points after which those that follow are worth the import of a compiler."""
 
 
