@@ -66,7 +66,8 @@ class Filter:
             return
         smooth, faded = stiffness(width / 2), problem.fading(width) * target
         yield [problem.nearest(target, stiff) for stiff in (0.0, stiffness(width / 4), smooth)]
-        yield problem.filtered(stiffness(self.scale)), problem.nearest(faded, smooth), problem.nearest(faded)
+        yield problem.filtered(stiffness(self.scale)), problem.nearest(target, stiffness(width / 8))
+        yield problem.nearest(faded, smooth), problem.nearest(faded)
         yield [problem.nearest(calm(problem, target, width) * faded)]
 
 
