@@ -21,7 +21,7 @@ from mracad.constraint.trimmed import TrimmedSeam
 from mracad.edit.pose import Scene, beside_rims
 from mracad.edit.target import Sheet, Wish
 from mracad.edit.tolerances import Tolerances
-from mracad.edit.trial import ENOUGH, Trial, Verdict, Watch, amounts, displaced
+from mracad.edit.trial import ENOUGH, Trial, Watch, amounts, displaced, worth
 from mracad.inspect.roughness import Change, Worse
 from mracad.model import Displacement, Offset
 from mracad.seam.interface import Joints
@@ -43,9 +43,11 @@ PRICE = 0.01
 CLOSER = 9
 """Points a span at which a result is looked at again."""
 
+TOGETHER = 1.25
+"""Surfaces move together unless each by itself comes nearer to what is wanted by more than this factor."""
+
 BLENDS, PROMISE = 2, 1.05
-"""Most times that what is best for each of joined surfaces is put together, and by how much that, or what is done to
-each by itself, has to come nearer."""
+"""Most times that what is best for each of joined surfaces is put together, and by how much it has to come nearer."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,7 +127,7 @@ class Moved:
         return replace(self, offset=amount * whole, amount=amount, changes=changes, limits=limits or self.limits)
 
     def _watch(self) -> Watch:
-        return Watch.of([(self.net, self.sheet.faces)], self.sheet.wavelength, CLOSER)
+        return Watch.of([(self.net, self.sheet.faces)], self.sheet.wavelength, self.sheet.reach, CLOSER)
 
     def displacement(self) -> Offset:
         """The displacement over the surface as it is."""
@@ -222,7 +224,7 @@ def _less(together: Mapping[int, Moved], alone: Mapping[int, Moved]) -> bool:
     """
     every = next(iter(together.values()))
     gain, wanted = (sum(getattr(alone[i], name) for i in together if i in alone) for name in ("gain", "wanted"))
-    return PROMISE * every.gain * wanted < gain * every.wanted
+    return TOGETHER * every.gain * wanted < gain * every.wanted
 
 
 def _together(
@@ -295,32 +297,30 @@ def _attempt(
     members = {i: scene.sheets[i] for i in surfaces}
     trial = Trial(scene, members, joined, finer)
     target = wish.target(trial.problem, members, joined)
-    best, found = trial.nothing(), []
+    found = [trial.nothing()]
     for batch in wish.ways(trial.problem, target, trial.width) if trial.problem.free.any() else ():
-        found += [trial.judged(wanted, target) for wanted in batch]
-        best = max(found, key=_worth)
-        if best.least > ENOUGH:
+        tried = [trial.judged(wanted, target) for wanted in batch]
+        if max(found + tried, key=worth).least <= ENOUGH:
+            tried = [trial.eased(each, target) for each in tried]
+        found += tried
+        if max(found, key=worth).least > ENOUGH:
             break
-    for _ in range(BLENDS if found and len(members) > 1 else 0):
+    for _ in range(BLENDS if len(found) > 1 and len(members) > 1 else 0):
         chosen = [(max(found, key=lambda each: each.gains[i]), i) for i in range(len(members))]
-        if sum(each.gains[i] for each, i in chosen) <= PROMISE * best.gain:
+        now = max(found, key=worth)
+        if sum(each.gains[i] for each, i in chosen) <= PROMISE * now.gain:
             break
         found.append(trial.blended(chosen, target))
-        if found[-1].worth <= best.worth:
+        if max(found, key=worth) is now:
             break
-        best = found[-1]
-    best = max([*found, trial.nothing()], key=_worth)
-    fairer = [True] * len(members) if best.least else trial.fairer(target)
+    done = max(found, key=worth)
+    fairer = [True] * len(members) if done.least else trial.fairer(target)
     wished = float((target * (trial.problem.mass @ target)).sum())
     return {
         i: Moved(
-            members[i], space.net, amount * part, amount, change, limits, int(space.free.sum()), best.gain, wished, fair
+            members[i], space.net, amount * part, amount, change, limits, int(space.free.sum()), done.gain, wished, fair
         )
         for (i, space), part, amount, change, limits, fair in zip(
-            trial.problem.spaces.items(), best.parts, best.amounts, best.changes, best.limits, fairer, strict=True
+            trial.problem.spaces.items(), done.parts, done.amounts, done.changes, done.limits, fairer, strict=True
         )
     }
-
-
-def _worth(verdict: Verdict) -> float:
-    return verdict.worth

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 
@@ -50,6 +51,7 @@ class Filter:
     """
 
     scale: float
+    spread: ClassVar[float] = 1.0
 
     def wavelength(self, net: Net, creases: Creases) -> float:
         """The scale, for every surface."""

@@ -18,7 +18,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -56,6 +56,7 @@ class Level:
     """
 
     level: float
+    spread: ClassVar[float] = math.inf  # waves beside what goes are part of a projection
 
     def wavelength(self, net: Net, creases: Creases) -> float:
         """√2 spacings of the coarse knots, in the direction that gets coarser where they are closest."""
@@ -89,9 +90,8 @@ class Level:
 
     def ways(self, problem: Problem, target: Array, width: float) -> Iterable[Iterable[Array]]:
         """What is nearest to the target, and smoother ways from it to what is held."""
-        yield [problem.nearest(target)]
+        yield [problem.nearest(target, stiff) for stiff in ((0.0, stiffness(width / 4)) if problem.rimmed else (0.0,))]
         if problem.rimmed:
-            yield [problem.nearest(target, stiffness(width / 4))]
             yield problem.nearest(target, stiffness(width / 2)), problem.nearest(problem.fading(width) * target)
 
     def _steps(self) -> list[tuple[float, int]]:

@@ -131,7 +131,7 @@ def _moved(members: Mapping[int, Sheet], found: Pose, delta: Array) -> dict[int,
 
 def _whole(sheet: Sheet, net: Net, offset: Array, free: int) -> Moved:
     """A displacement that was done in whole."""
-    now = Watch.of([(net, sheet.faces)], sheet.wavelength).changes({0: displaced(net, offset)})[0]
+    now = Watch.of([(net, sheet.faces)], sheet.wavelength, sheet.reach).changes({0: displaced(net, offset)})[0]
     return Moved(sheet, net, offset, 1.0, now, (), free, 0.0, 0.0)
 
 

@@ -30,7 +30,16 @@ TREND = 2.5
 
 
 class Wish(Protocol):
-    """What an edit wants."""
+    """What an edit wants.
+
+    Attributes
+    ----------
+    spread : float
+        Within how many wavelengths what it takes from a place spreads; infinite where that is no fault.
+    """
+
+    @property
+    def spread(self) -> float: ...
 
     def wavelength(self, net: Net, creases: Creases) -> float:
         """Wavelength below which it takes waves from a surface, mm: within it, it fades beside what is held."""
@@ -67,6 +76,8 @@ class Sheet:
         Crease lines in u and v.
     wavelength : float
         Below which the edit takes waves from it, mm.
+    reach : float
+        Within which what it takes spreads, mm.
     trend : Net
         The surface projected on the splines of a few wavelengths: what is in it is shape.
     detail : float
@@ -81,6 +92,7 @@ class Sheet:
     metric: Net
     creases: Creases
     wavelength: float
+    reach: float
     trend: Net
     detail: float = 0.0
 
@@ -114,7 +126,8 @@ def _sheet(index: int, origin: Net, every: tuple[Face, ...], faces: tuple[Face, 
     metric = smoothed(net, points, SMOOTHER**4 * stiffness(wavelength))
     form = forms(net, metric, points, sharp)
     reach = seen(net, form)
-    sheet = Sheet(index, origin, net, every, faces, metric, sharp, wavelength, _trend(net, sharp, TREND * wavelength))
+    trend, wide = _trend(net, sharp, TREND * wavelength), wish.spread * wavelength
+    sheet = Sheet(index, origin, net, every, faces, metric, sharp, wavelength, wide, trend)
     alone = Problem({index: Space(net, form, reach, reach, sheet.trend.poles)})
     change = wish.target(alone, {index: sheet}, Joints())
     return replace(sheet, detail=float(np.linalg.norm(change[alone.seen], axis=1).max(initial=0.0)))

@@ -12,7 +12,8 @@ from mracad.edit.jumps import Jumps
 from mracad.edit.pose import Scene, pose
 from mracad.edit.target import Sheet, eased, stiffness
 from mracad.edit.tolerances import Tolerances
-from mracad.inspect.roughness import Change, Worse, better, worse
+from mracad.inspect.places import Placed
+from mracad.inspect.roughness import Change, Worse, better, places, worse
 from mracad.inspect.survey import POINTS, Survey, changes, surveys
 from mracad.model import Face
 from mracad.seam.interface import Joints
@@ -22,8 +23,8 @@ Array = np.ndarray
 BISECTIONS = 5
 """Steps in which the amount is found."""
 
-GAIN = 0.005
-"""Least share of its bending or curvature variation that a face must lose to be touched at all."""
+GAIN = 0.05, 0.25
+"""Least share of bending or curvature variation that a face must lose to be touched at all, or one of its places."""
 
 ENOUGH = 0.9
 """Where more than this of a displacement may be done, no other is tried."""
@@ -31,6 +32,12 @@ ENOUGH = 0.9
 WHOLE = 1.25
 """What may be done in whole is preferred to a part of what comes nearer to the target by less than this factor: a part
 leaves something of every wave everywhere."""
+
+SHARES = 0.125, 0.25, 0.5, 1.0
+"""Amounts of which the largest that serves is done place by place, where not all can be done everywhere."""
+
+EASINGS = 2
+"""Most times that this is done to one displacement."""
 
 SINGULAR = 1e5
 """Curvature over the wavelength from which on a face is singular."""
@@ -71,11 +78,6 @@ class Verdict:
         """What may be done to all of them."""
         return min(self.amounts)
 
-    @property
-    def worth(self) -> float:
-        """What it counts for among others."""
-        return self.gain * (WHOLE if self.least > ENOUGH else 1.0)
-
 
 class Trial:
     """Surfaces that move together: their problem, and the judge of what is done to them."""
@@ -87,7 +89,8 @@ class Trial:
         self.pose = pose(scene, members, joined, self.width, detail, finer=finer)
         self.problem = self.pose.problem
         self.jumps = Jumps(scene, members, joined, self.width)
-        self.watch = Watch.of([(space.net, members[i].faces) for i, space in self.problem.spaces.items()], self.width)
+        surfaces = [(space.net, members[i].faces) for i, space in self.problem.spaces.items()]
+        self.watch = Watch.of(surfaces, self.width, max(sheet.reach for sheet in members.values()))
 
     def nothing(self) -> Verdict:
         """What the judge makes of leaving everything as it is."""
@@ -107,22 +110,53 @@ class Trial:
         nets = [space.net for space in problem.spaces.values()]
         shares, found, limits = amounts(self.watch, nets, parts, ceiling, self.tolerances)
         for i, faces in enumerate(found):
-            if not any(better(change, GAIN) for change in faces.values()):
+            if not any(better(change, *GAIN) for change in faces.values()):
                 shares[i], found[i] = 0.0, {face: change.undone() for face, change in faces.items()}
         gains = problem.gains(delta, target, shares)
         gain = sum(problem.gains(delta, target, [min(shares)] * len(parts)))
         return Verdict(parts, shares, found, limits, gains, gain)
 
+    def eased(self, verdict: Verdict, target: Array) -> Verdict:
+        """The best that becomes of a displacement that is scaled back where places allow less of it."""
+        found = [verdict]
+        while found[-1].least <= ENOUGH and len(found) <= EASINGS:
+            delta = np.concatenate([part.reshape(-1, 3) for part in found[-1].parts])
+            share = self._shares(delta)
+            if np.ptp(share) == 0:
+                break
+            found.append(self.judged(self.problem.nearest(share * delta, stiffness(self.width)), target))
+        return max(found, key=worth)
+
     def blended(self, chosen: Sequence[tuple[Verdict, int]], target: Array) -> Verdict:
         """For each surface another verdict on it, by place, made to meet as smoothly as can be."""
         wanted = np.concatenate([each.amounts[i] * each.parts[i].reshape(-1, 3) for each, i in chosen])
-        return self.judged(self.problem.nearest(wanted, stiffness(self.width)), target)
+        return self.eased(self.judged(self.problem.nearest(wanted, stiffness(self.width)), target), target)
 
     def fairer(self, delta: Array) -> list[bool]:
         """Whether a displacement would take anything off the roughness of each surface, whatever it adds to others."""
         both = zip(self.problem.spaces.values(), self.problem.split(delta).values(), strict=True)
         found = self.watch.changes({i: displaced(space.net, part) for i, (space, part) in enumerate(both)})
-        return [any(better(change, GAIN) for change in faces.values()) for faces in found.values()]
+        return [any(better(change, GAIN[0]) for change in faces.values()) for faces in found.values()]
+
+    def _shares(self, delta: Array) -> Array:
+        """The largest of :data:`SHARES` of a displacement that makes no place rougher, eased, ``(points, 1)``."""
+        nets = [space.net for space in self.problem.spaces.values()]
+        parts = list(self.problem.split(delta).values())
+        found: dict[tuple[int, int], tuple[Placed, Array]] = {}
+        for amount in SHARES:
+            tried = {i: displaced(net, amount * part) for i, (net, part) in enumerate(zip(nets, parts, strict=True))}
+            for i, faces in self.watch.changes(tried).items():
+                for face, change in faces.items():
+                    assert change.placed is not None
+                    _, share = found.get((i, face), (None, np.zeros(change.placed.area.shape)))
+                    share = np.where(places(change, self.tolerances.growth), share, amount)
+                    found[i, face] = change.placed, share
+        least = [np.ones(net.poles.shape[:2]) for net in nets]
+        for (i, _), (placed, share) in found.items():
+            at = placed.at(nets[i].u.greville(), nets[i].v.greville())
+            least[i] = np.minimum(least[i], share[np.ix_(*at)])
+        both = zip(nets, least, strict=True)
+        return np.concatenate([eased(net, share, self.width / 2).ravel() for net, share in both])[:, None]
 
     def _ceilings(self, delta: Array) -> Array:
         """How much of a displacement contacts allow each surface."""
@@ -136,6 +170,11 @@ class Trial:
         for i, most in self.jumps.room(moved).items():
             ceiling[i] = min(ceiling[i], most)
         return np.array(list(ceiling.values()))
+
+
+def worth(verdict: Verdict) -> float:
+    """What a verdict counts for among others."""
+    return verdict.gain * (WHOLE if verdict.least > ENOUGH else 1.0)
 
 
 def bounded(net: Net, offset: Array, bound: float, width: float) -> Array:
@@ -186,11 +225,14 @@ class Watch:
     owners: Sequence[tuple[int, int]]
 
     @classmethod
-    def of(cls, surfaces: Sequence[tuple[Net, Sequence[Face]]], width: float, points: int = POINTS) -> Watch:
-        """Look at faces of surfaces before an edit that takes waves up to a width (mm), at so many points a span."""
+    def of(
+        cls, surfaces: Sequence[tuple[Net, Sequence[Face]]], width: float, reach: float, points: int = POINTS
+    ) -> Watch:
+        """Look at faces of surfaces before an edit that takes waves up to a width and spreads them within a reach (mm),
+        at so many points a span."""
         every = [(place, net, face) for place, (net, faces) in enumerate(surfaces) for face in faces]
         return cls(
-            surveys([(net, (face,), net.u, net.v) for _, net, face in every], points, SINGULAR / width),
+            surveys([(net, (face,), net.u, net.v) for _, net, face in every], points, SINGULAR / width, reach),
             [(place, face.index) for place, _, face in every],
         )
 

@@ -5,6 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
+import numpy as np
+
+from mracad.inspect.places import Placed
+
+Array = np.ndarray
+
 
 class Rougher(Enum):
     """In what a face got worse."""
@@ -15,6 +21,7 @@ class Rougher(Enum):
     KINK = "kink"
     FOLD = "fold"
     SINGULAR = "singular point"
+    SPREAD = "waves where it is smooth"
 
 
 SETTLED = 0.005
@@ -67,6 +74,8 @@ class Change:
         Largest motion, mm.
     unsettled : float
         Largest relative change of the curvature at singular points that stay singular.
+    placed : Placed, optional
+        What became of its places.
     """
 
     before: Roughness
@@ -77,6 +86,17 @@ class Change:
     deviation: float = 0.0
     motion: float = 0.0
     unsettled: float = 0.0
+    placed: Placed | None = None
+
+    @property
+    def spread(self) -> float:
+        """By how much bending or curvature variation of a place exceeds all that was about it before, relative."""
+        return 0.0 if self.placed is None else float(self.placed.spread.max(initial=0.0))
+
+    @property
+    def lost(self) -> float:
+        """Largest share of the one or the other that a place lost."""
+        return 0.0 if self.placed is None else float(self.placed.lost.max(initial=0.0))
 
     def undone(self) -> Change:
         """Nothing done instead."""
@@ -95,6 +115,8 @@ class Growth:
         By how much an angle across a knot line may grow, degrees.
     fold : float
         By how much a normal may turn, degrees.
+    spread : float
+        By how much the figures of a place may exceed all that was about it, relative.
     """
 
     bending: float = 0.0
@@ -102,12 +124,13 @@ class Growth:
     curvature: float = 0.0
     kink: float = 0.0
     fold: float = 30.0
+    spread: float = 0.0
 
 
 @dataclass(frozen=True)
 class Worse:
     """One figure of a face that got worse, before and after; of a fold 0 and the angle (degrees), of a singular point 0
-    and the share by which its curvature changed."""
+    and the share by which its curvature changed, of a place 1 and its figure over the largest about it before."""
 
     what: Rougher
     before: float
@@ -130,11 +153,24 @@ def worse(change: Change, allowed: Growth) -> tuple[Worse, ...]:
         found.append(Worse(Rougher.FOLD, 0.0, change.turn))
     if change.unsettled > SETTLED:
         found.append(Worse(Rougher.SINGULAR, 0.0, change.unsettled))
+    if change.spread > allowed.spread:
+        found.append(Worse(Rougher.SPREAD, 1.0, 1.0 + change.spread))
     return tuple(found)
 
 
-def better(change: Change, share: float) -> bool:
-    """Whether a change took more than a share of the bending or of the curvature variation."""
+def places(change: Change, allowed: Growth) -> Array:
+    """The places of a face that got worse than allowed, ``(nu, nv)``."""
+    found = change.placed
+    assert found is not None
+    most = change.before.curvature * (1 + allowed.curvature) + change.noise.curvature
+    steep = (found.turn > np.radians(allowed.fold)) | (found.opened > np.radians(allowed.kink + change.noise.kink))
+    rough = (found.spread > allowed.spread) | (found.curvature > most) | (found.unsettled > SETTLED)
+    return np.asarray(steep | rough)
+
+
+def better(change: Change, share: float, local: float = np.inf) -> bool:
+    """Whether a change took more than a share of the bending or of the curvature variation, or another of a place's."""
     both = (change.before.bending, change.after.bending), (change.before.variation, change.after.variation)
     noise = change.noise.bending, change.noise.variation
-    return any(old - new > share * old + ripple for (old, new), ripple in zip(both, noise, strict=True))
+    whole = any(old - new > share * old + ripple for (old, new), ripple in zip(both, noise, strict=True))
+    return whole or change.lost > local

@@ -14,6 +14,7 @@ from mracad.inspect.cells import Quadrature, quadrature
 from mracad.inspect.creases import CLUSTER, Crossing, crossings
 from mracad.inspect.curvature import Forms, forms
 from mracad.inspect.jets import blocks
+from mracad.inspect.places import Places
 from mracad.inspect.roughness import Change, Roughness
 from mracad.model import Face
 
@@ -63,6 +64,8 @@ class Survey:
     crossed : list of (Crossing, ndarray)
         Where tangents may jump, and the angles by which they do.
     roughness, noise : Roughness
+    places : Places or None
+        Where it is looked at place by place.
     """
 
     net: Net
@@ -77,12 +80,14 @@ class Survey:
     crossed: Sequence[tuple[Crossing, Array]]
     roughness: Roughness
     noise: Roughness
+    places: Places | None
 
 
 def surveys(
     surfaces: Iterable[tuple[Net, Sequence[Face], KnotVector, KnotVector]],
     points: int = POINTS,
     singular: float = np.inf,
+    wavelength: float = 0.0,
 ) -> list[Survey]:
     """Look at surfaces before an edit.
 
@@ -94,6 +99,8 @@ def surveys(
         Points a span of those knots, in either direction.
     singular : float
         Curvature, 1/mm, from which on a point is singular: what a grid sees of it depends on where its points lie.
+    wavelength : float
+        Of the edit, mm: faces are then looked at place by place, too.
     """
     ready = [
         (net, tuple(faces), _rule(faces, u, v, points), (u, v), net.poles.mean(axis=(0, 1)))
@@ -116,6 +123,7 @@ def surveys(
             Survey(
                 net, faces, rule, centre, at, form.normal.astype(np.float32), regular, sharp, rounding, crossed,
                 _roughness(areas, form, regular, rounding, kink), _noise(areas * regular, sides, rounding),
+                Places.of(rule, form, areas * regular, wavelength) if wavelength else None,
             )
         )  # fmt: skip
     return found
@@ -135,33 +143,36 @@ def changes(surveyed: Sequence[Survey], nets: Sequence[Net]) -> list[Change]:
     for survey, net, (at, form) in zip(surveyed, nets, seen, strict=True):
         motion = at - survey.points
         both = form.regular & survey.regular
-        turned = _turned(survey, form.normal.astype(np.float32), both)
-        now = [(crossing.angles(net), before) for crossing, before in survey.crossed]
-        opened, kink = _largest(new - old for new, old in now), _largest(new for new, _ in now)
+        turned = 2 * np.arcsin(np.minimum(_turned(survey, form.normal.astype(np.float32), both) / 2, 1.0))
+        now = [(crossing, crossing.angles(net), before) for crossing, before in survey.crossed]
+        opened = [(crossing, new - old) for crossing, new, old in now]
+        kink, unsettled = _largest(new for _, new, _ in now), _unsettled(survey, form)
+        areas, places = _areas(survey.rule, form), survey.places
         found.append(
             Change(
                 survey.roughness,
-                _roughness(_areas(survey.rule, form), form, survey.regular, survey.rounding, kink),
+                _roughness(areas, form, survey.regular, survey.rounding, kink),
                 survey.noise,
-                np.degrees(opened).item(),
-                np.degrees(2 * np.arcsin(min(float(turned.max(initial=0.0)) / 2, 1.0))).item(),
+                np.degrees(_largest(grew for _, grew in opened)).item(),
+                np.degrees(turned.max(initial=0.0)).item(),
                 float(np.abs((motion * survey.normals).sum(axis=0)).max(initial=0.0)),
                 float(np.linalg.norm(motion, axis=0).max(initial=0.0)),
-                _unsettled(survey, form),
+                float(unsettled.max(initial=0.0)),
+                places.compared(form, areas * survey.regular, turned, unsettled, opened) if places else None,
             )
         )
     return found
 
 
-def _unsettled(survey: Survey, form: Forms) -> float:
-    """Largest relative change of the curvature of singular points that stay singular, or turn of their normals."""
-    those = survey.sharp > 0
-    if not those.any():
-        return 0.0
-    before, after = survey.sharp[those], form.largest[those]
-    stay = after > before.min()
-    turned = np.linalg.norm(form.normal[:, those].astype(np.float32) - survey.normals[:, those], axis=0)
-    return float(max(np.abs(after / before - 1)[stay].max(initial=0.0), STEADY * turned.max(initial=0.0)))
+def _unsettled(survey: Survey, form: Forms) -> Array:
+    """Relative change of curvature, or turn of normals, at singular points that stay so; 0 elsewhere, ``(q,)``."""
+    found, those = np.zeros(len(survey.sharp)), survey.sharp > 0
+    if those.any():
+        before, after = survey.sharp[those], form.largest[those]
+        change = np.where(after > before.min(), np.abs(after / before - 1), 0.0)
+        turned = np.linalg.norm(form.normal[:, those].astype(np.float32) - survey.normals[:, those], axis=0)
+        found[those] = np.maximum(change, STEADY * turned)
+    return found
 
 
 def _turned(survey: Survey, normals: Array, counted: Array) -> Array:
