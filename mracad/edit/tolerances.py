@@ -12,8 +12,8 @@ from mracad.model import Edge, Model
 from mracad.options import Fitting, Selection, length
 
 GROWTH = Growth(0.005, 0.005, 0.005, 0.02, 30.0, 0.25)
-"""What the judge lets pass by default: a quarter of the 2 % that count as worse where faces are compared, and waves at a
-place of an eighth more than about it."""
+"""What the judge lets pass by default: a quarter of the 2 % that count as worse where faces are compared, and waves
+at a place of an eighth more than about it."""
 
 MORE = 0.02
 """Share by which an edge may gape more that gapes as far as it may."""

@@ -63,7 +63,8 @@ def test_surfaces_that_go_through_together_are_not_all_tried_alone(spans, scale,
     monkeypatch.setattr(driver, "FIRST", 9)
     every = smooth(model, options)
     assert tried[len(solved) :] == [1] * 9 + (solved[10:] or [9])
-    assert len(some.displacement.offsets) == 9 and some.faces("edited") == every.faces("edited")
+    assert some.displacement.offsets.keys() == every.displacement.offsets.keys()
+    assert some.faces("edited") == every.faces("edited")
     for index, offset in some.displacement.offsets.items():
         assert np.array_equal(offset.poles, every.displacement.offsets[index].poles)
 

@@ -162,8 +162,8 @@ def test_points_are_not_added_where_a_face_does_as_well_without_them():
     """A ruled strip with a wave between straight edges: its rows move once its degree is raised."""
     u = KnotVector.clamped(np.arange(33.0), 3)
     x = u.greville()
-    rows = [np.stack([x, 6 * i + 0 * x, 0.05 * np.sin(2 * np.pi * x / 3)], axis=-1) for i in (0, 1)]
-    strip = Net(u, KnotVector.clamped([0, 6], 1), np.stack(rows, axis=1))
+    rows = [np.stack([x, 2 * i + 0 * x, 0.05 * np.sin(2 * np.pi * x / 3)], axis=-1) for i in (0, 1)]
+    strip = Net(u, KnotVector.clamped([0, 2], 1), np.stack(rows, axis=1))
     for refine in ("never", "auto"):
         result, outcome = smoothed(strip, scale="8mm", refine=refine)
         assert outcome.status == "edited" and outcome.detail > 0.01
