@@ -21,7 +21,7 @@ from mracad.constraint.trimmed import TrimmedSeam
 from mracad.edit.pose import Scene, beside_rims
 from mracad.edit.target import Sheet, Wish
 from mracad.edit.tolerances import Tolerances
-from mracad.edit.trial import ENOUGH, Trial, Watch, amounts, displaced, worth
+from mracad.edit.trial import ENOUGH, Trial, Watch, amounts, displaced, gained, worth
 from mracad.inspect.roughness import Change, Worse
 from mracad.model import Displacement, Offset
 from mracad.seam.interface import Joints
@@ -119,12 +119,14 @@ class Moved:
         return replace(self, offset=np.zeros_like(self.offset), amount=0.0, changes=still, limits=(), gain=0.0)
 
     def confirmed(self, tolerances: Tolerances) -> Moved:
-        """What a closer look leaves of it: what grows between the points of the first is taken back."""
+        """What a closer look leaves of it: what grows between the points of the first is taken back; nothing if no face
+        gains by the rest."""
         if not self.amount:
             return self
         whole, most = self.offset / self.amount, np.array([self.amount])
         (amount,), (changes,), (limits,) = amounts(self._watch(), [self.net], [whole], most, tolerances)
-        return replace(self, offset=amount * whole, amount=amount, changes=changes, limits=limits or self.limits)
+        found = replace(self, offset=amount * whole, amount=amount, changes=changes, limits=limits or self.limits)
+        return found if gained(changes) else replace(found.undone(), limits=found.limits)
 
     def _watch(self) -> Watch:
         return Watch.of([(self.net, self.sheet.faces)], self.sheet.wavelength, self.sheet.reach, CLOSER)
@@ -250,6 +252,10 @@ def _together(
             continue
         found = {i: moved.confirmed(scene.tolerances) for i, moved in found.items()}
         least = min(moved.amount for moved in found.values())
+        if not least:
+            good = [i for i, moved in found.items() if moved.amount]
+            waiting += [(each, rounds - 1) for each in groups(good, scene.joints.among(good))]
+            continue
         yield {i: moved.scaled(least) for i, moved in found.items()}, joined
 
 

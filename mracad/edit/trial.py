@@ -110,7 +110,7 @@ class Trial:
         nets = [space.net for space in problem.spaces.values()]
         shares, found, limits = amounts(self.watch, nets, parts, ceiling, self.tolerances)
         for i, faces in enumerate(found):
-            if not any(better(change, *GAIN) for change in faces.values()):
+            if not gained(faces):
                 shares[i], found[i] = 0.0, {face: change.undone() for face, change in faces.items()}
         gains = problem.gains(delta, target, shares)
         gain = sum(problem.gains(delta, target, [min(shares)] * len(parts)))
@@ -170,6 +170,11 @@ class Trial:
         for i, most in self.jumps.room(moved).items():
             ceiling[i] = min(ceiling[i], most)
         return np.array(list(ceiling.values()))
+
+
+def gained(faces: Mapping[int, Change]) -> bool:
+    """Whether one of the faces of a surface gained enough to be touched."""
+    return any(better(change, *GAIN) for change in faces.values())
 
 
 def worth(verdict: Verdict) -> float:
