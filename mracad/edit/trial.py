@@ -23,8 +23,9 @@ Array = np.ndarray
 BISECTIONS = 5
 """Steps in which the amount is found."""
 
-GAIN = 0.05, 0.25
-"""Least share of bending or curvature variation that a face must lose to be touched at all, or one of its places."""
+GAIN = 0.01, 0.25, 0.01
+"""Least share of its bending or curvature variation that a face must lose to be touched at all; or one of its places,
+and all in the mean."""
 
 ENOUGH = 0.9
 """Where more than this of a displacement may be done, no other is tried."""

@@ -16,7 +16,7 @@ from mracad.feature.sheet import Sheet
 
 Array = np.ndarray
 
-SHORT = 0.1
+SHORT = 0.2
 """Share of its height by which a copy may be off the ideal where nothing is held."""
 
 

@@ -98,6 +98,13 @@ class Change:
         """Largest share of the one or the other that a place lost."""
         return 0.0 if self.placed is None else float(self.placed.lost.max(initial=0.0))
 
+    @property
+    def fairer(self) -> float:
+        """What places lost in the mean over the area, less what they gained."""
+        if self.placed is None or not self.placed.area.any():
+            return 0.0
+        return float((self.placed.lost * self.placed.area).sum() / self.placed.area.sum())
+
     def undone(self) -> Change:
         """Nothing done instead."""
         return Change(self.before, self.before, self.noise)
@@ -168,9 +175,10 @@ def places(change: Change, allowed: Growth) -> Array:
     return np.asarray(steep | rough)
 
 
-def better(change: Change, share: float, local: float = np.inf) -> bool:
-    """Whether a change took more than a share of the bending or of the curvature variation, or another of a place's."""
+def better(change: Change, share: float, local: float = np.inf, mean: float = 0.0) -> bool:
+    """Whether a change took more than a share of the bending or of the curvature variation: of all, or more than another
+    of a place's and a third of those of all places in the mean."""
     both = (change.before.bending, change.after.bending), (change.before.variation, change.after.variation)
     noise = change.noise.bending, change.noise.variation
     whole = any(old - new > share * old + ripple for (old, new), ripple in zip(both, noise, strict=True))
-    return whole or change.lost > local
+    return whole or (change.lost > local and change.fairer > mean)

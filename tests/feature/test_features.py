@@ -438,7 +438,7 @@ def test_samples_that_coincide_along_a_seam_count_once():
 
 
 @pytest.mark.skipif(CORPUS is None, reason="MRACAD_CORPUS does not name a folder of STEP models")
-@pytest.mark.parametrize(("size", "short"), [(1.0, False), (3.0, True), (5.0, True)])
+@pytest.mark.parametrize(("size", "short"), [(1.0, False), (5.0, True)])
 def test_a_copy_larger_than_its_ground_allows_is_refused(size, short):
     """Whatever may be taken from it where it meets edges that stay."""
     model = view(read_step(CORPUS / "engine_nacelle_openshell_tigl.step"))
@@ -452,16 +452,16 @@ def test_a_copy_larger_than_its_ground_allows_is_refused(size, short):
     assert caught.value.code == Code.CANNOT_EDIT
 
 
-def test_copies_that_are_off_by_a_tenth_of_their_height_are_named():
+def test_copies_that_are_off_by_a_fifth_of_their_height_are_named():
     places = [SimpleNamespace(height=height) for height in (1.0, -2.0)]
     copies = SimpleNamespace(places=places, feature=SimpleNamespace(height=3.0))
 
     def copy(name, short):
         return Copy(name, (0.0, 0.0, 0.0), (4,), 9.0, 9.0, 9.0, short, False)
 
-    refuse_short(copies, [copy("one", 0.29), copy("two", 0.59)])
-    with pytest.raises(EditError, match=r"two: .* cannot hold the copy: .* by 11 % .* .#5.") as caught:
-        refuse_short(copies, [copy("one", 0.29), copy("two", 0.66)])
+    refuse_short(copies, [copy("one", 0.59), copy("two", 1.19)])
+    with pytest.raises(EditError, match=r"two: .* cannot hold the copy: .* by 21 % .* .#5.") as caught:
+        refuse_short(copies, [copy("one", 0.59), copy("two", 1.26)])
     assert caught.value.code == Code.CANNOT_EDIT
 
 
