@@ -43,11 +43,9 @@ PRICE = 0.01
 CLOSER = 9
 """Points a span at which a result is looked at again."""
 
-TOGETHER = 1.25
-"""Surfaces move together unless each by itself comes nearer to what is wanted by more than this factor."""
-
 BLENDS, PROMISE = 2, 1.05
-"""Most times that what is best for each of joined surfaces is put together, and by how much it has to come nearer."""
+"""Most times that what is best for each of joined surfaces is put together, and by how much that, or what is done to
+each by itself, has to come nearer."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -226,7 +224,7 @@ def _less(together: Mapping[int, Moved], alone: Mapping[int, Moved]) -> bool:
     """
     every = next(iter(together.values()))
     gain, wanted = (sum(getattr(alone[i], name) for i in together if i in alone) for name in ("gain", "wanted"))
-    return TOGETHER * every.gain * wanted < gain * every.wanted
+    return PROMISE * every.gain * wanted < gain * every.wanted
 
 
 def _together(

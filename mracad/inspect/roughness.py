@@ -176,8 +176,8 @@ def places(change: Change, allowed: Growth) -> Array:
 
 
 def better(change: Change, share: float, local: float = np.inf, mean: float = 0.0) -> bool:
-    """Whether a change took more than a share of the bending or of the curvature variation: of all, or more than another
-    of a place's and a third of those of all places in the mean."""
+    """Whether a change took more than a share of the bending or of the curvature variation of all; or more than another
+    of that of a place, and than a third of that of all places in the mean."""
     both = (change.before.bending, change.after.bending), (change.before.variation, change.after.variation)
     noise = change.noise.bending, change.noise.variation
     whole = any(old - new > share * old + ripple for (old, new), ripple in zip(both, noise, strict=True))
