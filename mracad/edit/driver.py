@@ -248,13 +248,26 @@ def _together(
             continue
         if _less(found, alone):
             continue
-        found = {i: moved.confirmed(scene.tolerances) for i, moved in found.items()}
-        least = min(moved.amount for moved in found.values())
-        if not least:
-            good = [i for i, moved in found.items() if moved.amount]
+        found = _alike(found, scene.tolerances)
+        good = [i for i, moved in found.items() if moved.amount]
+        if len(good) < len(part):
             waiting += [(each, rounds - 1) for each in groups(good, scene.joints.among(good))]
             continue
-        yield {i: moved.scaled(least) for i, moved in found.items()}, joined
+        yield found, joined
+
+
+def _alike(found: Mapping[int, Moved], tolerances: Tolerances) -> dict[int, Moved]:
+    """The same amount done to all, each looked at closer: less of a displacement may be rougher than more of it.
+
+    Where that does not settle, and of surfaces that gain nothing then, nothing is done.
+    """
+    for _ in range(ROUNDS):
+        found = {i: moved.confirmed(tolerances) for i, moved in found.items()}
+        least = min(moved.amount for moved in found.values())
+        if not least or all(moved.amount == least for moved in found.values()):
+            return dict(found)
+        found = {i: moved.scaled(least) for i, moved in found.items()}
+    return {i: moved.undone() for i, moved in found.items()}
 
 
 def groups(surfaces: Iterable[int], joined: Joints) -> list[list[int]]:

@@ -150,7 +150,7 @@ def worse(change: Change, allowed: Growth) -> tuple[Worse, ...]:
     found = []
     for what, share in ((Rougher.BENDING, allowed.bending), (Rougher.VARIATION, allowed.variation)):
         old, new, ripple = (float(getattr(each, what.name.lower())) for each in (before, after, noise))
-        if new > old * (1 + share) + ripple:
+        if new > max(old * (1 + share), ripple):
             found.append(Worse(what, old, new))
     if after.curvature > before.curvature * (1 + allowed.curvature) + noise.curvature:
         found.append(Worse(Rougher.CURVATURE, before.curvature, after.curvature))
