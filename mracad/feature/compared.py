@@ -154,25 +154,31 @@ def _missed(copies: Copies, sheet: Sheet, outcome: Outcome) -> Iterator[tuple[in
 
 def refuse_short(copies: Copies, found: Sequence[Copy]) -> None:
     """Raise EditError for a copy of which the ground cannot hold enough."""
-    for copy, place in zip(found, copies.places, strict=True):
-        share = copy.short / (copies.feature.height * abs(place.height))
-        if share > SHORT:
-            numbers = " ".join(f"#{i + 1}" for i in copy.faces)
-            raise EditError(
-                f"{copy.place}: the faces there cannot hold the copy: it would be off by {100 * share:.0f} % of its "
-                f"height ({numbers})",
-                "make it smaller with --size, or choose another place",
-            )
+    for copy, share in _above(copies, found, "short", SHORT):
+        raise EditError(
+            f"{copy.place}: the faces there cannot hold the copy: it would be off by {100 * share:.0f} % of its "
+            f"height ({_numbers(copy)})",
+            "make it smaller with --size, or choose another place",
+        )
 
 
 def refuse_clipped(copies: Copies, found: Sequence[Copy]) -> None:
     """Raise EditError for a copy that points which stay take too much of."""
+    for copy, share in _above(copies, found, "lost", LOST):
+        raise EditError(
+            f"{copy.place}: edges or holes that do not move take {100 * min(share, 1):.0f} % of the height of "
+            f"the copy there ({_numbers(copy)})",
+            "move it away from them, make it smaller with --size, or let them take it with --clip",
+        )
+
+
+def _above(copies: Copies, found: Sequence[Copy], figure: str, most: float) -> Iterator[tuple[Copy, float]]:
+    """Copies of which a figure is more than a share of their height, and that share."""
     for copy, place in zip(found, copies.places, strict=True):
-        share = copy.lost / (copies.feature.height * abs(place.height))
-        if share > LOST:
-            numbers = " ".join(f"#{i + 1}" for i in copy.faces)
-            raise EditError(
-                f"{copy.place}: edges or holes that do not move take {100 * min(share, 1):.0f} % of the height of "
-                f"the copy there ({numbers})",
-                "move it away from them, make it smaller with --size, or let them take it with --clip",
-            )
+        share = getattr(copy, figure) / (copies.feature.height * abs(place.height))
+        if share > most:
+            yield copy, share
+
+
+def _numbers(copy: Copy) -> str:
+    return " ".join(f"#{i + 1}" for i in copy.faces)
