@@ -87,7 +87,7 @@ def surveys(
     surfaces: Iterable[tuple[Net, Sequence[Face], KnotVector, KnotVector]],
     points: int = POINTS,
     singular: float = np.inf,
-    wavelength: float = 0.0,
+    reach: float = 0.0,
 ) -> list[Survey]:
     """Look at surfaces before an edit.
 
@@ -99,8 +99,8 @@ def surveys(
         Points a span of those knots, in either direction.
     singular : float
         Curvature, 1/mm, from which on a point is singular: what a grid sees of it depends on where its points lie.
-    wavelength : float
-        Of the edit, mm: faces are then looked at place by place, too.
+    reach : float
+        Within which what an edit takes spreads, mm: faces are then looked at place by place, too.
     """
     ready = [
         (net, tuple(faces), _rule(faces, u, v, points), (u, v), net.poles.mean(axis=(0, 1)))
@@ -123,7 +123,7 @@ def surveys(
             Survey(
                 net, faces, rule, centre, at, form.normal.astype(np.float32), regular, sharp, rounding, crossed,
                 _roughness(areas, form, regular, rounding, kink), _noise(areas * regular, sides, rounding),
-                Places.of(rule, form, areas * regular, wavelength) if wavelength else None,
+                Places.of(rule, form, areas * regular, reach) if reach else None,
             )
         )  # fmt: skip
     return found
