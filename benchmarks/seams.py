@@ -47,7 +47,7 @@ def make_panel(path: Path, side: int, spans: int) -> None:
 def group(model: Any) -> Any:
     """All faces as one problem, edges that bound one face free."""
     from mracad.constraint.wishes import Wishes
-    from mracad.inspect.cells import quadrature
+    from mracad.model.cells import quadrature
     from mracad.seam.conditions import matched, rows
     from mracad.seam.energy import forms
     from mracad.seam.interface import joints

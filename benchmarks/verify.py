@@ -12,7 +12,7 @@ import time
 from pathlib import Path
 
 import mracad
-from mracad.audit import accept
+from mracad.inspect import accept
 from mracad.occ.facts import facts
 from mracad.occ.load import Text
 

@@ -16,13 +16,14 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from mracad.audit.continuity import seams
-    from mracad.audit.deviation import deviations
     from mracad.edit.features import move, repeat, transfer
     from mracad.edit.smooth import smooth
     from mracad.errors import MracadError
+    from mracad.inspect.deviation import deviations
+    from mracad.inspect.seams import seams
     from mracad.job import run
-    from mracad.model import Displacement, Model
+    from mracad.model.brep import Model
+    from mracad.model.displacement import Displacement
     from mracad.occ.apply import apply
     from mracad.occ.check import check
     from mracad.occ.files import read, write
@@ -33,8 +34,8 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 _HOMES = {
-    "Displacement": "model",
-    "Model": "model",
+    "Displacement": "model.displacement",
+    "Model": "model.brep",
     "Move": "options",
     "MracadError": "errors",
     "Repeat": "options",
@@ -42,13 +43,13 @@ _HOMES = {
     "Transfer": "options",
     "apply": "occ.apply",
     "check": "occ.check",
-    "deviations": "audit.deviation",
+    "deviations": "inspect.deviation",
     "move": "edit.features",
     "read": "occ.files",
     "read_back": "produce",
     "repeat": "edit.features",
     "run": "job",
-    "seams": "audit.continuity",
+    "seams": "inspect.seams",
     "smooth": "edit.smooth",
     "snapshot": "occ.view:view",
     "transfer": "edit.features",

@@ -12,15 +12,15 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from mracad import guard
-from mracad.audit.continuity import SeamMeasure, key, remeasured, seams
-from mracad.audit.deviation import Deviation, deviations
-from mracad.audit.mended import unmended
-from mracad.audit.torn import gaps, torn
 from mracad.edit.result import Edit, Reason
 from mracad.edit.tolerances import Tolerances, tolerances
+from mracad.edit.torn import gaps, torn
 from mracad.errors import EditError
+from mracad.inspect.deviation import Deviation, deviations
+from mracad.inspect.mended import unmended
+from mracad.inspect.seams import SeamMeasure, key, remeasured, seams
 from mracad.judge import Judged, Original
-from mracad.model import Model
+from mracad.model.brep import Model
 from mracad.options import Fitting, Selection
 
 if TYPE_CHECKING:

@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mracad import review
-from mracad.audit.check import SeamLimits
-from mracad.audit.compare import Limits
-from mracad.audit.verdict import Layer, Verdict
-from mracad.audit.words import words
 from mracad.errors import FileError, UsageError
+from mracad.inspect.check import SeamLimits
+from mracad.inspect.compare import Limits
+from mracad.inspect.verdict import Layer, Verdict
+from mracad.inspect.words import words
 from mracad.options import Check, Compare, length
 
 if TYPE_CHECKING:

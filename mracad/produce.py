@@ -10,11 +10,11 @@ from functools import cached_property, partial
 from typing import TYPE_CHECKING, BinaryIO
 
 from mracad import guard, review
-from mracad.audit import accept
-from mracad.audit.accept import Slack
-from mracad.audit.faults import Facts, Fault, ReadBack, Reason
 from mracad.errors import EditError, FileError
 from mracad.formats import FORMATS, by_content
+from mracad.inspect import accept
+from mracad.inspect.accept import Slack
+from mracad.inspect.faults import Facts, Fault, ReadBack, Reason
 from mracad.job import Judged, Original, Progress, Report, play
 from mracad.options import length
 

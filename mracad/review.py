@@ -9,16 +9,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mracad import guard
-from mracad.audit import check as layers
-from mracad.audit import compare as audit
-from mracad.audit.continuity import seams
-from mracad.audit.crossing import crossings
-from mracad.audit.verdict import Finding, Layer, Verdict
 from mracad.errors import CrashError
 from mracad.formats import by_content, unheld
+from mracad.inspect import check as layers
+from mracad.inspect import compare as audit
+from mracad.inspect.crossing import crossings
+from mracad.inspect.seams import seams
+from mracad.inspect.verdict import Finding, Layer, Verdict
 
 if TYPE_CHECKING:
-    from mracad.audit.continuity import SeamMeasure
+    from mracad.inspect.seams import SeamMeasure
     from mracad.occ.document import Document
     from mracad.occ.stated import Stated
 
@@ -35,7 +35,7 @@ def compare(
         What may differ, from the diagonal of the reference in mm; by default faces may deviate by a millionth of a
         millimetre.
     ignore : iterable of str
-        Names of layers (see :data:`mracad.audit.compare.LAYERS`) that are left out.
+        Names of layers (see :data:`mracad.inspect.compare.LAYERS`) that are left out.
     """
     place = "assembly" in unheld(ref.schema, new.schema)
     old, fresh = (_measured(document, place) for document in (ref, new))

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mracad.errors import UsageError
-from mracad.model import Face, Model
+from mracad.model.brep import Face, Model
 from mracad.options import Selection
 
 HINT = "select by #3, a product or face name, type:bspline, colour:#ff0000, near:X,Y,Z or cq:'>Z'; see mracad info"

@@ -14,7 +14,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import mracad
-from mracad.audit.continuity import seams, summary
+from mracad.inspect.seams import seams, summary
 from mracad.occ.check import check
 from mracad.occ.contents import contents
 from mracad.occ.measure import mass

@@ -27,7 +27,8 @@ from statistics import mean, median
 import numpy as np
 
 from mracad.constraint.frozen import separate
-from mracad.model import Displacement, Model, Offset
+from mracad.model.brep import Model
+from mracad.model.displacement import Displacement, Offset
 from mracad.occ.apply import apply
 from mracad.occ.settings import quiet
 from mracad.occ.step import read_step, write_step

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
-from mracad.audit.continuity import SeamMeasure, seams
-from mracad.model import Model
+from mracad.inspect.seams import SeamMeasure, seams
+from mracad.model.brep import Model
 from mracad.occ.check import Validity, check
 from mracad.occ.settings import exchange, quiet
 from mracad.occ.step import read_step

@@ -31,7 +31,7 @@ from OCP.TopoDS import TopoDS, TopoDS_Face
 from scipy.optimize import linear_sum_assignment
 
 from mracad.bspline.knots import KnotVector
-from mracad.bspline.net import Net
+from mracad.bspline.surface import Net
 from mracad.constraint.crease import crease_lines
 from mracad.occ.document import Document
 from mracad.occ.settings import quiet

@@ -26,7 +26,7 @@ from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Shape, TopoDS_Shell
 
 from mracad.constraint.frozen import separate
-from mracad.model import Displacement, Offset
+from mracad.model.displacement import Displacement, Offset
 from mracad.occ import Document, apply, view
 from mracad.wavelet.ladder import arc_lengths
 from tests.occ import shapes

@@ -16,10 +16,10 @@ import msgspec
 from mracad.options import Selection
 
 if TYPE_CHECKING:
-    from mracad.audit.continuity import SeamMeasure, SeamSummary
-    from mracad.audit.faults import Fault, ReadBack
     from mracad.constraint.seam import Treatment
     from mracad.edit.result import FaceOutcome
+    from mracad.inspect.faults import Fault, ReadBack
+    from mracad.inspect.seams import SeamMeasure, SeamSummary
     from mracad.job import Judged, Report
     from mracad.occ.check import Validity
     from mracad.produce import Made
@@ -92,7 +92,7 @@ def found(made: Sequence[Made]) -> Found | None:
 
 def edit_lines(report: Report, options: Selection, end: str, found: Found | None = None) -> list[str]:
     """The four lines after an edit; ``end`` is that of the last one, ``found`` what its files are as read back."""
-    from mracad.audit.continuity import key, summary
+    from mracad.inspect.seams import key, summary
 
     edit, model = report.edit, report.model
     nurbs = [o for o in edit.outcomes if o.status != "analytic"]
@@ -275,7 +275,7 @@ def result(value: Report | Judged) -> dict[str, Any]:
 
 def report(value: Report) -> dict[str, Any]:
     """The full report of an edit."""
-    from mracad.audit.continuity import key, summary
+    from mracad.inspect.seams import key, summary
 
     smooth = value.smooth_seams()
     after = {key(m): m for m in value.after}

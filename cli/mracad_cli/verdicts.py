@@ -10,8 +10,8 @@ from xml.etree import ElementTree as Xml
 import msgspec
 
 import mracad
-from mracad.audit.verdict import Figure, Finding, Layer, Verdict
-from mracad.audit.words import words
+from mracad.inspect.verdict import Figure, Finding, Layer, Verdict
+from mracad.inspect.words import words
 from mracad_cli.files import deliver
 from mracad_cli.render import json_text
 

@@ -13,12 +13,12 @@ from typing import Any, Literal, Protocol
 
 from msgspec import structs
 
-from mracad.audit.faults import ReadBack
 from mracad.batch.cluster import lost
 from mracad.batch.find import Item
 from mracad.batch.manifest import Manifest, digest
 from mracad.batch.work import Product, Work, do
 from mracad.errors import Code, FileError, MracadError, UsageError
+from mracad.inspect.faults import ReadBack
 from mracad.recipe import Recipe, record_of
 
 AHEAD = 2

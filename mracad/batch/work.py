@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mracad import guard
-from mracad.audit.faults import ReadBack
 from mracad.errors import Code, MracadError
+from mracad.inspect.faults import ReadBack
 from mracad.options import STEPS
 from mracad.recipe import Step, title, versions
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from mracad.bspline.basis import jet
 from mracad.bspline.knots import Side
-from mracad.bspline.net import Net, surface_quotient
+from mracad.bspline.surface import Net, surface_quotient
 
 Array = np.ndarray
 

@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mracad.bspline.knots import Side as Limit
-from mracad.bspline.net import cross
+from mracad.bspline.surface import cross
 from mracad.constraint.frozen import ISO, local_span
 from mracad.constraint.sides import between, inner_side
-from mracad.model import Edge, Model, Side
+from mracad.model.brep import Edge, Model, Side
 
 Array = np.ndarray
 Jet = tuple[Array, ...]

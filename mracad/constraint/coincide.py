@@ -15,7 +15,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from mracad.model import Edge, Model, Side
+from mracad.model.brep import Edge, Model, Side
 
 Array = np.ndarray
 

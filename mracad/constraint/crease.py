@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from mracad.bspline.basis import basis
-from mracad.bspline.net import Net
+from mracad.bspline.surface import Net
 
 Array = np.ndarray
 

@@ -18,9 +18,9 @@ import numpy as np
 from mracad.bspline.basis import basis
 from mracad.bspline.curve import Curve
 from mracad.bspline.knots import KnotVector, Side
-from mracad.bspline.net import Net
-from mracad.constraint.region import Region, face_region, supported
-from mracad.model import Face
+from mracad.bspline.surface import Net
+from mracad.model.brep import Face
+from mracad.model.region import Region, face_region, supported
 
 Array = np.ndarray
 

@@ -20,7 +20,7 @@ from mracad.constraint.border import SHARES, Border, Jet, outward
 from mracad.constraint.cause import Cause, Still
 from mracad.constraint.sides import between
 from mracad.constraint.wishes import Wishes
-from mracad.model import Model
+from mracad.model.brep import Model
 
 Array = np.ndarray
 

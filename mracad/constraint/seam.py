@@ -14,7 +14,7 @@ from mracad.constraint.frozen import CONTINUITY, ISO
 from mracad.constraint.joint import Joint, joint_of
 from mracad.constraint.sides import across, between, views
 from mracad.constraint.wishes import Wishes
-from mracad.model import Edge, Model, Side
+from mracad.model.brep import Edge, Model, Side
 
 Array = np.ndarray
 

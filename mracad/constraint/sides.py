@@ -8,9 +8,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from mracad.bspline.knots import Side as Limit
-from mracad.bspline.net import Net, cross, curvature
+from mracad.bspline.surface import Net, cross, curvature
 from mracad.constraint.frozen import ISO, local_span
-from mracad.model import Edge, Face, Model, Side
+from mracad.model.brep import Edge, Face, Model, Side
 
 Array = np.ndarray
 

@@ -10,12 +10,12 @@ import numpy as np
 from mracad.bspline.curve import Curve
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.knots import Side as Limit
-from mracad.bspline.net import Net
+from mracad.bspline.surface import Net
 from mracad.constraint.border import Border
 from mracad.constraint.frozen import local_span
-from mracad.constraint.region import meeting
 from mracad.constraint.sides import from_inside
-from mracad.model import Face, Model, Trim
+from mracad.model.brep import Face, Model, Trim
+from mracad.model.region import meeting
 
 Array = np.ndarray
 

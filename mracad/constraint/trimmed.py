@@ -17,13 +17,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mracad.bspline.knots import KnotVector
-from mracad.bspline.net import curvature
+from mracad.bspline.surface import curvature
 from mracad.constraint.cause import Cause, Still
 from mracad.constraint.seam import Seam, runs_back
 from mracad.constraint.sides import across, between
 from mracad.constraint.trace import EVENLY, LOOKS, NEAR, Trace, along, crossings, trace_of
 from mracad.constraint.wishes import Wishes
-from mracad.model import Edge, Face, Model, Trim
+from mracad.model.brep import Edge, Face, Model, Trim
 
 Array = np.ndarray
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from mracad.bspline.net import Net
+from mracad.bspline.surface import Net
 from mracad.constraint.cause import Cause, Still
 from mracad.constraint.seam import Seam
 from mracad.constraint.trimmed import TrimmedSeam
@@ -23,7 +23,7 @@ from mracad.edit.target import Sheet, Wish
 from mracad.edit.tolerances import Tolerances
 from mracad.edit.trial import ENOUGH, Trial, Watch, amounts, displaced, gained, worth
 from mracad.inspect.roughness import Change, Worse
-from mracad.model import Displacement, Offset
+from mracad.model.displacement import Displacement, Offset
 from mracad.seam.interface import Joints
 
 Array = np.ndarray

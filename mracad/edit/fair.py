@@ -17,7 +17,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from mracad.bspline.net import Net
+from mracad.bspline.jets import jets
+from mracad.bspline.surface import Net
 from mracad.constraint.wishes import Wishes
 from mracad.edit.driver import Result, drive
 from mracad.edit.mend import Mended, mended
@@ -25,8 +26,7 @@ from mracad.edit.pose import Scene
 from mracad.edit.target import Sheet, Wish, eased, sheets, stiffness
 from mracad.edit.tolerances import Tolerances
 from mracad.inspect.curvature import forms
-from mracad.inspect.jets import jets
-from mracad.model import Model
+from mracad.model.brep import Model
 from mracad.seam.interface import Joints, joints
 from mracad.seam.ladders import Creases
 from mracad.seam.solve import Problem

@@ -25,7 +25,8 @@ from mracad.feature.ground import Ground, axes
 from mracad.feature.ideal import copies
 from mracad.feature.pattern import along, grid, listed, polar, scattered
 from mracad.feature.place import Place, face_number, place, sheet_of, standing, window
-from mracad.model import Displacement, Face, Model
+from mracad.model.brep import Face, Model
+from mracad.model.displacement import Displacement
 from mracad.options import Featured, Move, Repeat, Single, Transfer, band_of, length
 from mracad.select import Scope
 from mracad.select import scope as scope_of

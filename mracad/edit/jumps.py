@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from mracad.bspline.net import Net
+from mracad.bspline.surface import Net
 from mracad.constraint.sides import views
 from mracad.edit.pose import Scene
 from mracad.seam.interface import Joints

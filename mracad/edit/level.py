@@ -24,8 +24,8 @@ import numpy as np
 
 from mracad.bspline.gram import gram
 from mracad.bspline.knots import KnotVector
-from mracad.bspline.net import Net
 from mracad.bspline.refine import refinement
+from mracad.bspline.surface import Net
 from mracad.constraint.seam import Seam
 from mracad.edit.target import Sheet, stiffness
 from mracad.seam.conditions import rows

@@ -13,14 +13,14 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from mracad.bspline.net import Net
+from mracad.bspline.surface import Net
 from mracad.constraint.trace import along
 from mracad.constraint.trimmed import TrimmedSeam
 from mracad.edit.driver import Moved, Result, groups
 from mracad.edit.pose import Pose, Scene, pose
 from mracad.edit.target import Sheet, stiffness
 from mracad.edit.trial import Watch, displaced
-from mracad.model import Model
+from mracad.model.brep import Model
 from mracad.seam.interface import Joints
 
 Array = np.ndarray

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mracad.bspline.net import Net
+from mracad.bspline.surface import Net
 from mracad.edit.target import Sheet
 from mracad.edit.tolerances import Tolerances
-from mracad.inspect.cells import quadrature
-from mracad.model import Model
+from mracad.model.brep import Model
+from mracad.model.cells import quadrature
 from mracad.seam.conditions import doubled, matched
 from mracad.seam.conditions import rows as seam_rows
 from mracad.seam.contact import Contact, Rows

@@ -10,7 +10,8 @@ from typing import Literal
 from mracad.constraint.seam import Treatment
 from mracad.feature.copies import Copy
 from mracad.inspect.roughness import Roughness
-from mracad.model import Displacement, Face
+from mracad.model.brep import Face
+from mracad.model.displacement import Displacement
 from mracad.select import Scope
 
 Status = Literal["edited", "unchanged", "left", "held", "unselected", "analytic"]

@@ -16,7 +16,7 @@ from mracad.edit.result import Edit, FaceOutcome, Reason, Status, spared
 from mracad.edit.target import Wish
 from mracad.edit.tolerances import tolerances
 from mracad.inspect.roughness import Worse
-from mracad.model import Face, Model
+from mracad.model.brep import Face, Model
 from mracad.options import Smooth, length
 from mracad.select import Scope
 from mracad.select import scope as scope_of

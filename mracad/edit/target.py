@@ -9,9 +9,9 @@ from typing import Protocol
 
 import numpy as np
 
-from mracad.bspline.net import Net
-from mracad.inspect.cells import quadrature
-from mracad.model import Face, Model
+from mracad.bspline.surface import Net
+from mracad.model.brep import Face, Model
+from mracad.model.cells import quadrature
 from mracad.seam.energy import forms
 from mracad.seam.interface import Joints
 from mracad.seam.ladders import Creases

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mracad.inspect.roughness import Growth
-from mracad.model import Edge, Model
+from mracad.model.brep import Edge, Model
 from mracad.options import Fitting, Selection, length
 
 GROWTH = Growth(0.005, 0.005, 0.005, 0.02, 30.0, 0.25)

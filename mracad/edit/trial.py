@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mracad.bspline.net import Net, cross
+from mracad.bspline.surface import Net, cross
 from mracad.edit.jumps import Jumps
 from mracad.edit.pose import Scene, pose
 from mracad.edit.target import Sheet, eased, stiffness
@@ -15,7 +15,7 @@ from mracad.edit.tolerances import Tolerances
 from mracad.inspect.places import Placed
 from mracad.inspect.roughness import Change, Worse, better, places, worse
 from mracad.inspect.survey import POINTS, Survey, changes, surveys
-from mracad.model import Face
+from mracad.model.brep import Face
 from mracad.seam.interface import Joints
 
 Array = np.ndarray

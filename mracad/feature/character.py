@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mracad.bspline.knots import KnotVector
-from mracad.bspline.net import Net
+from mracad.bspline.surface import Net
 from mracad.constraint.frozen import separate
 from mracad.constraint.seam import seams
 from mracad.constraint.wishes import Wishes
@@ -23,7 +23,7 @@ from mracad.feature.copies import Laid, offset, over
 from mracad.feature.detail import taper
 from mracad.feature.fine import MISSED, NARROWEST, Knots, divided, split, through, weights_over
 from mracad.feature.sheet import Sheet
-from mracad.model import Model
+from mracad.model.brep import Model
 from mracad.options import Transfer
 from mracad.wavelet.ladder import arc_lengths, ladder_for_scale
 from mracad.wavelet.project import projection

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mracad.bspline.net import Net
+from mracad.bspline.surface import Net
 from mracad.errors import EditError
 from mracad.feature.detail import LOST
 from mracad.feature.fine import between

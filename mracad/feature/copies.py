@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from mracad.bspline.net import Net
+from mracad.bspline.surface import Net
 from mracad.constraint.border import opening
 from mracad.constraint.cause import Cause, Still
 from mracad.constraint.frozen import separate
@@ -27,7 +27,8 @@ from mracad.feature.ground import Ground
 from mracad.feature.ideal import Copies
 from mracad.feature.joined import Softness, Wanted, held
 from mracad.feature.shift import Shifts, shifted
-from mracad.model import Displacement, Model, Offset
+from mracad.model.brep import Model
+from mracad.model.displacement import Displacement, Offset
 from mracad.seam.interface import Joints, joints
 
 Array = np.ndarray

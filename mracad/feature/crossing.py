@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mracad.bspline.net import Net
+from mracad.bspline.surface import Net
 from mracad.constraint.border import Border
 from mracad.constraint.seam import Seam
 from mracad.constraint.trace import Trace, along, crossings

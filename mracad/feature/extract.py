@@ -6,8 +6,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from mracad.bspline.interpolate import interpolated
-from mracad.bspline.net import Net
+from mracad.bspline.fit import interpolated
+from mracad.bspline.surface import Net
 from mracad.constraint.frozen import separate
 from mracad.constraint.seam import seams
 from mracad.constraint.wishes import Wishes

@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mracad.bspline.net import Net
+from mracad.bspline.surface import Net
 from mracad.feature.sheet import Sheet
-from mracad.model import Model
+from mracad.model.brep import Model
 from mracad.wavelet.ladder import arc_lengths, ladder_for_scale
 from mracad.wavelet.project import projection
 

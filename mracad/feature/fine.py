@@ -11,9 +11,9 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from mracad.bspline.interpolate import interpolated
+from mracad.bspline.fit import interpolated
 from mracad.bspline.knots import KnotVector
-from mracad.bspline.net import Net
+from mracad.bspline.surface import Net
 from mracad.errors import EditError
 from mracad.feature.ideal import Copies
 from mracad.feature.sheet import Sheet

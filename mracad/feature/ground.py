@@ -10,7 +10,7 @@ import numpy as np
 
 from mracad.feature.chart import Charts, charts
 from mracad.feature.sheet import Sheet, inside
-from mracad.model import Model
+from mracad.model.brep import Model
 
 Array = np.ndarray
 

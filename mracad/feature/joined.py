@@ -12,16 +12,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mracad.bspline.knots import KnotVector
-from mracad.bspline.net import Net
+from mracad.bspline.surface import Net
 from mracad.constraint.border import Border
 from mracad.constraint.frozen import jet_support, meeting
-from mracad.constraint.region import supported
 from mracad.constraint.seam import Seam
 from mracad.constraint.trimmed import TrimmedSeam
 from mracad.feature.crossing import Crossing, Stretch, exact_parts, met, trace
 from mracad.feature.fine import grown
-from mracad.inspect.cells import quadrature
-from mracad.model import Face
+from mracad.model.brep import Face
+from mracad.model.cells import quadrature
+from mracad.model.region import supported
 from mracad.seam.conditions import rows as seam_rows
 from mracad.seam.contact import Contact
 from mracad.seam.contact import rows as contact_rows

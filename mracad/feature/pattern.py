@@ -11,7 +11,7 @@ import numpy as np
 from mracad.errors import EditError, UsageError
 from mracad.feature.ground import Feet, Ground, axes
 from mracad.feature.place import MOST_PLACES, Place, numbers, place, table, whole
-from mracad.model import Model
+from mracad.model.brep import Model
 
 Array = np.ndarray
 

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mracad.bspline.net import Net
+from mracad.bspline.surface import Net
 from mracad.errors import EditError, FileError, UsageError
 from mracad.feature.ground import Feet, Ground
 from mracad.feature.sheet import Sheet, inside
-from mracad.model import Model
+from mracad.model.brep import Model
 
 Array = np.ndarray
 

@@ -8,9 +8,9 @@ from functools import cached_property
 import numpy as np
 
 from mracad.bspline.knots import KnotVector
-from mracad.bspline.net import Net
-from mracad.constraint.region import face_region
-from mracad.model import Face, Model
+from mracad.bspline.surface import Net
+from mracad.model.brep import Face, Model
+from mracad.model.region import face_region
 
 Array = np.ndarray
 

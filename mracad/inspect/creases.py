@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from mracad.bspline.knots import KnotVector, Side
-from mracad.bspline.net import Net
-from mracad.inspect.cells import inside_grid
-from mracad.model import Face
+from mracad.bspline.surface import Net
+from mracad.model.brep import Face
+from mracad.model.cells import inside_grid
 from mracad.wavelet.ladder import arc_lengths
 
 Array = np.ndarray

@@ -72,7 +72,7 @@ class _Work:
 
 
 def forms(jet: Array) -> Forms:
-    """The forms of a surface with derivatives ``jet``, see :func:`mracad.inspect.jets.jets`.
+    """The forms of a surface with derivatives ``jet``, see :func:`mracad.bspline.jets.jets`.
 
     They are the same bits however many points there are.
     """

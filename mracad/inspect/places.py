@@ -12,9 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mracad.inspect.cells import Quadrature
 from mracad.inspect.creases import Crossing
 from mracad.inspect.curvature import Forms
+from mracad.model.cells import Quadrature
 
 Array = np.ndarray
 

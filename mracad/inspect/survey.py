@@ -8,15 +8,15 @@ from itertools import chain
 
 import numpy as np
 
+from mracad.bspline.jets import blocks
 from mracad.bspline.knots import KnotVector
-from mracad.bspline.net import Net
-from mracad.inspect.cells import Quadrature, quadrature
+from mracad.bspline.surface import Net
 from mracad.inspect.creases import CLUSTER, Crossing, crossings
 from mracad.inspect.curvature import Forms, forms
-from mracad.inspect.jets import blocks
 from mracad.inspect.places import Places
 from mracad.inspect.roughness import Change, Roughness
-from mracad.model import Face
+from mracad.model.brep import Face
+from mracad.model.cells import Quadrature, quadrature
 
 Array = np.ndarray
 

@@ -11,9 +11,10 @@ from OCP.TopAbs import TopAbs_FORWARD
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS
 
-from mracad.bspline.net import Net
+from mracad.bspline.surface import Net
 from mracad.errors import MracadError, UsageError
-from mracad.model import Displacement, Model, Offset, Surface
+from mracad.model.brep import Model, Surface
+from mracad.model.displacement import Displacement, Offset
 from mracad.occ.convert import lay
 from mracad.occ.document import Document, label_key
 from mracad.occ.follow import following

@@ -10,9 +10,9 @@ from OCP.TopAbs import TopAbs_VERTEX
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS, TopoDS_Face
 
-from mracad.inspect.boxes import box as nurbs_box
-from mracad.inspect.boxes import rims
-from mracad.model import Face, Model
+from mracad.model.boxes import box as nurbs_box
+from mracad.model.boxes import rims
+from mracad.model.brep import Face, Model
 from mracad.occ.document import Document
 from mracad.occ.topology import box, inside, matrix
 

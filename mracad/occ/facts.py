@@ -1,4 +1,4 @@
-"""What the kernel says of a document, for :mod:`mracad.audit.accept`: a little of everything, the rest when asked."""
+"""What the kernel says of a document, for :mod:`mracad.inspect.accept`: a little of everything, the rest when asked."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ from OCP.TopAbs import TopAbs_FACE, TopAbs_FORWARD, TopAbs_SHELL, TopAbs_SOLID, 
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS, TopoDS_Edge, TopoDS_Face
 
-from mracad.audit.continuity import SeamMeasure, seams
-from mracad.audit.faults import Counts, Facts, Line
+from mracad.inspect.faults import Counts, Facts, Line
+from mracad.inspect.seams import SeamMeasure, seams
 from mracad.occ.check import Validity, check
 from mracad.occ.document import Document
 from mracad.occ.measure import mass

@@ -20,7 +20,7 @@ from OCP.TColStd import TColStd_Array1OfInteger, TColStd_Array1OfReal, TColStd_A
 
 from mracad.bspline.curve import Curve
 from mracad.bspline.knots import KnotVector
-from mracad.bspline.net import Net
+from mracad.bspline.surface import Net
 
 Array = np.ndarray
 _KNOTS = np.dtype([("knot", "<f8"), ("mult", "<i4")])

@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import partial
 
 from mracad.errors import UsageError
-from mracad.model import Model
+from mracad.model.brep import Model
 from mracad.occ.document import Document
 from mracad.occ.instance import isolate
 from mracad.occ.select import select_cq

@@ -17,9 +17,9 @@ from OCP.TopAbs import TopAbs_FORWARD, TopAbs_REVERSED
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS, TopoDS_Edge, TopoDS_Face
 
-from mracad.bspline.net import Net, cross, curvature
+from mracad.bspline.surface import Net, cross, curvature
 from mracad.errors import FileError, UsageError
-from mracad.model import Edge, Face, Model, Side, Surface, Trim
+from mracad.model.brep import Edge, Face, Model, Side, Surface, Trim
 from mracad.occ.boxes import diagonal
 from mracad.occ.convert import conversion
 from mracad.occ.document import Document

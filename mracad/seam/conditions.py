@@ -21,7 +21,7 @@ import numpy as np
 from mracad.bspline.basis import basis
 from mracad.bspline.functions import functions
 from mracad.bspline.knots import KnotVector
-from mracad.bspline.net import Net
+from mracad.bspline.surface import Net
 from mracad.constraint.border import Border
 from mracad.constraint.joint import Joint
 from mracad.constraint.seam import Seam

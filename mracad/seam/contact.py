@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from mracad.bspline.functions import functions
-from mracad.bspline.net import Net
+from mracad.bspline.surface import Net
 from mracad.constraint.trace import Trace, crossings, derived, directions
 from mracad.seam.conditions import laid_out
 

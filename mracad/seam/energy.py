@@ -18,10 +18,10 @@ from typing import Any
 import numpy as np
 
 from mracad.bspline.functions import ORDERS, functions
+from mracad.bspline.jets import jets
 from mracad.bspline.knots import KnotVector, Side
-from mracad.bspline.net import Net
-from mracad.inspect.cells import Quadrature
-from mracad.inspect.jets import jets
+from mracad.bspline.surface import Net
+from mracad.model.cells import Quadrature
 from mracad.seam.integrals import Order, Sites, integrals, sites
 
 Array = np.ndarray

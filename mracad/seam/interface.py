@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from mracad.bspline.net import Net
+from mracad.bspline.surface import Net
 from mracad.constraint.border import Border
 from mracad.constraint.cause import Cause, Still
 from mracad.constraint.frozen import CONTINUITY, meeting, reached
@@ -20,7 +20,7 @@ from mracad.constraint.seam import Meeting, Seam, seams
 from mracad.constraint.trace import trace_of
 from mracad.constraint.trimmed import TrimmedSeam, beside, trimmed
 from mracad.constraint.wishes import Wishes
-from mracad.model import Face, Model, Trim
+from mracad.model.brep import Face, Model, Trim
 from mracad.seam.contact import Contact
 from mracad.seam.space import line
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from mracad.bspline.knots import KnotVector
-from mracad.bspline.net import Net
+from mracad.bspline.surface import Net
 from mracad.constraint.seam import Seam
 from mracad.wavelet.ladder import arc_lengths, rungs_by_level
 

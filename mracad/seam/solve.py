@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 from numpy.polynomial.chebyshev import chebvander
 
-from mracad.bspline.net import Net
+from mracad.bspline.surface import Net
 from mracad.seam.constrained import Constrained
 from mracad.seam.divided import Divided
 from mracad.seam.energy import Forms

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from mracad.bspline.net import Net
+from mracad.bspline.surface import Net
 from mracad.constraint.frozen import ISO, local_span
-from mracad.constraint.region import face_region
-from mracad.model import Face, Trim
+from mracad.model.brep import Face, Trim
+from mracad.model.region import face_region
 from mracad.wavelet.ladder import arc_lengths
 
 Array = np.ndarray

@@ -8,7 +8,7 @@ import numpy as np
 
 from mracad.bspline.basis import gauss
 from mracad.bspline.knots import Array, KnotVector
-from mracad.bspline.net import Net
+from mracad.bspline.surface import Net
 from mracad.errors import UsageError
 
 _RESOLUTION = 1_000_000

@@ -15,8 +15,8 @@ from OCP.TopExp import TopExp_Explorer
 from OCP.TopoDS import TopoDS, TopoDS_Shell
 
 from mracad import guard, occ, review
-from mracad.audit.verdict import Layer
 from mracad.errors import LimitError
+from mracad.inspect.verdict import Layer
 from tests.occ import shapes
 
 

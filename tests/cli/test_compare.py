@@ -9,7 +9,7 @@ import pytest
 from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox, BRepPrimAPI_MakeCylinder
 
 from mracad import occ
-from mracad.audit.project import distances
+from mracad.bspline.closest import distances
 from mracad.occ.units import UNITS, Units
 from tests.occ import shapes
 

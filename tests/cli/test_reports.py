@@ -8,8 +8,8 @@ from mracad_cli import render, verdicts
 from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
 
 from mracad import judge, occ
-from mracad.audit.words import words
 from mracad.edit.smooth import smooth
+from mracad.inspect.words import words
 from mracad.job import run
 from mracad.options import Check, Compare, Smooth
 from tests.occ import shapes

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from mracad import occ
-from mracad.constraint.region import face_region, supported
-from mracad.model import Displacement, Offset
+from mracad.model.displacement import Displacement, Offset
+from mracad.model.region import face_region, supported
 from mracad.occ.contents import contents
 from tests.conftest import CORPUS
 

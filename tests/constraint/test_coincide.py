@@ -10,11 +10,11 @@ from OCP.gp import gp_Trsf, gp_Vec
 from OCP.TopLoc import TopLoc_Location
 
 from mracad import job, occ
-from mracad.audit.continuity import seams
-from mracad.bspline.net import Net
+from mracad.bspline.surface import Net
 from mracad.constraint.cause import Cause, Still
 from mracad.constraint.coincide import TORN, coinciding, touching
 from mracad.edit.smooth import smooth
+from mracad.inspect.seams import seams
 from mracad.occ.document import Document, empty
 from mracad.occ.load import Text
 from mracad.occ.view import view

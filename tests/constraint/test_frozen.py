@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from mracad.bspline.knots import KnotVector
-from mracad.bspline.net import Net
+from mracad.bspline.surface import Net
 from mracad.constraint.frozen import CONTINUITY, frozen_along, jet_support, separate
-from mracad.constraint.region import region
-from mracad.model import Face, Trim
-from tests.constraint.test_region import circle, segment, square
+from mracad.model.brep import Face, Trim
+from mracad.model.region import region
+from tests.model.test_region import circle, segment, square
 
 TRIMS = {
     "natural": (segment((0, 0), (0, 1)), [1, 2, 3]),

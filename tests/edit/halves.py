@@ -3,7 +3,7 @@
 import numpy as np
 
 from mracad.bspline.knots import KnotVector
-from mracad.bspline.net import Net
+from mracad.bspline.surface import Net
 from samples import make
 from tests.edit import panels
 

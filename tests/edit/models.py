@@ -4,8 +4,8 @@ import numpy as np
 
 from mracad.bspline.curve import Curve
 from mracad.bspline.knots import KnotVector
-from mracad.bspline.net import Net
-from mracad.model import Edge, Face, Model, Side, Surface, Trim
+from mracad.bspline.surface import Net
+from mracad.model.brep import Edge, Face, Model, Side, Surface, Trim
 
 
 def segment(a, b):

@@ -7,7 +7,7 @@ import numpy as np
 
 from mracad.bspline.basis import basis
 from mracad.bspline.knots import KnotVector
-from mracad.bspline.net import Net
+from mracad.bspline.surface import Net
 from samples import make
 
 SIZE = 100.0

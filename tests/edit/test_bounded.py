@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from mracad import job, produce
-from mracad.audit.faults import Fault, ReadBack, Reason
 from mracad.edit import driver
 from mracad.edit.result import Edit, FaceOutcome
 from mracad.edit.smooth import smooth
 from mracad.errors import Code, EditError
-from mracad.model import Displacement
+from mracad.inspect.faults import Fault, ReadBack, Reason
+from mracad.model.displacement import Displacement
 from mracad.occ.view import view
 from mracad.options import Smooth
 from mracad.recipe import Step

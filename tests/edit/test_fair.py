@@ -5,10 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from mracad.audit.continuity import seams
-from mracad.bspline.interpolate import interpolated
+from mracad.bspline.fit import interpolated
 from mracad.bspline.knots import KnotVector
-from mracad.bspline.net import Net
+from mracad.bspline.surface import Net
 from mracad.constraint.wishes import Wishes
 from mracad.edit.driver import groups
 from mracad.edit.fair import Filter, faired
@@ -17,12 +16,13 @@ from mracad.edit.target import sheets
 from mracad.edit.tolerances import Tolerances
 from mracad.edit.trial import Trial
 from mracad.inspect.roughness import Growth, worse
+from mracad.inspect.seams import seams
 from mracad.inspect.survey import changes, surveys
 from mracad.occ.view import view
 from mracad.seam.interface import joints
 from tests.edit import halves, panels
 from tests.edit.models import fitted, rotation, sheet
-from tests.inspect.shapes import cylinder
+from tests.model.shapes import cylinder
 
 ALLOWED = Growth(0.02, 0.02, 0.02, 0.1, 60.0)
 """What counts as rougher; normals of noise turn back by up to 45°."""

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from mracad.audit.continuity import seams
-from mracad.bspline.net import Net
+from mracad.bspline.surface import Net
 from mracad.constraint.wishes import Wishes
 from mracad.edit.fair import faired
 from mracad.edit.level import Level
 from mracad.edit.target import sheets
 from mracad.edit.tolerances import Tolerances
-from mracad.inspect.cells import quadrature
+from mracad.inspect.seams import seams
+from mracad.model.cells import quadrature
 from mracad.occ.view import view
 from mracad.seam.energy import forms
 from mracad.seam.interface import Joints

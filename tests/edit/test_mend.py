@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mracad.audit.continuity import seams
-from mracad.bspline.net import Net
+from mracad.bspline.surface import Net
 from mracad.constraint.wishes import Wishes
 from mracad.edit.fair import Filter, faired
 from mracad.edit.mend import mended
 from mracad.edit.pose import Scene
 from mracad.edit.target import sheets
 from mracad.edit.tolerances import Tolerances
+from mracad.inspect.seams import seams
 from mracad.occ.view import view
 from mracad.seam.interface import joints
 from tests.edit import halves, panels

@@ -5,8 +5,8 @@ import json
 import pytest
 
 from mracad import job, occ
-from mracad.audit.continuity import seams
 from mracad.edit.smooth import smooth
+from mracad.inspect.seams import seams
 from mracad.occ.view import view
 from mracad.options import Smooth
 from tests.edit import panels

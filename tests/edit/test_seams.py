@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from mracad import job
-from mracad.audit.continuity import remeasured, seams
 from mracad.bspline.knots import KnotVector
-from mracad.bspline.net import Net
+from mracad.bspline.surface import Net
 from mracad.edit.smooth import smooth
-from mracad.model import Displacement, Offset
+from mracad.inspect.seams import remeasured, seams
+from mracad.model.displacement import Displacement, Offset
 from mracad.occ.step import read_step, write_step
 from mracad.occ.view import view
 from mracad.options import Smooth

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from mracad.bspline.knots import KnotVector
-from mracad.bspline.net import Net
+from mracad.bspline.surface import Net
 from mracad.edit import driver
 from mracad.edit.fair import Filter
 from mracad.edit.result import Reason

@@ -12,7 +12,7 @@ from mracad import job, occ
 from mracad.edit.result import Reason
 from mracad.edit.smooth import smooth
 from mracad.edit.tolerances import MORE, Tolerances
-from mracad.model import Displacement, Offset
+from mracad.model.displacement import Displacement, Offset
 from mracad.occ.apply import apply
 from mracad.occ.check import check
 from mracad.occ.view import view

@@ -6,8 +6,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mracad.audit.continuity import seams
-from mracad.audit.torn import gaps, torn
 from mracad.constraint.seam import Treatment
 from mracad.constraint.wishes import Wishes
 from mracad.edit.fair import Filter
@@ -15,7 +13,9 @@ from mracad.edit.pose import Scene
 from mracad.edit.result import Edit, FaceOutcome
 from mracad.edit.target import sheets
 from mracad.edit.tolerances import MORE, Tolerances, tolerances
-from mracad.model import Displacement
+from mracad.edit.torn import gaps, torn
+from mracad.inspect.seams import seams
+from mracad.model.displacement import Displacement
 from mracad.occ.view import view
 from mracad.options import Repeat, Smooth
 from mracad.seam.interface import joints, rims

@@ -8,9 +8,9 @@ from OCP.BRep import BRep_Tool
 from OCP.TopExp import TopExp
 
 from mracad import job
-from mracad.audit.continuity import seams
 from mracad.constraint.cause import Cause, Still
 from mracad.edit.smooth import smooth
+from mracad.inspect.seams import seams
 from mracad.occ.step import read_step, write_step
 from mracad.occ.view import view
 from mracad.options import Smooth

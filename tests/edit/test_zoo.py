@@ -5,10 +5,10 @@ import io
 import pytest
 
 from mracad import job, occ
-from mracad.audit.continuity import seams
 from mracad.edit.features import move, repeat
 from mracad.edit.smooth import smooth
 from mracad.errors import EditError
+from mracad.inspect.seams import seams
 from mracad.occ.load import Text
 from mracad.occ.measure import mass
 from mracad.options import Move, Repeat, Smooth

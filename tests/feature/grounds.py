@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from mracad.bspline.interpolate import interpolated as at_greville
+from mracad.bspline.fit import interpolated as at_greville
 from mracad.bspline.knots import KnotVector
-from mracad.bspline.net import Net
+from mracad.bspline.surface import Net
 from mracad.wavelet.ladder import arc_lengths
 from samples import make
 from tests.edit.models import fitted

@@ -10,12 +10,12 @@ from OCP.BRepAlgoAPI import BRepAlgoAPI_Cut
 from OCP.BRepPrimAPI import BRepPrimAPI_MakeCylinder
 from OCP.gp import gp_Ax2, gp_Dir, gp_Pnt
 
-from mracad.audit.continuity import seams
 from mracad.bspline.knots import KnotVector
-from mracad.bspline.net import Net
+from mracad.bspline.surface import Net
 from mracad.edit.features import extract, repeat
 from mracad.errors import Code, EditError
 from mracad.feature.compared import Copy, refuse_short
+from mracad.inspect.seams import seams
 from mracad.occ.step import read_step, write_step
 from mracad.occ.view import view
 from mracad.options import Repeat

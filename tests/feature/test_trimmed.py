@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from mracad import job
-from mracad.audit.continuity import seams
 from mracad.constraint.cause import Cause, Still
 from mracad.constraint.wishes import Wishes
 from mracad.edit.features import extract, move, repeat
 from mracad.errors import EditError
 from mracad.feature.detail import save
-from mracad.model import Displacement, Offset
+from mracad.inspect.seams import seams
+from mracad.model.displacement import Displacement, Offset
 from mracad.occ.step import read_step, write_step
 from mracad.occ.view import view
 from mracad.options import Move, Repeat

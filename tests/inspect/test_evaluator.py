@@ -5,13 +5,13 @@ import pytest
 from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeFace
 from OCP.STEPControl import STEPControl_AsIs, STEPControl_Writer
 
-from mracad.bspline.net import Net
+from mracad.bspline.surface import Net
 from mracad.inspect.survey import surveys
 from mracad.occ.geometry import spline
 from mracad.occ.settings import quiet
 from mracad.occ.step import read_step
 from mracad.occ.view import view
-from tests.inspect.shapes import cylinder, graph, sphere
+from tests.model.shapes import cylinder, graph, sphere
 from tests.roughness import compared, removed
 
 

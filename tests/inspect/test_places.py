@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from mracad.bspline.knots import KnotVector
-from mracad.bspline.net import Net
+from mracad.bspline.surface import Net
 from mracad.inspect.places import SIDES, SLOPE
 from mracad.inspect.roughness import Growth, Rougher, better, places, worse
 from mracad.inspect.survey import changes, surveys
-from tests.inspect.shapes import face
+from tests.model.shapes import face
 
 WIDTH = 10.0
 ALLOWED = Growth(0.005, 0.005, 0.005, 0.02, 30.0, 0.1)

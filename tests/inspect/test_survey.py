@@ -9,12 +9,12 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from mracad.bspline.knots import KnotVector
-from mracad.bspline.net import Net
+from mracad.bspline.surface import Net
 from mracad.inspect import curvature
 from mracad.inspect.curvature import forms
 from mracad.inspect.roughness import Change, Growth, Rougher, Roughness, worse
 from mracad.inspect.survey import POINTS, RIPPLE, STEEP, changes, surveys
-from tests.inspect.shapes import circle, cylinder, face, graph, plane, rectangle, roof, sphere, torus
+from tests.model.shapes import circle, cylinder, face, graph, plane, rectangle, roof, sphere, torus
 
 
 def survey(net, faces=None, points=8):

@@ -28,7 +28,7 @@ from OCP.TopLoc import TopLoc_Location
 
 from mracad import occ
 from mracad.errors import MracadError, UsageError
-from mracad.model import Displacement, Offset
+from mracad.model.displacement import Displacement, Offset
 from mracad.occ.geometry import basis, set_poles
 from tests.occ import shapes
 

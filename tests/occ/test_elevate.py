@@ -8,9 +8,9 @@ from mracad_cli.render import control_points
 
 from mracad import occ
 from mracad.bspline.knots import KnotVector
-from mracad.bspline.net import Net
+from mracad.bspline.surface import Net
 from mracad.errors import UsageError
-from mracad.model import Displacement, Offset
+from mracad.model.displacement import Displacement, Offset
 from mracad.occ.apply import restore
 from mracad.occ.geometry import nets, spline
 from tests.bspline.spaces import random_knots

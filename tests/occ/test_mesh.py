@@ -9,8 +9,8 @@ import pytest
 from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox, BRepPrimAPI_MakeSphere
 
 from mracad import occ
-from mracad.audit import accept
 from mracad.errors import FileError, UsageError
+from mracad.inspect import accept
 from mracad.occ import scene as scenes
 from mracad.occ.files import Lost
 from tests.occ import shapes

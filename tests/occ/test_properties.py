@@ -9,7 +9,7 @@ from OCP.TDF import TDF_AttributeIterator
 from OCP.XCAFDoc import XCAFDoc_Area, XCAFDoc_Centroid, XCAFDoc_Volume
 
 from mracad import occ
-from mracad.model import Displacement, Offset
+from mracad.model.displacement import Displacement, Offset
 from mracad.occ.document import label_key, label_name, labels
 from mracad.occ.load import Text
 from mracad.occ.measure import mass_of

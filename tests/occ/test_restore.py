@@ -9,7 +9,7 @@ import pytest
 from mracad import job
 from mracad.edit.smooth import smooth
 from mracad.errors import EditError
-from mracad.model import Displacement, Offset
+from mracad.model.displacement import Displacement, Offset
 from mracad.occ.apply import apply, restore
 from mracad.occ.check import Failure, check
 from mracad.occ.step import read_step

@@ -11,9 +11,9 @@ import time
 import pytest
 
 from mracad import guard, occ, output
-from mracad.audit.verdict import Finding, Layer
 from mracad.batch.manifest import Manifest
 from mracad.errors import Code, EditError, FileError, MracadError
+from mracad.inspect.verdict import Finding, Layer
 from tests.robust import kill, mutate
 
 NUMBERS = (*range(10), 499)

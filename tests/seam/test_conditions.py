@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.sparse import eye_array
 
-from mracad.bspline.interpolate import interpolated
+from mracad.bspline.fit import interpolated
 from mracad.bspline.knots import KnotVector
-from mracad.bspline.net import Net
+from mracad.bspline.surface import Net
 from mracad.constraint.border import Border
 from mracad.constraint.joint import Joint
 from mracad.constraint.seam import Seam

@@ -5,12 +5,12 @@ import pytest
 
 from mracad.bspline.basis import basis
 from mracad.bspline.curve import Curve
-from mracad.bspline.interpolate import interpolated
+from mracad.bspline.fit import interpolated
 from mracad.bspline.knots import KnotVector
-from mracad.bspline.net import Net
+from mracad.bspline.surface import Net
 from mracad.constraint.trace import Trace
 from mracad.seam.contact import MORE, Contact, rows
-from tests.inspect.shapes import graph, plane, segment
+from tests.model.shapes import graph, plane, segment
 
 INF = float("inf")
 HALF = np.sqrt(0.5)

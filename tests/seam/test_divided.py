@@ -7,13 +7,13 @@ import pytest
 from scipy.sparse import csr_array
 
 from mracad.bspline.knots import KnotVector
-from mracad.bspline.net import Net
-from mracad.inspect.cells import quadrature
+from mracad.bspline.surface import Net
+from mracad.model.cells import quadrature
 from mracad.seam.divided import LEFT, Divided, _Colour
 from mracad.seam.energy import forms
 from mracad.seam.solve import Problem, Space
 from tests.edit.models import rotation
-from tests.inspect.shapes import face
+from tests.model.shapes import face
 
 SIDE, SPANS, SIZE = 3, 24, 10.0
 STIFFNESS = 0.35**4

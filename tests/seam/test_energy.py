@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from mracad.bspline.interpolate import interpolated
+from mracad.bspline.fit import interpolated
 from mracad.bspline.knots import KnotVector
-from mracad.bspline.net import Net
+from mracad.bspline.surface import Net
 from mracad.constraint.crease import crease_lines
-from mracad.inspect.cells import quadrature
+from mracad.model.cells import quadrature
 from mracad.seam.energy import KINK_WEIGHT, forms
 from tests.edit.models import rotation
-from tests.inspect.shapes import circle, cylinder, face, graph, plane, rectangle, sphere, torus
+from tests.model.shapes import circle, cylinder, face, graph, plane, rectangle, sphere, torus
 
 
 def of(net, curves=(), creases=((), ())):

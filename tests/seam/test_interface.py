@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mracad.bspline.interpolate import interpolated
-from mracad.bspline.net import Net
+from mracad.bspline.fit import interpolated
+from mracad.bspline.surface import Net
 from mracad.constraint.seam import Meeting
 from mracad.constraint.wishes import Wishes
-from mracad.inspect.cells import quadrature
-from mracad.model import Edge, Face, Model, Side, Surface, Trim
+from mracad.model.brep import Edge, Face, Model, Side, Surface, Trim
+from mracad.model.cells import quadrature
 from mracad.occ.view import view
 from mracad.seam.interface import Joints, away, contact, end, joints, rims, twists
 from mracad.seam.metric import planar, smoothed
@@ -18,7 +18,7 @@ from mracad.seam.space import MOST_POINTS, refined
 from mracad.wavelet.ladder import arc_lengths
 from tests.edit import panels
 from tests.edit.models import free_edge, sheet
-from tests.inspect.shapes import circle, cylinder, face, graph, plane, rectangle, segment
+from tests.model.shapes import circle, cylinder, face, graph, plane, rectangle, segment
 
 
 def trimmed(net, curves):

@@ -6,12 +6,12 @@ from scipy.linalg import null_space
 from scipy.sparse import csr_array
 
 from mracad.bspline.knots import KnotVector
-from mracad.bspline.net import Net
-from mracad.inspect.cells import quadrature
+from mracad.bspline.surface import Net
+from mracad.model.cells import quadrature
 from mracad.seam.energy import forms
 from mracad.seam.solve import Constrained, Problem, Space
 from tests.edit.models import rotation
-from tests.inspect.shapes import face, plane
+from tests.model.shapes import face, plane
 
 STIFFNESS = 0.05**4
 

@@ -8,13 +8,13 @@ from scipy.spatial.transform import Rotation
 
 from mracad.bspline.basis import basis, gauss
 from mracad.bspline.knots import KnotVector
-from mracad.bspline.net import Net
 from mracad.bspline.refine import is_nested
+from mracad.bspline.surface import Net
 from mracad.errors import UsageError
 from mracad.wavelet.ladder import arc_lengths, finest_scale, ladder_for_scale, rungs_by_level
 from mracad.wavelet.project import projection
 from tests.bspline.spaces import KINDS, random_knots
-from tests.bspline.test_net import circle, sphere
+from tests.bspline.test_surface import circle, sphere
 from tests.wavelet.pairs import uniform
 
 

@@ -14,8 +14,8 @@ from mracad_cli.progress import Progress
 if TYPE_CHECKING:
     import numpy as np
 
-    from mracad.audit.scales import FaceScales
-    from mracad.model import Face, Model
+    from mracad.inspect.scales import FaceScales
+    from mracad.model.brep import Face, Model
 
 
 @click.command(help=__doc__)
@@ -42,8 +42,8 @@ if TYPE_CHECKING:
 def command(
     source: str, input_unit: str | None, encoding: str | None, scale: str, keep: Any, everything: bool, as_json: bool
 ) -> int:
-    from mracad.audit.continuity import seams, summary
-    from mracad.audit.scales import scales
+    from mracad.inspect.scales import scales
+    from mracad.inspect.seams import seams, summary
     from mracad.occ.boxes import face_boxes
     from mracad.occ.check import check
     from mracad.occ.instance import instances
@@ -155,7 +155,7 @@ def _judged(face: Face, scales: FaceScales | None) -> dict[str, Any]:
 
 def _status(face: Face, scales: FaceScales | None) -> tuple[str, str]:
     """A word for what smoothing at the given scale would meet, and the reason where it would change nothing."""
-    from mracad.audit.scales import LEAST
+    from mracad.inspect.scales import LEAST
 
     if scales is None:
         return "analytic", f"{face.kind}, not a NURBS face"

@@ -1,1 +1,0 @@
-"""Facts about models: continuity along seams, and how far an edit moved what."""

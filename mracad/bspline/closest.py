@@ -1,0 +1,87 @@
+"""Nearest points on NURBS surfaces.
+
+Newton's method on half the squared distance, all points at once, from the nearest of a grid of points; where the
+Hessian is not positive definite the Gauss–Newton matrix takes its place.  Parameters stay within the domain (their
+components that push against its ends are held), and a step that does not come nearer is halved.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mracad.bspline.surface import Net
+
+Array = np.ndarray
+_STEPS = 30
+_SEEDS = 3  # from the nearest only, a point by a thin edge may end on the wrong side of it
+_PLACES = 100  # at least, in each direction
+
+
+def distances(net: Net, points: Array) -> Array:
+    """Distance of each point ``(q, 3)`` from a surface, its natural borders included."""
+    from scipy.spatial import cKDTree
+
+    us, vs = _places(net, 0), _places(net, 1)
+    grid = np.asarray(net.grid(us, vs)).reshape(-1, 3)
+    _, seeds = cKDTree(grid).query(points, k=_SEEDS)
+    starts = np.stack([us[seeds // len(vs)], vs[seeds % len(vs)]], axis=-1)
+    found = [_descend(net, points, starts[:, k]) for k in range(_SEEDS)]
+    return np.asarray(np.min(found, axis=0))
+
+
+def _places(net: Net, axis: int) -> Array:
+    """About a hundred parameters of one direction, half of them spread over the spans and half over the length."""
+    knots, other = (net.u, net.v)[:: 1 - 2 * axis]
+    spans = len(knots.breaks) - 1
+    fine = np.interp(np.linspace(0, spans, 4 * spans + _PLACES), np.arange(spans + 1), knots.breaks)
+    across = np.linspace(*other.domain, 9)
+    lines = np.asarray(net.grid(fine, across) if axis == 0 else net.grid(across, fine))
+    steps = np.linalg.norm(np.diff(lines, axis=axis), axis=2).max(axis=1 - axis)
+    length = np.concatenate([[0.0], np.cumsum(steps)])
+    even = np.interp(np.linspace(0, length[-1], _PLACES), length, fine) if length[-1] > 0 else fine[:1]
+    return np.unique(np.concatenate([knots.breaks, even]))
+
+
+def _descend(net: Net, points: Array, uv: Array) -> Array:
+    """Distances that Newton's method reaches from the given parameters."""
+    uv = uv.copy()
+    low, high = np.array([net.u.domain, net.v.domain]).T
+    periodic = np.array([net.u.periodic, net.v.periodic])
+    low, high = np.where(periodic, -np.inf, low), np.where(periodic, np.inf, high)
+    best = np.linalg.norm(np.asarray(net.evaluate(uv)) - points, axis=1)
+    active = np.arange(len(points))
+    for _ in range(_STEPS):
+        step = _newton(net, points[active], uv[active], low, high)
+        moved = np.zeros(len(active), bool)
+        share = 1.0
+        while share > 1e-3 and not moved.all():
+            rest = ~moved
+            tried = np.clip(uv[active[rest]] + share * step[rest], low, high)
+            there = np.linalg.norm(np.asarray(net.evaluate(tried)) - points[active[rest]], axis=1)
+            nearer = there < best[active[rest]] * (1 - 1e-15)
+            which = active[rest][nearer]
+            uv[which], best[which] = tried[nearer], there[nearer]
+            moved[np.flatnonzero(rest)[nearer]] = True
+            share /= 4
+        active = active[moved]
+        if not len(active):
+            break
+    return best
+
+
+def _newton(net: Net, points: Array, uv: Array, low: Array, high: Array) -> Array:
+    """One step each."""
+    s, su, sv, suu, suv, svv = net.evaluate(uv, 2)
+    r = s - points
+    gradient = np.stack([(r * su).sum(1), (r * sv).sum(1)], axis=1)
+    a, b, c = (su * su).sum(1), (su * sv).sum(1), (sv * sv).sum(1)
+    p, q, t = a + (r * suu).sum(1), b + (r * suv).sum(1), c + (r * svv).sum(1)
+    bent = (p > 0) & (t > 0) & (p * t - q * q > 1e-6 * a * c)
+    a, b, c = np.where(bent, p, a), np.where(bent, q, b), np.where(bent, t, c)
+    held = ((uv <= low) & (gradient > 0)) | ((uv >= high) & (gradient < 0))
+    gradient[held] = 0.0
+    b = np.where(held.any(axis=1), 0.0, b)
+    tiny = np.finfo(float).tiny
+    determinant = np.maximum(a * c - b * b, 1e-14 * a * c + tiny)
+    step = np.stack([b * gradient[:, 1] - c * gradient[:, 0], b * gradient[:, 0] - a * gradient[:, 1]], axis=1)
+    return np.asarray(step / determinant[:, None])

@@ -1,0 +1,66 @@
+"""What seams may gape after an edit, and the faces of those that do not hold."""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
+
+from mracad.edit.result import Edit
+from mracad.edit.tolerances import Tolerances
+from mracad.inspect.seams import SeamMeasure
+from mracad.model.brep import Model
+
+
+def torn(
+    model: Model,
+    before: Sequence[SeamMeasure],
+    after: Sequence[SeamMeasure],
+    edit: Edit,
+    allowed: Tolerances,
+    keep: str,
+) -> set[int]:
+    """Faces of seams that an edit would open, or that were smooth and would not be; against its own intent.
+
+    Parameters
+    ----------
+    model : Model
+    before, after : sequence of SeamMeasure
+        In the same order.
+    edit : Edit
+        Edges of which it says nothing stay.
+    allowed : Tolerances
+    keep : str
+        Where only the position (``"g0"``) is to be kept a kink is no harm.
+    """
+    steeper, found = math.degrees(allowed.angle), set()
+    for (old, widest), new in zip(_widest(model, before, edit, allowed), after, strict=True):
+        bent = keep != "g0" and old.smooth and new.angle > old.angle + steeper
+        if widest is not None and (new.gap > widest or bent):
+            found |= set(old.faces)
+    return found
+
+
+def gaps(model: Model, before: Sequence[SeamMeasure], edit: Edit, allowed: Tolerances) -> dict[tuple[int, ...], float]:
+    """How wide seams of edited faces may gape that do not move exactly, mm, by their faces.
+
+    Parameters as for :func:`torn`.
+    """
+    exact = {each.edge for each in edit.edges if each.how == "coupled"}
+    edited, found = {each.face for each in edit.faces("edited")}, defaultdict[tuple[int, ...], float](float)
+    for seam, widest in _widest(model, before, edit, allowed):
+        if widest is not None and seam.edge not in exact and edited.intersection(seam.faces):
+            pair = tuple(sorted(seam.faces))
+            found[pair] = max(found[pair], widest)
+    return dict(found)
+
+
+def _widest(
+    model: Model, before: Sequence[SeamMeasure], edit: Edit, allowed: Tolerances
+) -> Iterator[tuple[SeamMeasure, float | None]]:
+    """Seams, and how wide they may gape, mm; None where they were to be mended."""
+    ways: Mapping[int, str] = {each.edge: each.how for each in edit.edges}
+    for seam in before:
+        how = ways.get(seam.edge)
+        wider = allowed.gap if how == "to tolerance" else allowed.wider(model.edges[seam.edge], seam.gap)
+        yield seam, None if how == "mended" else seam.gap + wider

@@ -1,0 +1,66 @@
+"""What differs between two versions of a document: a layer each for geometry, structure and attributes.
+
+A face's *deviation* is measured from points inside it to the whole surface under its partner, and back; how its
+boundary moved is its *outline*.  So a wall that only grew longer with the face above it has moved in its outline alone.
+
+What a format cannot hold, and how a shape is written down (the kind of a surface, edges in one piece or several), is
+noted and fails nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from functools import cache
+
+from mracad.formats import unheld
+from mracad.inspect.compare import attributes, geometry, structure
+from mracad.inspect.compare.match import match
+from mracad.inspect.compare.subject import Limits, Subject
+from mracad.inspect.verdict import Layer, Verdict
+
+__all__ = ["LAYERS", "Limits", "Subject", "compare"]
+
+LAYERS = (
+    "faces", "deviation", "seams", "topology", "validity", "size", "units", "assembly", "names", "colours", "layers",
+    "materials", "annotations",
+)  # fmt: skip
+"""Names of the layers of a comparison, in order."""
+
+
+def compare(ref: Subject, new: Subject, limits: Limits, ignore: Iterable[str] = ()) -> Verdict:
+    """Judge a new version of a document by a reference.
+
+    Parameters
+    ----------
+    ref, new : Subject
+    limits : Limits
+    ignore : iterable of str
+        Names of layers that are left out.
+    """
+    lacks = unheld(ref.schema, new.schema)
+    groups = match(ref, new, limits.deviation, by_product="assembly" not in lacks)
+    apart = cache(lambda: geometry.deviations(ref, new, groups))
+    makers: dict[str, Callable[[], Layer]] = {
+        "faces": lambda: structure.faces(ref, new, groups),
+        "deviation": lambda: geometry.deviation(ref, new, apart(), limits, exact="assembly" not in lacks),
+        "seams": lambda: structure.seams(ref, new, groups, limits, geometry.unchanged(ref, apart())),
+        "topology": lambda: structure.topology(ref, new, lacks.get("shells", "")),
+        "validity": lambda: structure.validity(ref, new),
+        "size": lambda: structure.size(ref.mass, new.mass, limits, lacks.get("shells", "")),
+        "units": lambda: attributes.units(ref.contents.unit, new.contents.unit),
+        "assembly": lambda: attributes.assembly(ref, new),
+        "names": lambda: attributes.names(ref, new, groups),
+        "colours": lambda: attributes.colours(ref, new, groups, lacks),
+        "layers": lambda: attributes.marks("layers", ref, new, groups),
+        "materials": lambda: attributes.marks("materials", ref, new, groups),
+        "annotations": lambda: attributes.pmi(ref.contents.annotations, new.contents.annotations),
+    }
+    left = frozenset(ignore)
+
+    def made(name: str) -> Layer:
+        if name in left:
+            return Layer(name, "skipped", "ignored")
+        layer = makers[name]()
+        return attributes.noted(layer, lacks[name]) if name in lacks else layer
+
+    return Verdict(new.model.name, tuple(made(name) for name in LAYERS), new.validity.valid)

@@ -1,0 +1,109 @@
+"""One of two documents that are compared, measured; what may differ; how findings become layers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+
+from mracad.inspect.verdict import Finding, Layer
+from mracad.model.brep import Model
+
+if TYPE_CHECKING:
+    from mracad.occ.check import Validity
+    from mracad.occ.contents import Contents
+    from mracad.occ.measure import Mass
+
+Array = np.ndarray
+Point = tuple[float, float, float]
+
+EQUAL = 1e-9
+"""Share of the diagonal below which two lengths are the same."""
+
+
+class Gauge(Protocol):
+    """Exact measures on one document; see :class:`mracad.occ.measure.Gauge`."""
+
+    def sample(self, index: int, lines: tuple[int, int]) -> Array: ...
+
+    def distances(self, index: int, points: Array) -> Array: ...
+
+    def face_distances(self, index: int, points: Array) -> Array: ...
+
+    def edge_distances(self, edges: Iterable[int], points: Array) -> Array: ...
+
+    def facing(self, index: int) -> Array: ...
+
+
+@dataclass(frozen=True, eq=False)
+class Subject:
+    """One of the two documents, measured.
+
+    Attributes
+    ----------
+    model : Model
+        Its geometry: the parts, or all instances in their places as one part.
+    schema : str
+        What it was read from, see :attr:`mracad.occ.document.Document.schema`.
+    contents : Contents
+    mass : Mass
+    faces : list of Mass
+        Of each face of ``model``.
+    validity : Validity
+    lone_faces : int
+        Open shells of one face.
+    gauge : Gauge
+        On the faces of ``model``.
+    face_numbers, edge_numbers : sequence of int
+        Which face and edge of the document each one of ``model`` is.
+    """
+
+    model: Model
+    schema: str
+    contents: Contents
+    mass: Mass
+    faces: list[Mass]
+    validity: Validity
+    lone_faces: int
+    gauge: Gauge
+    face_numbers: Sequence[int]
+    edge_numbers: Sequence[int]
+
+    def named(self, faces: Iterable[int]) -> tuple[int, ...]:
+        """The faces of the document that some faces of ``model`` are."""
+        return tuple(self.face_numbers[face] for face in faces)
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What may differ; None for no limit.  Lengths are millimetres, angles degrees, the volume a share of itself."""
+
+    deviation: float
+    gap_growth: float | None = None
+    angle_growth: float | None = None
+    volume_change: float | None = None
+
+
+@dataclass(frozen=True)
+class Group:
+    """Faces of the reference and those of the new document that are the same: one each, or one and its parts."""
+
+    ref: tuple[int, ...]
+    new: tuple[int, ...]
+
+    def pairs(self) -> list[tuple[int, int]]:
+        return [(i, j) for i in self.ref for j in self.new]
+
+
+def layer(
+    name: str, text: str, findings: Sequence[Finding], figures: Mapping[str, object], notes: Sequence[Finding] = ()
+) -> Layer:
+    """A layer that fails where something was found."""
+    return Layer(name, "fail" if findings else "pass", text, tuple(findings), figures, tuple(notes))
+
+
+def paired(ref: Subject, new: Subject, i: int, j: int, rule: str, **figures: float | str) -> Finding:
+    """A finding about a face of the new document and its partner."""
+    return Finding(rule, new.named([j]), figures={"was_face": ref.face_numbers[i], **figures})

@@ -1,0 +1,61 @@
+"""How far an edit moved each surface: the length of the displacement, measured on a grid of the surface.
+
+δ(u, v) = Σ R_ij(u, v) δ_ij with the kept weights, so max ‖δ_ij‖ bounds it.  It is evaluated at the Greville
+points of the (refined) net that some face depends on.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mracad.bspline.surface import Net
+from mracad.model.brep import Model
+from mracad.model.displacement import Displacement
+from mracad.model.region import face_region, supported
+
+
+@dataclass(frozen=True)
+class Deviation:
+    """Displacement of one face, mm.
+
+    Attributes
+    ----------
+    face : int
+        Index in ``Model.faces``.
+    largest, mean : float
+        Over the sample of the face.
+    bound : float
+        Certified bound: the longest pole offset.
+    where : tuple of float
+        Point of the largest displacement, before the edit, in the part's frame, mm.
+    """
+
+    face: int
+    largest: float
+    mean: float
+    bound: float
+    where: tuple[float, float, float]
+
+
+def deviations(model: Model, displacement: Displacement) -> list[Deviation]:
+    """Deviation of every face whose surface moves, in face order."""
+    found = []
+    for index, offset in displacement.offsets.items():
+        surface = model.surfaces[index]
+        net = offset.over(surface.net)
+        delta = Net(net.u, net.v, offset.poles, net.weights)
+        us, vs = net.u.greville(), net.v.greville()
+        sizes = np.linalg.norm(delta.grid(us, vs), axis=-1)
+        for number in surface.faces:
+            face = model.faces[number]
+            reach = supported(net, face_region(net, face).inside)
+            seen = np.where(reach, sizes, 0.0)
+            i, j = np.unravel_index(seen.argmax(), seen.shape)
+            point = net.evaluate(np.array([[us[i], vs[j]]]))[0]
+            where = face.frame[:3, :3] @ point + face.frame[:3, 3]
+            bound = float(np.linalg.norm(offset.poles, axis=-1)[reach].max(initial=0.0))
+            mean = float(sizes[reach].mean()) if reach.any() else 0.0
+            found.append(Deviation(number, float(seen.max()), mean, bound, tuple(float(x) for x in where)))  # type: ignore[arg-type]
+    return sorted(found, key=lambda d: d.face)

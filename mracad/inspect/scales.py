@@ -1,0 +1,141 @@
+"""What there is to smooth on the faces of a model, told from knots and nets: nothing is edited, no seam looked at.
+
+At a scale s the surface S_f of each face is projected onto the coarse space that its knots leave there, as smoothing
+does; what that takes away, d = S_f − S_{Pf}, is looked at in the knot cells that the face touches.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from mracad.bspline.basis import gauss
+from mracad.bspline.knots import KnotVector
+from mracad.bspline.surface import Net
+from mracad.constraint.crease import crease_lines
+from mracad.constraint.frozen import separate
+from mracad.model.brep import Face, Model, Surface
+from mracad.model.region import face_region
+from mracad.wavelet.ladder import arc_lengths, finest_scale, ladder_for_scale
+from mracad.wavelet.project import projection
+
+Array = np.ndarray
+
+LEAST = 1e-7
+"""Height, mm, from which on something counts as detail: the kernel's coincidence tolerance."""
+
+_POINTS = 2  # places at which a knot cell is looked at in each direction
+
+
+@dataclass(frozen=True)
+class FaceScales:
+    """What one NURBS face holds of scales.
+
+    Attributes
+    ----------
+    face : int
+        Index in ``Model.faces``.
+    spans : (float, float)
+        Least and largest knot span, mm.
+    finest : float
+        Least wavelength whose removal the knots allow, mm; 0 where there is none.
+    creases : int
+        Crease lines inside the face, which every edit keeps.
+    coarser : bool
+        Whether the knots allow a coarser surface at the scale.
+    detail, rms : float
+        Largest and root mean square height of what smoothing at the scale takes away were nothing held, mm.
+    free, points : int
+        Control points that can move while all edges stay, and all on which the face depends.
+    """
+
+    face: int
+    spans: tuple[float, float]
+    finest: float
+    creases: int
+    coarser: bool
+    detail: float
+    rms: float
+    free: int
+    points: int
+
+
+def scales(
+    model: Model, scale: float, keep: str = "g1", progress: Callable[[int, int], None] | None = None
+) -> dict[int, FaceScales]:
+    """Look at the NURBS faces of a model.
+
+    Parameters
+    ----------
+    model : Model
+    scale : float
+        Wavelength, mm.
+    keep : {"g0", "g1", "g2"}
+        Continuity that edges keep; it decides which control points are free.
+    progress : callable, optional
+        Called with surfaces done and surfaces in all.
+
+    Returns
+    -------
+    dict of int to FaceScales
+        By index of the face; faces without a NURBS surface are left out.
+    """
+    found: dict[int, FaceScales] = {}
+    for done, surface in enumerate(model.surfaces):
+        if progress:
+            progress(done, len(model.surfaces))
+        found |= {each.face: each for each in _of_surface(model, surface, scale, keep)}
+    return found
+
+
+def _of_surface(model: Model, surface: Surface, scale: float, keep: str) -> list[FaceScales]:
+    net, faces = surface.net, [model.faces[i] for i in surface.faces]
+    spans = arc_lengths(net, 0), arc_lengths(net, 1)
+    separation = separate(net, faces, surface.faces, keep)
+    creases = crease_lines(net, 0, separation.visible), crease_lines(net, 1, separation.visible)
+    directions = list(zip((net.u, net.v), spans, creases, strict=True))
+    finest = [finest_scale(*each) for each in directions]
+    coarse = [
+        ladder_for_scale(knots, lengths, scale, kept) if 0 < least < scale else knots
+        for (knots, lengths, kept), least in zip(directions, finest, strict=True)
+    ]
+    coarser = coarse != [net.u, net.v]
+    squares = _squares(net, coarse) if coarser else np.zeros((net.u.spans, net.v.spans, 1))
+    area = np.multiply.outer(*spans)
+
+    def of(face: Face) -> FaceScales:
+        inside, reach = face_region(net, face).inside, separation.reach[face.index]
+        heights = squares[inside]
+        mean = np.average(heights.mean(axis=-1), weights=area[inside]) if area[inside].any() else 0.0
+        return FaceScales(
+            face.index,
+            (float(min(s.min() for s in spans)), float(max(s.max() for s in spans))),
+            min(filter(None, finest), default=0.0),
+            sum(map(len, creases)),
+            coarser,
+            float(np.sqrt(heights.max(initial=0.0))),
+            float(np.sqrt(mean)),
+            int((reach & separation.free).sum()),
+            int(reach.sum()),
+        )
+
+    return [of(face) for face in faces]
+
+
+def _squares(net: Net, coarse: list[KnotVector]) -> Array:
+    """Squared heights of what goes at a few places of every knot cell, ``(cells_u, cells_v, places)``."""
+    smoothed = projection(coarse[0], net.u).apply(net.poles, axis=0)
+    smoothed = projection(coarse[1], net.v).apply(smoothed, axis=1)
+    us, vs = (_places(knots) for knots in (net.u, net.v))
+    heights = Net(net.u, net.v, net.poles - smoothed, net.weights).grid(us, vs)
+    squares = np.square(heights).sum(axis=-1)
+    cells = squares.reshape(net.u.spans, _POINTS, net.v.spans, _POINTS)
+    return cells.swapaxes(1, 2).reshape(net.u.spans, net.v.spans, _POINTS**2)
+
+
+def _places(knots: KnotVector) -> Array:
+    """Parameters of the places in every span."""
+    span, offset, _ = gauss(knots, _POINTS)
+    return (knots.knots[span][:, None] + offset).ravel()

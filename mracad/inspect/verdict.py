@@ -1,0 +1,82 @@
+"""Verdicts as data: named layers in order, each with a status and the evidence for it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+Status = Literal["pass", "fail", "time limit", "skipped"]
+Figure = float | int | str | bool | None
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One piece of evidence; :func:`mracad.inspect.words.words` puts it into words.
+
+    Attributes
+    ----------
+    rule : str
+        Its kind, as ``"SelfIntersectingWire"`` or ``"deviates"``.
+    faces : tuple of int
+        Indices of the faces that it concerns.
+    edge : int or None
+        Index of the edge that it concerns.
+    where : tuple of float or None
+        A point, mm, in the part's frame.
+    figures : mapping
+        What was measured, by name; lengths are millimetres, angles degrees, faces of another document indices.
+    """
+
+    rule: str
+    faces: tuple[int, ...] = ()
+    edge: int | None = None
+    where: tuple[float, float, float] | None = None
+    figures: Mapping[str, Figure] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Layer:
+    """One thing that was looked at.
+
+    Attributes
+    ----------
+    name : str
+    status : {"pass", "fail", "time limit", "skipped"}
+    text : str
+        What was measured, or why not, in one line.
+    findings : tuple of Finding
+    figures : mapping
+        What was measured, by name; lengths are millimetres, angles degrees.
+    notes : tuple of Finding
+        What is worth saying and fails nothing.
+    """
+
+    name: str
+    status: Status
+    text: str = ""
+    findings: tuple[Finding, ...] = ()
+    figures: Mapping[str, object] = field(default_factory=dict)
+    notes: tuple[Finding, ...] = ()
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """The layers of a check or a comparison, in order.
+
+    Attributes
+    ----------
+    subject : str
+        Name of the file.
+    layers : tuple of Layer
+    valid : bool or None
+        None where it is unknown: something that decides it was not looked at to its end.
+    """
+
+    subject: str
+    layers: tuple[Layer, ...]
+    valid: bool | None
+
+    def failed(self, *names: str) -> tuple[Layer, ...]:
+        """The layers that failed: of those named, or of all."""
+        return tuple(x for x in self.layers if x.status == "fail" and (not names or x.name in names))

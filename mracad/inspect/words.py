@@ -1,0 +1,121 @@
+"""Findings in words: the one place where evidence becomes sentences."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from mracad.inspect.verdict import Finding
+
+
+def words(finding: Finding) -> str:
+    """What was found, in one line."""
+    return _SENTENCES.get(finding.rule, _failure)(finding)
+
+
+def _faces(faces: Sequence[int]) -> str:
+    return " and ".join(f"#{face + 1}" for face in dict.fromkeys(faces))
+
+
+def _paired(finding: Finding) -> str:
+    """A face of the new document, and its number in the reference where that is another."""
+    (face,), was = finding.faces, finding.figures["was_face"]
+    assert isinstance(was, int)
+    return f"#{face + 1}" if face == was else f"#{face + 1} (was #{was + 1})"
+
+
+def _seam(finding: Finding) -> str:
+    edge = "" if finding.edge is None else f"edge#{finding.edge + 1} "
+    return f"{edge}between {_faces(finding.faces)}"
+
+
+def _failure(finding: Finding) -> str:
+    """A failure in the kernel's own check."""
+    of = f" of #{finding.faces[0] + 1}" if finding.faces else ""
+    return f"{finding.rule} in a {finding.figures['kind']}{of}"
+
+
+def _place(finding: Finding) -> str:
+    """A product, one of its components or one of its faces."""
+    product, component, face = (finding.figures[name] for name in ("product", "component", "face"))
+    assert face is None or isinstance(face, int)
+    within = " inside" if finding.figures["inside"] else ""
+    return f"{product}{f'/{component}' if component else ''}{within if face is None else f' #{face + 1}'}"
+
+
+def _hex(colour: object) -> object:
+    return colour or "without colour"
+
+
+def _counted(noun: str) -> Callable[[Finding], str]:
+    return lambda f: f"{f.figures['now']} {noun}, were {f.figures['was']}"
+
+
+_SENTENCES: dict[str, Callable[[Finding], str]] = {
+    # of a check
+    "entity": lambda f: f"{f.figures['says']}",
+    "lost-faces": lambda f: (
+        f"face not loaded: {f.figures['says']}"
+        if "says" in f.figures
+        else f"{f.figures['count']} faces could not be loaded"
+    ),
+    "same-sense": lambda f: f"the same_sense of {_faces(f.faces)} in the file is wrong",
+    "free-edge": lambda f: f"edge#{(f.edge or 0) + 1} of {_faces(f.faces)} is free",
+    "flipped-face": lambda f: f"{_faces(f.faces)} looks the other way than its neighbours",
+    "unsewn": lambda f: f"{_faces(f.faces)} are not sewn, gap {f.figures['gap']:.3g} mm",
+    "gap": lambda f: f"gap {f.figures['gap']:.3g} mm {_seam(f)}",
+    "angle": lambda f: f"angle {f.figures['angle']:.2g}° {_seam(f)}",
+    "smooth-seams": lambda f: f"{f.figures['now']} seams are smooth, {f.figures['expected']} were expected",
+    "not-smooth": lambda f: f"{_seam(f)} turns by {f.figures['angle']:.4g}°",
+    "crossing": lambda f: _faces(f.faces) + (" crosses itself" if len(set(f.faces)) == 1 else " cross"),
+    "edge-tolerance": lambda f: f"edge#{(f.edge or 0) + 1} has a tolerance of {f.figures['tolerance']:.3g} mm",
+    "vertex-tolerance": lambda f: f"a vertex has a tolerance of {f.figures['tolerance']:.3g} mm",
+    "thin-wall": lambda f: f"wall of {f.figures['thickness']:.4g} mm at {_faces(f.faces)}",
+    "no-mesh": lambda f: f"{_faces(f.faces)} cannot be meshed",
+    "hole": lambda f: "hole at " + " ".join(f"#{face + 1}" for face in f.faces),
+    # of a comparison: faces
+    "face-lost": lambda f: f"{_faces(f.faces)} ({f.figures['kind']}) is gone",
+    "face-added": lambda f: f"{_faces(f.faces)} ({f.figures['kind']}) is new",
+    "face-kind": lambda f: f"{_paired(f)} is {f.figures['now']}, was {f.figures['was']}",
+    "face-split": lambda f: f"#{(f.figures['was_face'] or 0) + 1} is now in {len(f.faces)} parts: {_faces(f.faces)}",  # type: ignore[operator]
+    "face-merged": lambda f: f"{_faces(f.faces)} is one face, was in {f.figures['was']} parts",
+    "deviates": lambda f: f"{_paired(f)} deviates by {f.figures['by']:.6g} mm",
+    "outline": lambda f: f"{_paired(f)} outline moved by {f.figures['by']:.6g} mm",
+    "outline-tolerance": lambda f: (
+        f"outlines differ by up to {f.figures['by']:.3g} mm on {f.figures['count']} faces, within the tolerance of "
+        "their edges"
+    ),
+    # seams
+    "seam-lost": lambda f: f"no seam any more {_seam(f)}",
+    "seam-added": lambda f: f"a new seam, {_seam(f)}",
+    "seam-pieces": lambda f: f"{f.figures['now']} edges between {_faces(f.faces)}, were {f.figures['was']}",
+    "crease": lambda f: f"{_seam(f)} is no longer smooth: {f.figures['now']:.4g}°, was {f.figures['was']:.4g}°",
+    "seam-laid-anew": lambda f: (
+        f"{_seam(f)} measures {f.figures['now']:.4g}°, was {f.figures['was']:.4g}°: its curves lie elsewhere on "
+        "the same faces"
+    ),
+    "gap-growth": lambda f: f"gap {_seam(f)} is {f.figures['now']:.4g} mm, was {f.figures['was']:.4g} mm",
+    "angle-growth": lambda f: f"angle {_seam(f)} is {f.figures['now']:.4g}°, was {f.figures['was']:.4g}°",
+    # counts and sizes
+    **{
+        name: _counted(name.replace("-", " "))
+        for name in ("solids", "shells", "faces", "open-shells", "free-edges", "edges")
+    },
+    "volume-change": lambda f: f"volume {f.figures['now']:.9g} mm³, was {f.figures['was']:.9g} mm³",
+    # structure and attributes
+    "assembly": lambda f: f"{f.figures['change']}: {f.figures['path']}{_of_product(f)}",
+    "placement": lambda f: f"{f.figures['path']}{_of_product(f)} stands elsewhere",
+    "usages": _counted("usages"),
+    "product": lambda f: f"{f.figures['change']}: {f.figures['product']}",
+    "face-name": lambda f: f"{_paired(f)} is named '{f.figures['now']}', was '{f.figures['was']}'",
+    "face-colour": lambda f: f"{_paired(f)} is {_hex(f.figures['now'])}, was {_hex(f.figures['was'])}",
+    "colours": lambda f: f"{f.figures['change']}: {_place(f)} {f.figures['of']} {f.figures['colour']}",
+    "layers": lambda f: f"{f.figures['change']}: {f.figures['layer']} {_place(f)}",
+    "materials": lambda f: f"{f.figures['change']}: {_place(f)} {f.figures['density']}",
+    **{name: _counted(name) for name in ("dimensions", "tolerances", "datums")},
+    "not-held": lambda f: f"not held by {f.figures['format']}: {f.figures['what']}",
+}
+
+
+def _of_product(finding: Finding) -> str:
+    product = finding.figures["product"]
+    return f" ({product})" if product else ""

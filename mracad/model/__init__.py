@@ -1,0 +1,1 @@
+"""A CAD document as plain arrays: faces on surfaces, joined by edges; their regions; displacements; facts."""

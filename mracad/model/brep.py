@@ -1,0 +1,211 @@
+"""The kernel-free snapshot of a CAD document: surfaces, faces, edges.
+
+Lengths are millimetres.  Every array is float64 and must be treated as read-only.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from mracad.bspline.curve import Curve
+from mracad.bspline.surface import Net
+
+Array = np.ndarray
+
+SAME = 9
+"""Decimals in which the numbers of two frames that are the same agree."""
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """One NURBS surface of the document; several faces may lie on it.
+
+    Attributes
+    ----------
+    index : int
+        Position in ``Model.surfaces``.
+    net : Net
+        Its control net in the surface's own frame (see ``Face.frame``), mm.
+    faces : tuple of int
+        Indices of the faces that lie on it.
+    origin : str
+        ``"bspline"``, ``"bezier"``, or the analytic kind it would be converted from (``"extrusion"``, …).
+    """
+
+    index: int
+    net: Net
+    faces: tuple[int, ...]
+    origin: str = "bspline"
+
+
+@dataclass(frozen=True, eq=False)
+class Trim:
+    """One use of an edge by a face: the edge's curve in the parameter plane of the face's surface.
+
+    Attributes
+    ----------
+    edge : int
+        Index in ``Model.edges``.
+    curve : Curve
+        The pcurve as a 2D NURBS curve over the edge's own parameter range (poles ``(n, 2)`` in ``u, v``).
+    """
+
+    edge: int
+    curve: Curve
+
+
+@dataclass(frozen=True, eq=False)
+class Face:
+    """One face of one part.  A part that is instanced counts once (``instances`` says how often it stands).
+
+    Attributes
+    ----------
+    index : int
+        Position in ``Model.faces``, from 0; users write ``#1`` for the first.
+    name, product : str
+        Names from the document, or ``""``.
+    colour : str
+        ``"#rrggbb"`` or ``""``.
+    kind : str
+        ``"bspline"``, ``"bezier"``, ``"plane"``, ``"cylinder"``, ``"cone"``, ``"sphere"``, ``"torus"``,
+        ``"extrusion"``, ``"revolution"``, ``"offset"``, ``"other"``.
+    surface : int or None
+        Index in ``Model.surfaces`` of a NURBS face; None for a face that stays as it is.
+    trims : tuple of Trim
+        The boundary, one entry per use of an edge (two for a closing edge); empty unless ``surface`` is set.
+    reversed : bool
+        Whether the face's outward normal is opposite to S_u × S_v.
+    frame : ndarray (4, 4)
+        Rigid map from the surface's frame to the part's.
+    box : ndarray (2, 3)
+        Lowest and highest corner of what is around its control points in the part's frame, mm; ``face_boxes`` of
+        ``occ.boxes`` has that of the face itself.
+    instances : int
+        How often the part stands in the document.
+    """
+
+    index: int
+    kind: str
+    surface: int | None
+    trims: tuple[Trim, ...]
+    reversed: bool
+    frame: Array
+    box: Array
+    name: str = ""
+    product: str = ""
+    colour: str = ""
+    instances: int = 1
+
+
+@dataclass(frozen=True, eq=False)
+class Side:
+    """One face's view of an edge, at the edge's sample parameters (see ``Edge.points``).
+
+    A NURBS side has ``uv`` and is evaluated on its surface, so that it follows an edit; any other side does not
+    move and carries its points, normals and curvature as measured by the kernel.
+
+    Attributes
+    ----------
+    face : int
+        Index in ``Model.faces``.
+    uv : ndarray (k, 2) or None
+        Parameters on the face's surface.
+    points, normals : ndarray (k, 3) or None
+        Points (mm) and outward unit normals in the part's frame.
+    curvatures : ndarray (k,) or None
+        Normal curvatures across the edge (1/mm), positive where the face bends towards its normal.
+    """
+
+    face: int
+    uv: Array | None = None
+    points: Array | None = None
+    normals: Array | None = None
+    curvatures: Array | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Edge:
+    """An edge of a part.
+
+    Attributes
+    ----------
+    index : int
+        Position in ``Model.edges``, from 0; users write ``edge#1`` for the first.
+    points, tangents : ndarray (k, 3)
+        Samples of its 3D curve in the part's frame (mm) and unit tangents there; empty when degenerate.
+    sides : tuple of Side
+        One per use by a face: one for a free edge, two for a seam, two of the same face for a closing edge.
+    tolerance : float
+        The edge's tolerance, mm.
+    degenerate : bool
+        A pole: the edge is a point in space.
+    part : int
+        Which part (shape definition) it belongs to.
+    """
+
+    index: int
+    points: Array
+    tangents: Array
+    sides: tuple[Side, ...]
+    tolerance: float
+    degenerate: bool = False
+    part: int = 0
+
+    @property
+    def free(self) -> bool:
+        return len(self.sides) == 1 and not self.degenerate
+
+    @property
+    def closing(self) -> bool:
+        return len(self.sides) == 2 and self.sides[0].face == self.sides[1].face
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """A document as faces on surfaces, joined by edges.
+
+    Attributes
+    ----------
+    name : str
+        File name without folder.
+    surfaces, faces, edges
+        The parts' geometry.
+    diagonal : float
+        Diagonal of the bounding box of the whole document, instances placed, mm.
+    unit : str
+        The file's length unit (``"mm"``, ``"m"``, ``"in"``, …).
+    schema : str
+        STEP schema (``"AP203"``, ``"AP214"``, ``"AP242"``).
+    products : tuple of str
+        By part.
+    places : tuple of tuple of ndarray (4, 4)
+        By part, the frames in which its instances stand; empty for a model of one part where it stands.
+    """
+
+    name: str
+    surfaces: tuple[Surface, ...]
+    faces: tuple[Face, ...]
+    edges: tuple[Edge, ...]
+    diagonal: float
+    unit: str = "mm"
+    schema: str = ""
+    products: tuple[str, ...] = ()
+    places: tuple[tuple[Array, ...], ...] = ()
+
+    @cached_property
+    def spaces(self) -> tuple[int, ...]:
+        """By part, which space its numbers are in: parts that stand once and in the same place have one in common."""
+        first: dict[bytes, int] = {}
+        bases = [
+            first.setdefault((frames[0].round(SAME) + 0.0).tobytes(), part) if len(frames) == 1 else part
+            for part, frames in enumerate(self.places)
+        ]
+        return tuple(bases)
+
+    def with_surfaces(self, surfaces: Sequence[Surface]) -> Model:
+        """The model with other surfaces under the same faces (baked sides stay where they are)."""
+        return replace(self, surfaces=tuple(surfaces))

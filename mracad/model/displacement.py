@@ -1,0 +1,60 @@
+"""What an edit does to a model: offsets of the control points of its surfaces."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from mracad.bspline.surface import Net
+from mracad.model.brep import Model, Surface
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Offset:
+    """Pole offsets of one surface, in its own spline space or one that holds it exactly: of higher degree, finer.
+
+    Attributes
+    ----------
+    poles : ndarray (nu, nv, 3)
+        Offsets of the Euclidean control points of the net that ``over`` gives, mm; weights are kept.
+        Rows that are exactly zero are left bit-identical.
+    u_knots, v_knots : ndarray
+        Knots to insert first (with repetition), beyond those the (elevated) surface has; empty for none.
+    degrees : (int, int)
+        Degrees in u and v to which the surface is elevated before that; as it is where its own is no lower.
+    """
+
+    poles: Array
+    u_knots: Array = field(default_factory=lambda: np.empty(0))
+    v_knots: Array = field(default_factory=lambda: np.empty(0))
+    degrees: tuple[int, int] = (0, 0)
+
+    def over(self, net: Net) -> Net:
+        """The net of the undisplaced surface whose control points the offset moves; ``net`` itself where it does."""
+        u, v = (kv.elevated(degree) for kv, degree in zip((net.u, net.v), self.degrees, strict=True))
+        return net.over(u.refined(self.u_knots), v.refined(self.v_knots))
+
+
+@dataclass(frozen=True, eq=False)
+class Displacement:
+    """What an edit does: pole offsets by surface index.  Surfaces that are not named do not move."""
+
+    offsets: dict[int, Offset] = field(default_factory=dict)
+
+    def scaled(self, factor: float) -> Displacement:
+        """The same displacement times ``factor``."""
+        return Displacement({i: replace(o, poles=factor * o.poles) for i, o in self.offsets.items()})
+
+    def applied(self, model: Model) -> Model:
+        """The model with its surfaces displaced (baked sides stay where they are)."""
+        surfaces = list(model.surfaces)
+        for index, offset in self.offsets.items():
+            old = surfaces[index]
+            net = offset.over(old.net)
+            surfaces[index] = Surface(
+                index, Net(net.u, net.v, net.poles + offset.poles, net.weights), old.faces, old.origin
+            )
+        return model.with_surfaces(surfaces)
