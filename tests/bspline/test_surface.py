@@ -91,15 +91,13 @@ def test_grid_is_evaluate_on_a_tensor_product(kind_u, rational):
         np.testing.assert_array_equal(net.tangents(us, vs, axis), net.grid(us, vs, 1)[1 + axis])
 
 
-def test_many_points_are_evaluated_in_blocks(monkeypatch):
-    from mracad.bspline import net as module
-
+def test_many_points_are_what_few_at_a_time_are():
+    """More than go through at once."""
     net = random_net("clamped", "clamped", True)
-    uv = places(net, 100)
-    whole = net.evaluate(uv, 2)
-    monkeypatch.setattr(module, "_BLOCK", 200)
-    for a, b in zip(whole, net.evaluate(uv, 2), strict=True):
-        np.testing.assert_array_equal(a, b)
+    uv = places(net, 50_000)
+    few = [net.evaluate(part, 2) for part in np.array_split(uv, 50)]
+    for whole, *parts in zip(net.evaluate(uv, 2), *few, strict=True):
+        np.testing.assert_array_equal(whole, np.concatenate(parts))
 
 
 @pytest.mark.parametrize("kind_u", KINDS)
