@@ -45,7 +45,7 @@ def peak() -> float:
 def measure(source: Path, copies: int) -> None:
     """One run in this process: reading, editing, writing."""
     from mracad import job
-    from mracad.edit.features import repeat
+    from mracad.edit.feature.edits import repeat
     from mracad.occ.step import read_step, write_step
     from mracad.options import Repeat
 

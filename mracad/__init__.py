@@ -16,7 +16,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from mracad.edit.features import move, repeat, transfer
+    from mracad.edit.feature.edits import move, repeat, transfer
     from mracad.edit.smooth import smooth
     from mracad.errors import MracadError
     from mracad.inspect.deviation import deviations
@@ -44,15 +44,15 @@ _HOMES = {
     "apply": "occ.apply",
     "check": "occ.check",
     "deviations": "inspect.deviation",
-    "move": "edit.features",
+    "move": "edit.feature.edits",
     "read": "occ.files",
     "read_back": "produce",
-    "repeat": "edit.features",
+    "repeat": "edit.feature.edits",
     "run": "job",
     "seams": "inspect.seams",
     "smooth": "edit.smooth",
     "snapshot": "occ.view:view",
-    "transfer": "edit.features",
+    "transfer": "edit.feature.edits",
     "write": "occ.files",
 }
 

@@ -89,7 +89,7 @@ class Single(Featured, frozen=True, kw_only=True, forbid_unknown_fields=True):
 class Move(Single, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Move a detail feature: the coarse surface is left clean at its place, and it is present at another one."""
 
-    function: ClassVar[str] = "mracad.edit.features:move"
+    function: ClassVar[str] = "mracad.edit.feature.edits:move"
 
     to: Annotated[str, Meta(description="Where to: X,Y,Z (mm) or #face@u,v.")] = ""
 
@@ -108,7 +108,7 @@ class Move(Single, frozen=True, kw_only=True, forbid_unknown_fields=True):
 class Repeat(Single, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Repeat a detail feature at other places of the same or other faces, over seams where they lie in its way."""
 
-    function: ClassVar[str] = "mracad.edit.features:repeat"
+    function: ClassVar[str] = "mracad.edit.feature.edits:repeat"
 
     at: Annotated[
         tuple[PlaceText, ...],
@@ -167,7 +167,7 @@ class Repeat(Single, frozen=True, kw_only=True, forbid_unknown_fields=True):
 class Transfer(Featured, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Carry the detail of a face, or a feature, of another file onto this one; units may differ."""
 
-    function: ClassVar[str] = "mracad.edit.features:transfer"
+    function: ClassVar[str] = "mracad.edit.feature.edits:transfer"
 
     source: Annotated[File, Meta(description="The file that the detail is taken from.")] = ""
     from_: Annotated[

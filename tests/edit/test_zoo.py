@@ -5,7 +5,7 @@ import io
 import pytest
 
 from mracad import job, occ
-from mracad.edit.features import move, repeat
+from mracad.edit.feature.edits import move, repeat
 from mracad.edit.smooth import smooth
 from mracad.errors import EditError
 from mracad.inspect.seams import seams

@@ -22,7 +22,7 @@ def command() -> None:
 @options.apply(options.reading, options.of(Selection, "instance hold keep edges"), options.printing)
 def list_(source: str, input_unit: str | None, encoding: str | None, faces: tuple[str, ...], as_json: bool) -> None:
     """Propose features: places where the detail of a face stands out, with size, height and scales."""
-    from mracad.feature.find import found
+    from mracad.edit.feature.find import found
     from mracad.occ.look import looked_at
     from mracad_cli.render import json_text, mm, plain, say
 
@@ -61,8 +61,8 @@ def extract(
     **given: Any,
 ) -> None:
     """Save a feature to a file: a library of details that mracad repeat and mracad transfer lay elsewhere."""
-    from mracad.edit.features import extract as taken
-    from mracad.feature.detail import save
+    from mracad.edit.feature.detail import save
+    from mracad.edit.feature.edits import extract as taken
     from mracad.occ.look import looked_at
     from mracad.recipe import options as options_of
     from mracad_cli.render import json_text, mm

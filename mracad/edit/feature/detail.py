@@ -15,8 +15,8 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
+from mracad.edit.feature.ground import Feet
 from mracad.errors import FileError
-from mracad.feature.ground import Feet
 
 Array = np.ndarray
 

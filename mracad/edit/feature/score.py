@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from mracad.bspline.surface import Net
+from mracad.edit.feature.detail import LOST
+from mracad.edit.feature.fine import between
+from mracad.edit.feature.ideal import Copies
+from mracad.edit.feature.sheet import Sheet
 from mracad.errors import EditError
-from mracad.feature.detail import LOST
-from mracad.feature.fine import between
-from mracad.feature.ideal import Copies
-from mracad.feature.sheet import Sheet
 
 Array = np.ndarray
 

@@ -17,12 +17,12 @@ from mracad.bspline.surface import Net
 from mracad.constraint.frozen import separate
 from mracad.constraint.seam import seams
 from mracad.constraint.wishes import Wishes
+from mracad.edit.feature.copies import Laid, offset, over
+from mracad.edit.feature.detail import taper
+from mracad.edit.feature.fine import MISSED, NARROWEST, Knots, divided, split, through, weights_over
+from mracad.edit.feature.score import Copy
+from mracad.edit.feature.sheet import Sheet
 from mracad.errors import EditError
-from mracad.feature.compared import Copy
-from mracad.feature.copies import Laid, offset, over
-from mracad.feature.detail import taper
-from mracad.feature.fine import MISSED, NARROWEST, Knots, divided, split, through, weights_over
-from mracad.feature.sheet import Sheet
 from mracad.model.brep import Model
 from mracad.options import Transfer
 from mracad.wavelet.ladder import arc_lengths, ladder_for_scale

@@ -1,6 +1,6 @@
 """Copies of a feature as offsets of control points: the ideal displacement as far as seams, edges and holes allow it.
 
-Where copies lie over a seam between two faces that move, it moves with them (:mod:`mracad.feature.joined`): exactly
+Where copies lie over a seam between two faces that move, it moves with them (:mod:`.joined`): exactly
 where both sides end there along parameter lines, to a tolerance along trim curves.  A seam that would not hold stays,
 and takes its part of the copies.
 """
@@ -20,13 +20,13 @@ from mracad.constraint.frozen import separate
 from mracad.constraint.seam import Seam
 from mracad.constraint.trimmed import TrimmedSeam
 from mracad.constraint.wishes import Wishes
-from mracad.feature.compared import Copy, Outcome, compared, refuse_clipped, refuse_short
-from mracad.feature.crossing import Crossing, crossing, reached, refined
-from mracad.feature.fine import MISSED, Fit
-from mracad.feature.ground import Ground
-from mracad.feature.ideal import Copies
-from mracad.feature.joined import Softness, Wanted, held
-from mracad.feature.shift import Shifts, shifted
+from mracad.edit.feature.crossing import Crossing, crossing, reached, refined
+from mracad.edit.feature.exact import Shifts, shifted
+from mracad.edit.feature.fine import MISSED, Fit
+from mracad.edit.feature.ground import Ground
+from mracad.edit.feature.ideal import Copies
+from mracad.edit.feature.joined import Softness, Wanted, held
+from mracad.edit.feature.score import Copy, Outcome, compared, refuse_clipped, refuse_short
 from mracad.model.brep import Model
 from mracad.model.displacement import Displacement, Offset
 from mracad.seam.interface import Joints, joints

@@ -17,8 +17,8 @@ from mracad.constraint.border import Border
 from mracad.constraint.frozen import jet_support, meeting
 from mracad.constraint.seam import Seam
 from mracad.constraint.trimmed import TrimmedSeam
-from mracad.feature.crossing import Crossing, Stretch, exact_parts, met, trace
-from mracad.feature.fine import grown
+from mracad.edit.feature.crossing import Crossing, Stretch, exact_parts, met, trace
+from mracad.edit.feature.fine import grown
 from mracad.model.brep import Face
 from mracad.model.cells import quadrature
 from mracad.model.region import supported

@@ -14,9 +14,9 @@ import numpy as np
 from mracad.bspline.fit import interpolated
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
+from mracad.edit.feature.ideal import Copies
+from mracad.edit.feature.sheet import Sheet
 from mracad.errors import EditError
-from mracad.feature.ideal import Copies
-from mracad.feature.sheet import Sheet
 from mracad.wavelet.ladder import arc_lengths
 
 Array = np.ndarray

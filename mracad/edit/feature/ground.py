@@ -8,8 +8,8 @@ from functools import cached_property
 
 import numpy as np
 
-from mracad.feature.chart import Charts, charts
-from mracad.feature.sheet import Sheet, inside
+from mracad.edit.feature.chart import Charts, charts
+from mracad.edit.feature.sheet import Sheet, inside
 from mracad.model.brep import Model
 
 Array = np.ndarray

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mracad.feature.chart import charts
+from mracad.edit.feature.chart import charts
 
 RADIUS, REACH = 40.0, 25.0
 

@@ -12,8 +12,8 @@ from mracad.constraint.border import Border
 from mracad.constraint.seam import Seam
 from mracad.constraint.trace import Trace, along, crossings
 from mracad.constraint.trimmed import TrimmedSeam
-from mracad.feature.fine import grown
-from mracad.feature.ideal import Copies
+from mracad.edit.feature.fine import grown
+from mracad.edit.feature.ideal import Copies
 from mracad.seam.conditions import SAME, doubled, matched
 
 Array = np.ndarray

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from mracad.edit.feature.chart import DEGREE, charts, monomials
+from mracad.edit.feature.ground import Ground, axes
+from mracad.edit.feature.locate import Window
 from mracad.errors import EditError
-from mracad.feature.chart import DEGREE, charts, monomials
-from mracad.feature.ground import Ground, axes
-from mracad.feature.place import Window
 
 Array = np.ndarray
 

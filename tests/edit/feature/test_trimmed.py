@@ -8,9 +8,9 @@ import pytest
 from mracad import job
 from mracad.constraint.cause import Cause, Still
 from mracad.constraint.wishes import Wishes
-from mracad.edit.features import extract, move, repeat
+from mracad.edit.feature.detail import save
+from mracad.edit.feature.edits import extract, move, repeat
 from mracad.errors import EditError
-from mracad.feature.detail import save
 from mracad.inspect.seams import seams
 from mracad.model.displacement import Displacement, Offset
 from mracad.occ.step import read_step, write_step
@@ -18,9 +18,9 @@ from mracad.occ.view import view
 from mracad.options import Move, Repeat
 from mracad.seam.interface import joints
 from tests.edit import halves
+from tests.edit.feature import grounds
+from tests.edit.feature.grounds import HEIGHT, bump
 from tests.edit.models import sheet
-from tests.feature import grounds
-from tests.feature.grounds import HEIGHT, bump
 
 
 @pytest.fixture(scope="module")

@@ -9,17 +9,17 @@ from mracad.bspline.surface import Net
 from mracad.constraint.border import Border
 from mracad.constraint.joint import Joint
 from mracad.constraint.seam import Seam
-from mracad.edit.features import extract, repeat
+from mracad.edit.feature.crossing import crossing
+from mracad.edit.feature.detail import save
+from mracad.edit.feature.edits import extract, repeat
 from mracad.errors import EditError
-from mracad.feature.crossing import crossing
-from mracad.feature.detail import save
 from mracad.occ.view import view
 from mracad.options import Repeat
 from tests import zoo
 from tests.edit import panels
+from tests.edit.feature import grounds
+from tests.edit.feature.grounds import HEIGHT, SIGMA, bump
 from tests.edit.models import sheet
-from tests.feature import grounds
-from tests.feature.grounds import HEIGHT, SIGMA, bump
 from tests.occ import shapes
 
 

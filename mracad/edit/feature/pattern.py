@@ -8,9 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from mracad.edit.feature.ground import Feet, Ground, axes
+from mracad.edit.feature.locate import MOST_PLACES, Place, numbers, place, table, whole
 from mracad.errors import EditError, UsageError
-from mracad.feature.ground import Feet, Ground, axes
-from mracad.feature.place import MOST_PLACES, Place, numbers, place, table, whole
 from mracad.model.brep import Model
 
 Array = np.ndarray

@@ -12,11 +12,11 @@ from functools import cached_property
 
 import numpy as np
 
-from mracad.feature.chart import Charts
-from mracad.feature.detail import Feature
-from mracad.feature.ground import STEEP, Feet, Ground
-from mracad.feature.place import Place
-from mracad.feature.sheet import Sheet
+from mracad.edit.feature.chart import Charts
+from mracad.edit.feature.detail import Feature
+from mracad.edit.feature.ground import STEEP, Feet, Ground
+from mracad.edit.feature.locate import Place
+from mracad.edit.feature.sheet import Sheet
 
 Array = np.ndarray
 

@@ -12,9 +12,9 @@ from OCP.gp import gp_Ax2, gp_Dir, gp_Pnt
 
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
-from mracad.edit.features import extract, repeat
+from mracad.edit.feature.edits import extract, repeat
+from mracad.edit.feature.score import Copy, refuse_short
 from mracad.errors import Code, EditError
-from mracad.feature.compared import Copy, refuse_short
 from mracad.inspect.seams import seams
 from mracad.occ.step import read_step, write_step
 from mracad.occ.view import view
@@ -22,9 +22,9 @@ from mracad.options import Repeat
 from samples import make
 from tests.conftest import CORPUS
 from tests.edit import panels
+from tests.edit.feature import grounds
+from tests.edit.feature.grounds import HEIGHT, SIGMA, bump
 from tests.edit.models import fitted
-from tests.feature import grounds
-from tests.feature.grounds import HEIGHT, SIGMA, bump
 from tests.occ import shapes
 
 FEATURE = "near:50,50,0,radius:20"

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from mracad.bspline.surface import Net
+from mracad.edit.feature.ground import Feet, Ground
+from mracad.edit.feature.sheet import Sheet, inside
 from mracad.errors import EditError, FileError, UsageError
-from mracad.feature.ground import Feet, Ground
-from mracad.feature.sheet import Sheet, inside
 from mracad.model.brep import Model
 
 Array = np.ndarray

@@ -11,13 +11,13 @@ from mracad.bspline.surface import Net
 from mracad.constraint.frozen import separate
 from mracad.constraint.seam import seams
 from mracad.constraint.wishes import Wishes
+from mracad.edit.feature.base import Surroundings
+from mracad.edit.feature.chart import Charts
+from mracad.edit.feature.detail import LOST, Feature, Origin, taper
+from mracad.edit.feature.ground import STEEP, Ground
+from mracad.edit.feature.locate import Window
+from mracad.edit.feature.sheet import Sheet
 from mracad.errors import EditError
-from mracad.feature.chart import Charts
-from mracad.feature.detail import LOST, Feature, Origin, taper
-from mracad.feature.ground import STEEP, Ground
-from mracad.feature.place import Window
-from mracad.feature.sheet import Sheet
-from mracad.feature.surroundings import Surroundings
 
 Array = np.ndarray
 

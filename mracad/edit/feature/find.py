@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mracad.bspline.surface import Net
-from mracad.feature.sheet import Sheet
+from mracad.edit.feature.sheet import Sheet
 from mracad.model.brep import Model
 from mracad.wavelet.ladder import arc_lengths, ladder_for_scale
 from mracad.wavelet.project import projection

@@ -1,7 +1,7 @@
 """Detail features: move one, repeat it, carry it from another model (METHOD: a feature is a displacement).
 
-A feature is told from what it stands above (:mod:`mracad.feature.extract`), tabulated in geodesic coordinates of its
-place, and laid on other places (:mod:`mracad.feature.copies`); seams between edited faces hold.
+A feature is told from what it stands above (:mod:`~mracad.edit.feature.extract`), tabulated in geodesic coordinates of
+its place, and laid on other places (:mod:`~mracad.edit.feature.copies`); seams between edited faces hold.
 """
 
 from __future__ import annotations
@@ -14,17 +14,17 @@ import numpy as np
 
 from mracad.constraint.seam import Treatment
 from mracad.constraint.wishes import Wishes
+from mracad.edit.feature.copies import Laid, laid
+from mracad.edit.feature.detail import Feature, load
+from mracad.edit.feature.extract import above_surroundings, between_levels
+from mracad.edit.feature.fine import NARROWEST
+from mracad.edit.feature.ground import Ground, axes
+from mracad.edit.feature.ideal import copies
+from mracad.edit.feature.locate import Place, face_number, place, sheet_of, standing, window
+from mracad.edit.feature.pattern import along, grid, listed, polar, scattered
+from mracad.edit.feature.transfer import at_scale, laid_on
 from mracad.edit.result import Edit, FaceOutcome, Reason, spared
 from mracad.errors import EditError, UsageError
-from mracad.feature.character import at_scale, laid_on
-from mracad.feature.copies import Laid, laid
-from mracad.feature.detail import Feature, load
-from mracad.feature.extract import above_surroundings, between_levels
-from mracad.feature.fine import NARROWEST
-from mracad.feature.ground import Ground, axes
-from mracad.feature.ideal import copies
-from mracad.feature.pattern import along, grid, listed, polar, scattered
-from mracad.feature.place import Place, face_number, place, sheet_of, standing, window
 from mracad.model.brep import Face, Model
 from mracad.model.displacement import Displacement
 from mracad.options import Featured, Move, Repeat, Single, Transfer, band_of, length

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from mracad.bspline.knots import KnotVector
-from mracad.feature.detail import Origin
-from mracad.feature.ideal import Copies
-from mracad.feature.sheet import Sheet
+from mracad.edit.feature.detail import Origin
+from mracad.edit.feature.ideal import Copies
+from mracad.edit.feature.sheet import Sheet
 
 Array = np.ndarray
 _Box = tuple[tuple[int, int], tuple[int, int]]
