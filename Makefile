@@ -64,7 +64,7 @@ bench-batch: $(VENV)/dev
 
 # The page of steps, from their declaration
 docs: $(VENV)/ready
-	$(BIN)/python -c 'from mracad.recipe import page; print(page(), end="")' > docs/steps.md
+	$(BIN)/python -c 'from mracad.spec.schema import page; print(page(), end="")' > docs/steps.md
 
 samples: $(VENV)/ready
 	$(BIN)/python samples/make.py samples

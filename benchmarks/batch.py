@@ -22,12 +22,12 @@ import psutil
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
-from mracad.batch.find import find  # noqa: E402
-from mracad.batch.manifest import Manifest  # noqa: E402
-from mracad.batch.pool import Limits, Pool  # noqa: E402
-from mracad.batch.run import Settings, run  # noqa: E402
-from mracad.batch.work import warm  # noqa: E402
-from mracad.recipe import load  # noqa: E402
+from mracad.job.batch.find import find  # noqa: E402
+from mracad.job.batch.manifest import Manifest  # noqa: E402
+from mracad.job.batch.pool import Limits, Pool  # noqa: E402
+from mracad.job.batch.run import Settings, run  # noqa: E402
+from mracad.job.batch.work import warm  # noqa: E402
+from mracad.spec.recipe import load  # noqa: E402
 from tests.batch.runs import batch, environment, kills, outputs, recipe, shams  # noqa: E402
 from tests.batch.tasks import work  # noqa: E402
 from tests.batch.test_cluster import cluster  # noqa: E402

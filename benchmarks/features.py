@@ -44,10 +44,10 @@ def peak() -> float:
 
 def measure(source: Path, copies: int) -> None:
     """One run in this process: reading, editing, writing."""
-    from mracad import job
     from mracad.edit.feature.edits import repeat
+    from mracad.job.document import run
     from mracad.occ.step import read_step, write_step
-    from mracad.options import Repeat
+    from mracad.spec.steps import Repeat
 
     rng = np.random.default_rng(0)
     x, y = rng.uniform(15, SIDE - 15, (2, copies))
@@ -56,13 +56,13 @@ def measure(source: Path, copies: int) -> None:
     np.savetxt(places, rows, delimiter=",", fmt="%.6f")
     z = ground(np.float64(PLACE), np.float64(PLACE)) + 0.8
     begin = time.perf_counter()
-    job.run(read_step(source), repeat, Repeat(feature=f"near:{PLACE},{PLACE},{z},radius:10", at=(f"{x[0]},{y[0]},0",)))
+    run(read_step(source), repeat, Repeat(feature=f"near:{PLACE},{PLACE},{z},radius:10", at=(f"{x[0]},{y[0]},0",)))
     first = time.perf_counter() - begin
     times = [time.perf_counter()]
     document = read_step(source)
     times.append(time.perf_counter())
     held = peak()
-    report = job.run(document, repeat, Repeat(feature=f"near:{PLACE},{PLACE},{z},radius:10", at=(f"@{places}",)))
+    report = run(document, repeat, Repeat(feature=f"near:{PLACE},{PLACE},{z},radius:10", at=(f"@{places}",)))
     times.append(time.perf_counter())
     more = peak() - held
     write_step(document, source.with_name("out.step"))

@@ -89,13 +89,13 @@ def measure_solve(source: Path, side: int) -> None:
 
 def measure_job(source: Path) -> None:
     """Reading, the whole job, writing."""
-    from mracad import job
     from mracad.edit.smooth import smooth
+    from mracad.job.document import run
     from mracad.occ.step import read_step, write_step
-    from mracad.options import Smooth
+    from mracad.spec.steps import Smooth
 
     document, read = timed(lambda: read_step(source))
-    report, whole = timed(lambda: job.run(document, smooth, Smooth(scale=f"{SCALE}mm")))
+    report, whole = timed(lambda: run(document, smooth, Smooth(scale=f"{SCALE}mm")))
     with (source.parent / "out.step").open("wb") as stream:
         _, write = timed(lambda: write_step(document, stream))
     seams = sum(edge.how == "coupled" for edge in report.edit.edges)

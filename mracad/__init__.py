@@ -21,34 +21,33 @@ if TYPE_CHECKING:
     from mracad.errors import MracadError
     from mracad.inspect.deviation import deviations
     from mracad.inspect.seams import seams
-    from mracad.job import run
+    from mracad.job.document import run
     from mracad.model.brep import Model
     from mracad.model.displacement import Displacement
     from mracad.occ.apply import apply
     from mracad.occ.check import check
     from mracad.occ.files import read, write
     from mracad.occ.view import view as snapshot
-    from mracad.options import Move, Repeat, Smooth, Transfer
-    from mracad.produce import read_back
+    from mracad.spec.steps import Move, Repeat, Smooth, Transfer
 
 __version__ = "0.1.0"
 
 _HOMES = {
     "Displacement": "model.displacement",
     "Model": "model.brep",
-    "Move": "options",
+    "Move": "spec.steps",
     "MracadError": "errors",
-    "Repeat": "options",
-    "Smooth": "options",
-    "Transfer": "options",
+    "Repeat": "spec.steps",
+    "Smooth": "spec.steps",
+    "Transfer": "spec.steps",
     "apply": "occ.apply",
     "check": "occ.check",
     "deviations": "inspect.deviation",
     "move": "edit.feature.edits",
     "read": "occ.files",
-    "read_back": "produce",
+    "read_back": "job.produce",
     "repeat": "edit.feature.edits",
-    "run": "job",
+    "run": "job.document",
     "seams": "inspect.seams",
     "smooth": "edit.smooth",
     "snapshot": "occ.view:view",

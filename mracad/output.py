@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import IO, BinaryIO
 
-from mracad import guard
+from mracad import note
 from mracad.errors import FileError
 
 PREFIX = ".mracad-"
@@ -46,7 +46,7 @@ def beside(target: str | os.PathLike, prefix: str = PREFIX) -> Iterator[Path]:
             yield made
             with _writing(path):
                 os.fsync(held.fileno())
-        guard.ending()
+        note.ending()
         with _writing(path):
             made.chmod(_mode(path))
             made.replace(path)

@@ -33,7 +33,7 @@ from mracad.occ.apply import apply
 from mracad.occ.settings import quiet
 from mracad.occ.step import read_step, write_step
 from mracad.occ.view import view
-from mracad.options import length
+from mracad.spec.quantity import length
 from tests.roughness import FEWEST, POINTS, Face, compared, faces, matched, opened, removed, report
 from tests.sheet import Sheet, grid
 

@@ -12,15 +12,16 @@ from functools import partial
 import click
 
 import mracad
-from mracad import guard
+from mracad import note
 from mracad.errors import Code, MracadError
-from mracad.wire import internal
+from mracad.job import guard
+from mracad.job.wire import internal
 from mracad_cli import commands, options
 from mracad_cli.steps import edit_command, edits
 
 
 class Commands(click.Group):
-    """A group whose commands are the modules of ``mracad_cli.commands`` and the edits of ``mracad.options``."""
+    """A group whose commands are the modules of ``mracad_cli.commands`` and the edits of ``mracad.spec.steps``."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return sorted({*_modules(), *edits()})
@@ -128,7 +129,7 @@ def _done(arguments: list[str]) -> int:
             raise internal(error) from error
         what = f"{type(error).__name__}: {error}"
         hint = "the model may be damaged: see mracad check, or export it again"
-        raise MracadError(f"the CAD kernel failed{guard.now()} ({what})", hint) from error
+        raise MracadError(f"the CAD kernel failed{note.now()} ({what})", hint) from error
     return result if isinstance(result, int) else 0
 
 

@@ -14,16 +14,16 @@ from xml.etree import ElementTree
 
 import msgspec
 
-from mracad.batch.cluster import Cluster
-from mracad.batch.find import Item, find
-from mracad.batch.manifest import Manifest
-from mracad.batch.pool import Limits, Pool
-from mracad.batch.run import Outcome, Settings, run
-from mracad.batch.work import warm
 from mracad.errors import Code, MracadError
-from mracad.guard import size
-from mracad.options import duration
-from mracad.recipe import Recipe
+from mracad.job.batch.cluster import Cluster
+from mracad.job.batch.find import Item, find
+from mracad.job.batch.manifest import Manifest
+from mracad.job.batch.pool import Limits, Pool
+from mracad.job.batch.run import Outcome, Settings, run
+from mracad.job.batch.work import warm
+from mracad.job.guard import size
+from mracad.spec.quantity import duration
+from mracad.spec.recipe import Recipe
 from mracad_cli.files import check_reports, deliver, depfile_text
 from mracad_cli.progress import Progress
 from mracad_cli.render import json_text, say

@@ -9,15 +9,15 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from mracad import guard
+from mracad import note
 from mracad.errors import FileError, UsageError
 from mracad.formats import FORMATS, by_ending
 from mracad_cli.render import read_back, say
 
 if TYPE_CHECKING:
+    from mracad.job.produce import Made, Target
     from mracad.occ.document import Document
     from mracad.occ.load import Text
-    from mracad.produce import Made, Target
 
 
 def load(source: str) -> Text:
@@ -32,7 +32,7 @@ def read(source: str | Text, input_unit: str | None, encoding: str | None) -> Do
     from mracad.occ.files import read as read_file
 
     text = load(source) if isinstance(source, str) else source
-    guard.doing("reading", text.name)
+    note.doing("reading", text.name)
     document = read_file(text, input_unit, encoding)
     for warning in document.warnings:
         say(f"warning: {warning}", file=sys.stderr)
@@ -133,7 +133,7 @@ class Outputs:
 
     def targets(self) -> list[Target]:
         """How each output is written."""
-        from mracad.produce import Target
+        from mracad.job.produce import Target
 
         return [
             Target(self._name(path), format.name, self.schema, self.chord, self.angle, self.ascii_stl)

@@ -1,4 +1,4 @@
-"""Options that commands share, and options made from the structs of :mod:`mracad.options`."""
+"""Options that commands share, and options made from the structs of :mod:`mracad.spec.steps`."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ import click
 from msgspec import Meta, Struct, structs
 
 from mracad.formats import FORMATS
-from mracad.options import Length, dashed, duration, plain_types
+from mracad.spec.quantity import Length, duration
+from mracad.spec.steps.base import dashed, plain_types
 
 Command = Callable[..., Any]
 
@@ -167,7 +168,7 @@ record = click.option(
 
 def limits(arguments: list[str]) -> tuple[float | None, int | None]:
     """Seconds and bytes that ``--time-limit`` and ``--memory-limit`` allow: needed before the command itself runs."""
-    from mracad.guard import size
+    from mracad.job.guard import size
 
     time, memory = (_given(arguments, flag) for flag in ("--time-limit", "--memory-limit"))
     seconds = None if time is None else duration(time, "time-limit")

@@ -7,7 +7,7 @@ import time
 from types import TracebackType
 from typing import Any
 
-from mracad import guard
+from mracad import note
 
 PATIENCE = 1.0
 """Seconds before a bar appears."""
@@ -38,7 +38,7 @@ class Progress:
             self._bar.stop()
 
     def __call__(self, stage: str, done: int, total: int) -> None:
-        guard.doing(stage)
+        note.doing(stage)
         if not sys.stderr.isatty() or (time.monotonic() - self._start < PATIENCE and not self._rate):
             return
         if self._bar is None:

@@ -13,17 +13,18 @@ from typing import TYPE_CHECKING, Any, TextIO
 
 import msgspec
 
-from mracad.options import Selection
+from mracad.spec.steps import Selection
 
 if TYPE_CHECKING:
     from mracad.constraint.seam import Treatment
     from mracad.edit.result import FaceOutcome
     from mracad.inspect.faults import Fault, ReadBack
     from mracad.inspect.seams import SeamMeasure, SeamSummary
-    from mracad.job import Judged, Report
+    from mracad.job.document import Report
+    from mracad.job.judge import Judged
+    from mracad.job.produce import Made
     from mracad.occ.check import Validity
-    from mracad.produce import Made
-    from mracad.recipe import Step
+    from mracad.spec.recipe import Step
 
 SHOWN = 6
 """Most faces named in one line."""
@@ -58,7 +59,7 @@ def verdict(valid: bool) -> str:
 
 def step_lines(step: Step, result: Report | Judged) -> list[str]:
     """What a step of a recipe did; its first line begins with the step's name."""
-    from mracad.job import Report
+    from mracad.job.document import Report
 
     if isinstance(result, Report):
         assert isinstance(step.options, Selection)
@@ -264,7 +265,7 @@ def seam(value: SeamMeasure) -> dict[str, Any]:
 
 def result(value: Report | Judged) -> dict[str, Any]:
     """What a step did, in full."""
-    from mracad.job import Report
+    from mracad.job.document import Report
 
     if isinstance(value, Report):
         return report(value)

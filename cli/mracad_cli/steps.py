@@ -9,14 +9,15 @@ from typing import TYPE_CHECKING, Any
 import click
 from msgspec import structs
 
-from mracad.options import STEPS, Selection
+from mracad.spec.steps import STEPS, Selection
 from mracad_cli import options
 from mracad_cli.files import Outputs, depfile_text, load, read
 from mracad_cli.progress import Progress
 
 if TYPE_CHECKING:
-    from mracad.job import Judged, Report
-    from mracad.recipe import Recipe, Step
+    from mracad.job.document import Report
+    from mracad.job.judge import Judged
+    from mracad.spec.recipe import Recipe, Step
 
 
 def edits() -> list[str]:
@@ -31,8 +32,8 @@ def edit_command(use: str) -> click.Command:
     @click.command(use, help=struct.__doc__)
     @options.apply(options.reading, options.of(struct), options.writing, options.editing, options.printing)
     def command(source: str, **given: Any) -> int:
-        from mracad.recipe import Step
-        from mracad.recipe import options as options_of
+        from mracad.spec.recipe import Step
+        from mracad.spec.text import options as options_of
 
         values = {name: given.pop(name) for name in struct.__struct_fields__}
         return run_steps([Step(use, use, options_of(struct, values))], source, **given)
@@ -61,7 +62,7 @@ def run_steps(
     **formats: Any,
 ) -> int:
     """Take one file through steps; without a recipe they are the one edit of a command."""
-    from mracad.recipe import record_of, title
+    from mracad.spec.recipe import record_of, title
     from mracad_cli import render
 
     start = time.perf_counter()
@@ -72,8 +73,8 @@ def run_steps(
         progress("reading", 0, 1)
         text = load(source)
         document = read(text, input_unit, encoding)
+        from mracad.job.produce import produce
         from mracad.occ.files import read as read_again
-        from mracad.produce import produce
 
         done = produce(
             document,

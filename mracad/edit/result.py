@@ -12,7 +12,7 @@ from mracad.edit.feature.copies import Copy
 from mracad.inspect.roughness import Roughness
 from mracad.model.brep import Face
 from mracad.model.displacement import Displacement
-from mracad.select import Scope
+from mracad.spec.select import Scope
 
 Status = Literal["edited", "unchanged", "left", "held", "unselected", "analytic"]
 """``edited``; ``unchanged``: nothing to do there; ``left``: something to do that cannot be done well;

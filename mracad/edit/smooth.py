@@ -17,9 +17,10 @@ from mracad.edit.target import Wish
 from mracad.edit.tolerances import tolerances
 from mracad.inspect.roughness import Worse
 from mracad.model.brep import Face, Model
-from mracad.options import Smooth, length
-from mracad.select import Scope
-from mracad.select import scope as scope_of
+from mracad.spec.quantity import length
+from mracad.spec.select import Scope
+from mracad.spec.select import scope as scope_of
+from mracad.spec.steps import Smooth
 
 
 def smooth(

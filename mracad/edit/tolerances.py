@@ -9,7 +9,8 @@ import numpy as np
 
 from mracad.inspect.roughness import Growth
 from mracad.model.brep import Edge, Model
-from mracad.options import Fitting, Selection, length
+from mracad.spec.quantity import length
+from mracad.spec.steps import Fitting, Selection
 
 GROWTH = Growth(0.005, 0.005, 0.005, 0.02, 30.0, 0.25)
 """What the judge lets pass by default: a quarter of the 2 % that count as worse where faces are compared, and waves

@@ -6,7 +6,8 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 from mracad.inspect.seams import SeamMeasure
-from mracad.options import Fitting, length
+from mracad.spec.quantity import length
+from mracad.spec.steps import Fitting
 
 LEFT = 0.1
 """A defect is mended where no more than this share of it is left, beside what counts for none."""

@@ -10,9 +10,9 @@ from mracad.occ.document import Document
 from mracad.occ.instance import isolate
 from mracad.occ.select import select_cq
 from mracad.occ.view import view
-from mracad.options import Selection
-from mracad.select import Scope, every_nurbs
-from mracad.select import scope as select_scope
+from mracad.spec.select import Scope, every_nurbs
+from mracad.spec.select import scope as select_scope
+from mracad.spec.steps import Selection
 
 
 def looked_at(document: Document, options: Selection) -> tuple[Model, Scope]:

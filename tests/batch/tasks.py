@@ -8,9 +8,10 @@ import time
 from collections.abc import Callable
 from functools import partial
 
-from mracad import guard
-from mracad.batch.work import Product
 from mracad.errors import UsageError
+from mracad.job import guard
+from mracad.job.batch.work import Product
+from mracad.note import doing
 
 MB = 1_000_000
 
@@ -34,7 +35,7 @@ def hang() -> None:
 
 
 def note() -> None:
-    guard.doing("looking", "part.step")
+    doing("looking", "part.step")
 
 
 def eat() -> None:

@@ -13,10 +13,10 @@ from xml.etree import ElementTree
 import psutil
 import pytest
 
-from mracad.batch.find import find
-from mracad.batch.manifest import NAME, Manifest
 from mracad.errors import FileError, UsageError
-from mracad.recipe import load
+from mracad.job.batch.find import find
+from mracad.job.batch.manifest import NAME, Manifest
+from mracad.spec.recipe import load
 from tests.batch.runs import RECIPE, batch, environment, kills, models, outputs, recipe, shams, start
 
 

@@ -63,9 +63,9 @@ def test_a_lost_worker_costs_nothing(tmp_path: Path):
 
 
 def test_a_cluster_that_is_not_there_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    from mracad.batch import cluster as module
-    from mracad.batch.pool import Limits
     from mracad.errors import FileError
+    from mracad.job.batch import cluster as module
+    from mracad.job.batch.pool import Limits
 
     monkeypatch.setattr(module, "PATIENCE", 1)
     with pytest.raises(FileError, match=r"no cluster with workers at tcp://127\.0\.0\.1:9"):

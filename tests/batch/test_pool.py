@@ -8,9 +8,9 @@ import time
 
 import pytest
 
-from mracad.batch.pool import Limits, Pool
-from mracad.batch.work import Product
 from mracad.errors import CrashError, LimitError, UsageError
+from mracad.job.batch.pool import Limits, Pool
+from mracad.job.batch.work import Product
 from tests.batch.tasks import MB, made, work
 
 

@@ -13,9 +13,11 @@ from hypothesis import strategies as st
 from mracad_cli.__main__ import main
 from msgspec import Meta
 
-from mracad import options, recipe
 from mracad.errors import UsageError
-from mracad.recipe.values import toml
+from mracad.spec import recipe, schema
+from mracad.spec.files import PlaceText
+from mracad.spec.steps import STEPS, Check, Repeat, Selection, Smooth
+from mracad.spec.text import toml
 from tests.batch.runs import models
 
 TEXT = """# a recipe
@@ -91,9 +93,9 @@ def test_recipe_pipeline_record_and_schema_agree(tmp_path):
     record = recipe.record_of(steps, tmp_path / "out.toml")
     again = recipe.load(written(tmp_path, record))
     assert again.steps("other.step") == steps
-    schema = recipe.schema()["$defs"]
+    definitions = schema.schema()["$defs"]
     for step in tomllib.loads(record)["step"]:
-        assert set(step) <= set(schema[step["use"]]["properties"])
+        assert set(step) <= set(definitions[step["use"]]["properties"])
 
 
 def test_options_are_set_and_variables_filled(tmp_path):
@@ -107,21 +109,21 @@ def test_options_are_set_and_variables_filled(tmp_path):
             found.with_values([wrong])
 
 
-class Engrave(options.Selection, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class Engrave(Selection, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Engrave a text."""
 
     function: ClassVar[str] = "mracad.edit.smooth:smooth"
     quiet: ClassVar[str] = "blank"
 
-    stencil: Annotated[options.PlaceText, Meta(description="Its outline.")]
+    stencil: Annotated[PlaceText, Meta(description="Its outline.")]
 
 
 def test_a_new_edit_is_known_everywhere_by_its_declaration(tmp_path, monkeypatch, capsys):
-    monkeypatch.setitem(options.STEPS, "engrave", Engrave)
+    monkeypatch.setitem(STEPS, "engrave", Engrave)
     assert main(["engrave", "--help"]) == 0
     assert "--stencil" in capsys.readouterr().out
-    assert recipe.schema()["$defs"]["engrave"]["required"] == ["use", "stencil"]
-    assert "| `stencil` |" in recipe.page()
+    assert schema.schema()["$defs"]["engrave"]["required"] == ["use", "stencil"]
+    assert "| `stencil` |" in schema.page()
     (step,) = recipe.pipeline("engrave --stencil @marks/a.csv").steps("-")
     assert step.text() == "engrave --stencil @a.csv"
     path = written(tmp_path, '[[step]]\nuse = "engrave"\nstencil = "@a.csv"\n')
@@ -187,7 +189,7 @@ def test_a_result_is_compared_with_what_came_in_or_with_a_file(tmp_path):
 
 def test_the_page_of_steps_is_up_to_date():
     page = Path(__file__).parents[2] / "docs" / "steps.md"
-    assert page.read_text(encoding="utf-8") == recipe.page(), "run make docs"
+    assert page.read_text(encoding="utf-8") == schema.page(), "run make docs"
 
 
 def header(path: Path) -> str:
@@ -202,8 +204,8 @@ calm = settings(max_examples=60, deadline=None, suppress_health_check=[HealthChe
 
 @calm
 @given(
-    st.builds(options.Smooth, scale=st.just("2%"), faces=st.lists(TEXTS).map(tuple), instance=st.none() | TEXTS),
-    st.builds(options.Check, max_angle=st.none() | FLOATS, kink=FLOATS),
+    st.builds(Smooth, scale=st.just("2%"), faces=st.lists(TEXTS).map(tuple), instance=st.none() | TEXTS),
+    st.builds(Check, max_angle=st.none() | FLOATS, kink=FLOATS),
     TEXTS.filter(bool),
 )
 def test_a_record_is_a_recipe_whatever_the_options(tmp_path_factory, smooth, check, name):
@@ -257,13 +259,13 @@ def test_the_files_of_a_transfer_are_told_by_their_options(line, files, there):
 
 def test_a_count_is_no_file():
     for text, files in (("7", ()), ("7.json", ("7.json",)), (None, ())):
-        step = options.Check(expect=text)
+        step = Check(expect=text)
         assert step.files() == files and step.relocated({"7": "x/7", "7.json": "x/7.json"}).files() == tuple(
             f"x/{file}" for file in files
         )
 
 
 def test_the_files_of_copies_are_told_by_their_options():
-    step = recipe.Step("r", "repeat", options.Repeat(feature="@b.feature", at=("@a.csv", "1,2,3", "a.csv@0,0")))
+    step = recipe.Step("r", "repeat", Repeat(feature="@b.feature", at=("@a.csv", "1,2,3", "a.csv@0,0")))
     assert step.options.files() == ("@b.feature", "a.csv")
     assert step.options.relocated({"a.csv": "x/c.csv"}).at == ("@x/c.csv", "1,2,3", "a.csv@0,0")

@@ -14,9 +14,11 @@ from OCP.TopAbs import TopAbs_FACE
 from OCP.TopExp import TopExp_Explorer
 from OCP.TopoDS import TopoDS, TopoDS_Shell
 
-from mracad import guard, occ, review
+from mracad import occ
 from mracad.errors import LimitError
 from mracad.inspect.verdict import Layer
+from mracad.job import check as checks
+from mracad.job import guard
 from tests.occ import shapes
 
 
@@ -153,7 +155,7 @@ def test_a_tangent_seam_is_smooth(mracad, tmp_path):
 
 
 def test_a_layer_that_takes_too_long_says_nothing():
-    slow = review._limited("brep", lambda: time.sleep(60), review.CheckLimits(layer_seconds=0.1))
+    slow = checks._limited("brep", lambda: time.sleep(60), checks.CheckLimits(layer_seconds=0.1))
     assert slow == Layer("brep", "time limit", "more than 0.1 s")
 
 
@@ -163,7 +165,7 @@ def test_a_layer_holds_no_more_memory_than_the_check():
         return Layer("brep", "pass", str(len(held)))
 
     def check():
-        return review._limited("brep", hungry, review.CheckLimits(layer_seconds=60.0))
+        return checks._limited("brep", hungry, checks.CheckLimits(layer_seconds=60.0))
 
     assert guard.run(check, Layer).status == "pass"
     with pytest.raises(LimitError, match="memory limit of 500 MB"):

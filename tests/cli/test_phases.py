@@ -6,7 +6,7 @@ from importlib import import_module
 
 import pytest
 
-from mracad import guard
+from mracad.job import guard
 from mracad.occ.step import write_step
 from tests.edit import panels
 

@@ -7,11 +7,12 @@ import pytest
 from mracad_cli import render, verdicts
 from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
 
-from mracad import judge, occ
+from mracad import occ
 from mracad.edit.smooth import smooth
 from mracad.inspect.words import words
-from mracad.job import run
-from mracad.options import Check, Compare, Smooth
+from mracad.job import check, compare
+from mracad.job.document import run
+from mracad.spec.steps import Check, Compare, Smooth
 from tests.occ import shapes
 
 PLAIN = (str, int, float, bool, type(None))
@@ -48,7 +49,7 @@ def test_a_comparison_is_plain_data(panels, samples, tmp_path):
     occ.write(occ.read(samples / "assembly.step"), other)
     pairs = [tuple(panels), (occ.read(samples / "assembly.step"), occ.read(other)), (panels[0], occ.read(other))]
     for ref, new in pairs:
-        judged = judge.compare(new, strict, lambda ref=ref: ref)
+        judged = compare.compare(new, strict, lambda ref=ref: ref)
         assert odd(raw(judged.verdict)) == []
         body = verdicts.as_data(judged.verdict, judged.failed)
         assert odd(body) == [] and json.loads(json.dumps(body, allow_nan=True))
@@ -58,7 +59,7 @@ def test_a_comparison_is_plain_data(panels, samples, tmp_path):
 def test_a_check_is_plain_data(panels, samples):
     text = (samples / "panel.step").read_bytes()
     strict = Check(max_gap="1e-12mm", max_angle=1e-12, max_tolerance="1e-12mm", expect="99", min_wall="1m")
-    judged = judge.check(panels[1], strict, text=text)
+    judged = check.check(panels[1], strict, text=text)
     assert {"shells", "seams", "tolerances"} <= {layer.name for layer in judged.verdict.layers if layer.findings}
     assert odd(raw(judged.verdict)) == [] and odd(verdicts.as_data(judged.verdict, judged.failed)) == []
 

@@ -15,8 +15,8 @@ from OCP.gp import gp_Ax3, gp_Vec
 from OCP.TopLoc import TopLoc_Location
 
 import mracad as library
+from mracad.job.produce import WORSE
 from mracad.occ import step as writer
-from mracad.produce import WORSE
 from tests import zoo
 from tests.batch.runs import recipe
 from tests.occ import shapes

@@ -9,16 +9,17 @@ from OCP.BRepBuilderAPI import BRepBuilderAPI_Transform
 from OCP.gp import gp_Trsf, gp_Vec
 from OCP.TopLoc import TopLoc_Location
 
-from mracad import job, occ
+from mracad import occ
 from mracad.bspline.surface import Net
 from mracad.constraint.cause import Cause, Still
 from mracad.constraint.coincide import TORN, coinciding, touching
 from mracad.edit.smooth import smooth
 from mracad.inspect.seams import seams
+from mracad.job.document import run
 from mracad.occ.document import Document, empty
 from mracad.occ.load import Text
 from mracad.occ.view import view
-from mracad.options import Smooth
+from mracad.spec.steps import Smooth
 from tests.edit import panels
 from tests.occ import shapes
 
@@ -75,7 +76,7 @@ def test_products_that_touch_are_as_one_part(format):
         return exchanged(made, format) if format else made
 
     assert len(many().parts) == 4
-    single, several = (job.run(document, smooth, Smooth(level=1)) for document in (one(), many()))
+    single, several = (run(document, smooth, Smooth(level=1)) for document in (one(), many()))
     assert len(single.before) == 4
     for a, b in zip(single.before, several.before, strict=True):
         assert (a.edge, a.faces) == (b.edge, b.faces)

@@ -6,16 +6,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mracad import job, produce
 from mracad.edit import driver
 from mracad.edit.result import Edit, FaceOutcome
 from mracad.edit.smooth import smooth
 from mracad.errors import Code, EditError
 from mracad.inspect.faults import Fault, ReadBack, Reason
+from mracad.job import document as job
+from mracad.job import produce
 from mracad.model.displacement import Displacement
 from mracad.occ.view import view
-from mracad.options import Smooth
-from mracad.recipe import Step
+from mracad.spec.recipe import Step
+from mracad.spec.steps import Smooth
 from tests.edit import panels
 from tests.occ import shapes
 
@@ -147,7 +148,7 @@ def test_files_are_made_again_a_bounded_number_of_times(monkeypatch):
         assert memory.edited == set(range(stub.rounds - 1, produce.ROUNDS + 4))
         return replace(made, read_back=ReadBack(False, (Fault(Reason.AREA, (min(memory.edited),), 2.0, 1.0),)))
 
-    monkeypatch.setattr("mracad.produce._judged", judged)
+    monkeypatch.setattr("mracad.job.produce._judged", judged)
     monkeypatch.setattr(sys.modules["mracad.edit.smooth"], "smooth", stub)
     step = Step("smooth", "smooth", Smooth(level=1))
     with pytest.raises(EditError, match=f"the area of #{produce.ROUNDS} changes") as caught:

@@ -4,11 +4,12 @@ import json
 
 import pytest
 
-from mracad import job, occ
+from mracad import occ
 from mracad.edit.smooth import smooth
 from mracad.inspect.seams import seams
+from mracad.job.document import run
 from mracad.occ.view import view
-from mracad.options import Smooth
+from mracad.spec.steps import Smooth
 from tests.edit import panels
 from tests.edit.test_seams import torn
 
@@ -20,7 +21,7 @@ def patches():
 
 
 def notes(document, **options):
-    return job.run(document, smooth, Smooth(level=1, **options), apply=False).edit.notes
+    return run(document, smooth, Smooth(level=1, **options), apply=False).edit.notes
 
 
 def test_what_is_not_mended_is_named_with_how_far_off_it_stayed(patches):

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import mracad
-from mracad import job
 from mracad.constraint.cause import Cause, Still
 from mracad.errors import UsageError
+from mracad.job.document import run
 from mracad.occ.step import read_step, write_step
 from mracad.occ.view import view
 from tests.edit import panels
@@ -41,7 +41,7 @@ def test_a_held_edge_stays_and_the_rest_moves(sewn):
     for hold in ((), (f"edge#{place + 1}",)):
         document = panel(sewn=sewn)
         before = view(document).edges[place].points
-        report = job.run(document, mracad.smooth, mracad.Smooth(level=2, hold=hold))
+        report = run(document, mracad.smooth, mracad.Smooth(level=2, hold=hold))
         (treatment,) = (t for t in report.edit.edges if t.edge == place)
         moved = np.abs(view(document).edges[place].points - before).max()
         found[hold] = treatment.how, treatment.reason, moved
@@ -60,7 +60,7 @@ def test_a_held_edge_stays_under_a_copy_of_a_feature():
         hold = tuple(f"edge#{place + 1}" for _ in hold)
         x, y, z = model.edges[place].points[12]
         options = mracad.Repeat(feature="near:50,50,0,radius:15", at=(f"{x},{y},{z}",), hold=hold, clip=True)
-        job.run(document, mracad.repeat, options)
+        run(document, mracad.repeat, options)
         found.append(np.abs(view(document).edges[place].points - model.edges[place].points).max())
     assert found[0] > 1e-3 and found[1] == 0.0
 
@@ -104,7 +104,7 @@ def test_an_edge_of_one_instance_is_held_by_the_number_of_the_part(tmp_path):
         from mracad.occ.instance import instances
 
         path = list(instances(document))[-1]
-        report = job.run(document, mracad.smooth, mracad.Smooth(level=2, instance=path, hold=hold))
+        report = run(document, mracad.smooth, mracad.Smooth(level=2, instance=path, hold=hold))
         hows = {t.how for t in report.edit.edges if len(t.faces) == 2}
         assert hows == {"frozen" if hold else "coupled"}
 

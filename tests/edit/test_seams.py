@@ -6,15 +6,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mracad import job
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
 from mracad.edit.smooth import smooth
 from mracad.inspect.seams import remeasured, seams
+from mracad.job.document import run
 from mracad.model.displacement import Displacement, Offset
 from mracad.occ.step import read_step, write_step
 from mracad.occ.view import view
-from mracad.options import Smooth
+from mracad.spec.steps import Smooth
 from tests.edit import panels
 from tests.edit.models import sheet
 
@@ -31,7 +31,7 @@ def unsplit(noisy, **options):
 def edited(patches, **options):
     """The model of patches after smoothing, written and read again, and what was done about its edges."""
     document = panels.document(patches)
-    report = job.run(document, smooth, Smooth(**options))
+    report = run(document, smooth, Smooth(**options))
     stream = io.BytesIO()
     write_step(document, stream)
     model = view(read_step(io.BytesIO(stream.getvalue())))
@@ -157,7 +157,7 @@ def test_a_joint_of_varying_ratio_moves():
     for skew in (0.5, 0.0):
         clean, noisy = skewed(0.0, skew), skewed(NOISE, skew)
         document = panels.pair(*noisy)
-        report = job.run(document, smooth, Smooth(scale="25mm"))
+        report = run(document, smooth, Smooth(scale="25mm"))
         model = view(document)
         apart = [s.net.evaluate(grid) - c.evaluate(grid) for s, c in zip(model.surfaces, clean, strict=True)]
         figures.append(np.sqrt(np.mean(np.concatenate(apart) ** 2)))
@@ -189,7 +189,7 @@ def test_defects_are_carried_or_mended(sewn):
     assert gap > 3e-3 and 0.05 < angle < 1
     for options in ({}, {"close_gaps": True}, {"fit_g1": 1.0}, {"close_gaps": True, "fit_g1": 1.0}):
         document = torn(patches, sewn)
-        report = job.run(document, smooth, Smooth(level=1, keep="g1", **options))  # jumps of curvature may grow
+        report = run(document, smooth, Smooth(level=1, keep="g1", **options))  # jumps of curvature may grow
         assert coupled(report) == (4 if sewn else 8)
         now = seams(view(document))
         share, wider, steeper = (0.1, 1e-4, 0.1) if options else (0.0, 1e-6, 0.008)
@@ -208,7 +208,7 @@ def test_defects_are_carried_or_mended(sewn):
 def test_a_t_junction_moves():
     _, noisy = panels.whole(10, 0.1, patches=(2, 2))
     document = panels.junction(noisy)
-    report = job.run(document, smooth, Smooth(scale="16mm"))
+    report = run(document, smooth, Smooth(scale="16mm"))
     gap, angle = holds(view(document))
     assert coupled(report) == 3 and report.valid_after.valid
     assert gap <= 1e-9 and angle <= 1e-5

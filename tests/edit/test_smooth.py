@@ -14,8 +14,8 @@ from mracad.edit.result import Reason
 from mracad.edit.smooth import smooth
 from mracad.errors import UsageError
 from mracad.occ.view import view
-from mracad.options import Smooth
-from mracad.select import Scope
+from mracad.spec.select import Scope
+from mracad.spec.steps import Smooth
 from tests.edit.models import rotation, sheet
 from tests.occ import shapes
 

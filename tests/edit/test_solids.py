@@ -8,15 +8,16 @@ from OCP.BRepBuilderAPI import BRepBuilderAPI_NurbsConvert
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS
 
-from mracad import job, occ
+from mracad import occ
 from mracad.edit.result import Reason
 from mracad.edit.smooth import smooth
 from mracad.edit.tolerances import MORE, Tolerances
+from mracad.job.document import run
 from mracad.model.displacement import Displacement, Offset
 from mracad.occ.apply import apply
 from mracad.occ.check import check
 from mracad.occ.view import view
-from mracad.options import Smooth
+from mracad.spec.steps import Smooth
 from samples import make
 from tests.occ.test_mesh import corners, is_watertight
 
@@ -56,7 +57,7 @@ def sample(name):
 def test_solids_stay_solid_and_smooth(samples, tmp_path, source, scale):
     """Seams stay shut; those that are smooth stay so, edges keep their place."""
     document = source(samples)
-    report = job.run(document, smooth, Smooth(scale=scale))
+    report = run(document, smooth, Smooth(scale=scale))
     assert report.edit.faces("edited")
     assert report.valid_before.valid and report.valid_after.valid and check(document).solids == 1
     widest = max(measure.gap for measure in report.before)
@@ -78,7 +79,7 @@ def pipe():
 
 def test_a_clean_pipe_is_left_as_it_is():
     document = pipe()
-    edit = job.run(document, smooth, Smooth(scale="8%")).edit
+    edit = run(document, smooth, Smooth(scale="8%")).edit
     assert [(o.status, o.reason) for o in edit.outcomes] == [("unchanged", Reason.FAIR)] * 3
     assert {t.how for t in edit.edges} == {"frozen"} and not edit.displacement.offsets
 
@@ -91,7 +92,7 @@ def test_a_face_that_closes_on_itself_gets_no_kink_there():
     noise = np.zeros(net.refined(*knots).poles.shape)
     noise[:, 12:-12] = 0.1 * np.random.default_rng(0).standard_normal(noise[:, 12:-12].shape)
     apply(document, model, Displacement({0: Offset(noise, *knots)}))
-    report = job.run(document, smooth, Smooth(scale="12%"))
+    report = run(document, smooth, Smooth(scale="12%"))
     closing = [(a, b) for a, b in zip(report.before, report.after, strict=True) if a.faces[0] == a.faces[1]]
     assert [t.how for t in report.edit.edges if t.faces[0] == t.faces[1]] == ["coupled"]
     assert closing and report.edit.faces("edited") and report.valid_after.valid

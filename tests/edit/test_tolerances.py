@@ -17,8 +17,8 @@ from mracad.edit.torn import gaps, torn
 from mracad.inspect.seams import seams
 from mracad.model.displacement import Displacement
 from mracad.occ.view import view
-from mracad.options import Repeat, Smooth
 from mracad.seam.interface import joints, rims
+from mracad.spec.steps import Repeat, Smooth
 from tests.edit import halves
 
 EDGE = 5e-5

@@ -7,13 +7,13 @@ import pytest
 from OCP.BRep import BRep_Tool
 from OCP.TopExp import TopExp
 
-from mracad import job
 from mracad.constraint.cause import Cause, Still
 from mracad.edit.smooth import smooth
 from mracad.inspect.seams import seams
+from mracad.job.document import run
 from mracad.occ.step import read_step, write_step
 from mracad.occ.view import view
-from mracad.options import Smooth
+from mracad.spec.steps import Smooth
 from tests.edit import halves
 from tests.edit.models import sheet
 
@@ -23,7 +23,7 @@ NOISE, SPANS = 0.05, (30, 60)
 def smoothed(left, right, sewn=True, **options):
     """The document's models before and after smoothing (read again from a file), and the report."""
     document = halves.document(left, right, sewn)
-    report = job.run(document, smooth, Smooth(scale="30mm", **options))
+    report = run(document, smooth, Smooth(scale="30mm", **options))
     stream = io.BytesIO()
     write_step(document, stream)
     return report.model, view(read_step(io.BytesIO(stream.getvalue()))), report
@@ -113,6 +113,6 @@ def test_vertices_stay_where_the_ends_of_their_edges_do(rough_halves):
     edge = next(edge.index for edge in view(document).edges if len(edge.sides) == 2)
     vertices = [end(document.edges[edge]) for end in (TopExp.FirstVertex_s, TopExp.LastVertex_s)]
     before = [BRep_Tool.Pnt_s(vertex) for vertex in vertices]
-    report = job.run(document, smooth, Smooth(scale="30mm"))
+    report = run(document, smooth, Smooth(scale="30mm"))
     assert treatment(report) == ("to tolerance", None)
     assert all(old.Distance(BRep_Tool.Pnt_s(vertex)) < 1e-9 for old, vertex in zip(before, vertices, strict=True))

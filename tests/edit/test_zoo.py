@@ -4,14 +4,15 @@ import io
 
 import pytest
 
-from mracad import job, occ
+from mracad import occ
 from mracad.edit.feature.edits import move, repeat
 from mracad.edit.smooth import smooth
 from mracad.errors import EditError
 from mracad.inspect.seams import seams
+from mracad.job.document import run
 from mracad.occ.load import Text
 from mracad.occ.measure import mass
-from mracad.options import Move, Repeat, Smooth
+from mracad.spec.steps import Move, Repeat, Smooth
 from tests import zoo
 from tests.occ import shapes
 
@@ -75,7 +76,7 @@ def test_bodies_smoothed(name, scale, refine, quick):
     quick(name in QUICK and scale == "20%" and refine == "auto")
     document = zoo.noisy(body(name))
     try:
-        report = job.run(document, smooth, Smooth(scale=scale, refine=refine))
+        report = run(document, smooth, Smooth(scale=scale, refine=refine))
     except EditError as error:
         pytest.skip(str(error))
     assert report.valid_after.valid
@@ -92,6 +93,6 @@ def test_bodies_smoothed(name, scale, refine, quick):
 )
 def test_a_bump_elsewhere(edit, options):
     document = zoo.bumped()
-    report = job.run(document, edit, options)
+    report = run(document, edit, options)
     assert report.edit.faces("edited") and report.valid_after.valid
     assert_kept(document, "step")

@@ -6,15 +6,15 @@ import sys
 import numpy as np
 import pytest
 
-from mracad import job
 from mracad.edit.smooth import smooth
 from mracad.errors import EditError
+from mracad.job.document import run
 from mracad.model.displacement import Displacement, Offset
 from mracad.occ.apply import apply, restore
 from mracad.occ.check import Failure, check
 from mracad.occ.step import read_step
 from mracad.occ.view import view
-from mracad.options import Smooth
+from mracad.spec.steps import Smooth
 from tests.conftest import SAMPLES
 
 
@@ -53,7 +53,7 @@ def test_a_spoiled_face_is_left_and_named(monkeypatch):
 
     monkeypatch.setattr(sys.modules["mracad.occ.check"], "check", picky)
     document = read_step(SAMPLES / "panel.step")
-    report = job.run(document, smooth, Smooth(scale="16mm"))
+    report = run(document, smooth, Smooth(scale="16mm"))
     states = [(o.status, o.words) for o in report.edit.outcomes]
     assert states[1] == ("left", "would come out worse: its result would not be valid")
     assert all(status == "edited" for i, (status, _) in enumerate(states) if i != 1)
@@ -62,4 +62,4 @@ def test_a_spoiled_face_is_left_and_named(monkeypatch):
     assert not np.array_equal(before[0].net.poles, after[0].net.poles)
     assert report.valid_after.valid
     with pytest.raises(EditError, match="#2: would come out worse: its result would not be valid"):
-        job.run(read_step(SAMPLES / "panel.step"), smooth, Smooth(scale="16mm", faces=("#2",)))
+        run(read_step(SAMPLES / "panel.step"), smooth, Smooth(scale="16mm", faces=("#2",)))

@@ -21,8 +21,9 @@ from pathlib import Path
 
 from mracad_cli import __main__ as cli
 
-from mracad import guard, occ
+from mracad import occ
 from mracad.errors import MracadError
+from mracad.job import guard
 
 SAMPLES = Path(__file__).parents[2] / "samples"
 LIMIT = 20.0

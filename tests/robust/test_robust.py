@@ -10,10 +10,11 @@ import time
 
 import pytest
 
-from mracad import guard, occ, output
-from mracad.batch.manifest import Manifest
+from mracad import note, occ, output
 from mracad.errors import Code, EditError, FileError, MracadError
 from mracad.inspect.verdict import Finding, Layer
+from mracad.job import guard
+from mracad.job.batch.manifest import Manifest
 from tests.robust import kill, mutate
 
 NUMBERS = (*range(10), 499)
@@ -126,8 +127,8 @@ def test_a_crash_or_an_endless_loop_is_an_error(work, code, says):
 
 def test_a_crash_says_what_it_was_at():
     def work():
-        guard.doing("reading", "bad.step")
-        guard.doing("editing")
+        note.doing("reading", "bad.step")
+        note.doing("editing")
         crash()
 
     with pytest.raises(MracadError, match=r"crashed \(SIGSEGV\) while editing 'bad.step'"):

@@ -61,7 +61,7 @@ from mracad_cli import options
     options.debug,
 )
 def command(recipe: str, sources: tuple[str, ...], assignments: tuple[str, ...], **given: Any) -> int:
-    from mracad.recipe import load
+    from mracad.spec.recipe import load
     from mracad_cli.batches import run_batch
 
     return run_batch(load(recipe).with_values(assignments), sources, **given)

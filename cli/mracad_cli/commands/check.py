@@ -10,7 +10,7 @@ from typing import Any
 
 import click
 
-from mracad.options import Check
+from mracad.spec.steps import Check
 from mracad_cli import options
 from mracad_cli.progress import Progress
 
@@ -27,12 +27,12 @@ def command(
     as_json: bool,
     **given: Any,
 ) -> int:
-    from mracad.recipe import options as options_of
+    from mracad.spec.text import options as options_of
     from mracad_cli.files import check_reports, load, read
 
     check_reports(junit, sarif, overwrite=overwrite)
     limits = options_of(Check, given)
-    from mracad import judge
+    from mracad.job import check
     from mracad_cli.verdicts import emit
 
     with Progress() as progress:
@@ -40,5 +40,5 @@ def command(
         text = load(source)
         document = read(text, input_unit, encoding)
         progress("checking", 0, 1)
-        judged = judge.check(document, limits, text=text.getvalue())
+        judged = check.check(document, limits, text=text.getvalue())
     return emit(judged.verdict, judged.failed, command="check", as_json=as_json, junit=junit, sarif=sarif)

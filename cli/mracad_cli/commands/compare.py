@@ -10,7 +10,7 @@ from typing import Any
 
 import click
 
-from mracad.options import Compare
+from mracad.spec.steps import Compare
 from mracad_cli import options
 from mracad_cli.progress import Progress
 
@@ -36,12 +36,12 @@ def command(
     as_json: bool,
     **given: Any,
 ) -> int:
-    from mracad.recipe import options as options_of
+    from mracad.spec.text import options as options_of
     from mracad_cli.files import check_reports, read
 
     check_reports(junit, sarif, overwrite=overwrite)
     limits = options_of(Compare, given)
-    from mracad import judge
+    from mracad.job import compare
     from mracad_cli.verdicts import emit
 
     with Progress() as progress:
@@ -49,5 +49,5 @@ def command(
         old = read(reference, limits.reference_unit, encoding)
         new = read(source, input_unit, encoding)
         progress("comparing", 0, 1)
-        judged = judge.compare(new, limits, lambda: old)
+        judged = compare.compare(new, limits, lambda: old)
     return emit(judged.verdict, judged.failed, command="compare", as_json=as_json, junit=junit, sarif=sarif)

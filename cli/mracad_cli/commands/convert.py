@@ -26,8 +26,8 @@ def command(
         progress("reading", 0, 1)
         text = load(source)
         document = read(text, input_unit, encoding)
+        from mracad.job.produce import produce
         from mracad.occ.files import read as read_again
-        from mracad.produce import produce
 
         done = produce(
             document,

@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from mracad.errors import UsageError
-from mracad.options import Repeat, Selection
+from mracad.spec.steps import Repeat, Selection
 from mracad_cli import options
 from mracad_cli.files import check_target, deliver, read
 
@@ -64,7 +64,7 @@ def extract(
     from mracad.edit.feature.detail import save
     from mracad.edit.feature.edits import extract as taken
     from mracad.occ.look import looked_at
-    from mracad.recipe import options as options_of
+    from mracad.spec.text import options as options_of
     from mracad_cli.render import json_text, mm
 
     path = Path(output)

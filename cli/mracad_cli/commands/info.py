@@ -48,7 +48,7 @@ def command(
     from mracad.occ.check import check
     from mracad.occ.instance import instances
     from mracad.occ.view import view
-    from mracad.options import length
+    from mracad.spec.quantity import length
     from mracad_cli.files import read
 
     with Progress() as progress:

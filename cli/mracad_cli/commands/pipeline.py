@@ -14,6 +14,6 @@ from mracad_cli.steps import run_recipe
 @click.argument("steps", metavar="STEPS")
 @options.apply(options.reading, options.writing, options.record, options.editing, options.printing)
 def command(steps: str, source: str, **given: Any) -> int:
-    from mracad.recipe import pipeline
+    from mracad.spec.recipe import pipeline
 
     return run_recipe(pipeline(steps), source, **given)

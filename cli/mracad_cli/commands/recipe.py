@@ -19,9 +19,9 @@ def command() -> None:
 @options.apply(options.assignments, options.printing)
 def check(file: str, assignments: tuple[str, ...], as_json: bool) -> None:
     """Say what a recipe would do; exit code 2 when something in it is wrong."""
-    from mracad import recipe
+    from mracad.spec.recipe import load
 
-    found = recipe.load(file).with_values(assignments)
+    found = load(file).with_values(assignments)
     steps = found.steps("model.step")
     if as_json:
         listed = [{"id": step.id, "use": step.use, "text": step.text()} for step in steps]
@@ -34,6 +34,6 @@ def check(file: str, assignments: tuple[str, ...], as_json: bool) -> None:
 @command.command()
 def schema() -> None:
     """Print the JSON schema of recipes, for editors and validators."""
-    from mracad import recipe
+    from mracad.spec import schema
 
-    print(json_text(recipe.schema(), 1))
+    print(json_text(schema.schema(), 1))

@@ -14,6 +14,6 @@ from mracad_cli.steps import run_recipe
 @click.argument("recipe", metavar="RECIPE", type=click.Path())
 @options.apply(options.reading, options.assignments, options.writing, options.record, options.editing, options.printing)
 def command(recipe: str, source: str, **given: Any) -> int:
-    from mracad.recipe import load
+    from mracad.spec.recipe import load
 
     return run_recipe(load(recipe), source, **given)

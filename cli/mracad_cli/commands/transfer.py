@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from mracad.options import Transfer
+from mracad.spec.steps import Transfer
 from mracad_cli import options
 from mracad_cli.steps import run_steps
 
@@ -23,8 +23,8 @@ from mracad_cli.steps import run_steps
     options.printing,
 )
 def command(source: str, target: str, **given: Any) -> int:
-    from mracad.recipe import Step
-    from mracad.recipe import options as options_of
+    from mracad.spec.recipe import Step
+    from mracad.spec.text import options as options_of
 
     values = {name: given.pop(name) for name in Transfer.__struct_fields__ if name != "source"}
     step = Step("transfer", "transfer", options_of(Transfer, {**values, "source": source}))

@@ -27,9 +27,10 @@ from mracad.edit.result import Edit, FaceOutcome, Reason, spared
 from mracad.errors import EditError, UsageError
 from mracad.model.brep import Face, Model
 from mracad.model.displacement import Displacement
-from mracad.options import Featured, Move, Repeat, Single, Transfer, band_of, length
-from mracad.select import Scope
-from mracad.select import scope as scope_of
+from mracad.spec.quantity import band_of, length
+from mracad.spec.select import Scope
+from mracad.spec.select import scope as scope_of
+from mracad.spec.steps import Featured, Move, Repeat, Single, Transfer
 
 Array = np.ndarray
 

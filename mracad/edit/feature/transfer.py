@@ -24,7 +24,7 @@ from mracad.edit.feature.score import Copy
 from mracad.edit.feature.sheet import Sheet
 from mracad.errors import EditError
 from mracad.model.brep import Model
-from mracad.options import Transfer
+from mracad.spec.steps import Transfer
 from mracad.wavelet.ladder import arc_lengths, ladder_for_scale
 from mracad.wavelet.project import projection
 

@@ -5,7 +5,7 @@ import os
 import signal
 import time
 
-from mracad.batch import work
+from mracad.job.batch import work
 
 real, reader = work.do, work._read
 

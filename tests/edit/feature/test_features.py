@@ -18,7 +18,7 @@ from mracad.errors import Code, EditError
 from mracad.inspect.seams import seams
 from mracad.occ.step import read_step, write_step
 from mracad.occ.view import view
-from mracad.options import Repeat
+from mracad.spec.steps import Repeat
 from samples import make
 from tests.conftest import CORPUS
 from tests.edit import panels

@@ -14,7 +14,7 @@ from mracad.edit.feature.detail import save
 from mracad.edit.feature.edits import extract, repeat
 from mracad.errors import EditError
 from mracad.occ.view import view
-from mracad.options import Repeat
+from mracad.spec.steps import Repeat
 from tests import zoo
 from tests.edit import panels
 from tests.edit.feature import grounds

@@ -5,18 +5,18 @@ import io
 import numpy as np
 import pytest
 
-from mracad import job
 from mracad.constraint.cause import Cause, Still
 from mracad.constraint.wishes import Wishes
 from mracad.edit.feature.detail import save
 from mracad.edit.feature.edits import extract, move, repeat
 from mracad.errors import EditError
 from mracad.inspect.seams import seams
+from mracad.job.document import run
 from mracad.model.displacement import Displacement, Offset
 from mracad.occ.step import read_step, write_step
 from mracad.occ.view import view
-from mracad.options import Move, Repeat
 from mracad.seam.interface import joints
+from mracad.spec.steps import Move, Repeat
 from tests.edit import halves
 from tests.edit.feature import grounds
 from tests.edit.feature.grounds import HEIGHT, bump
@@ -74,7 +74,7 @@ def visible(count=400):
 def test_a_copy_lies_over_a_trimmed_seam(feature, place):
     paper = document()
     before = view(paper)
-    report = job.run(paper, repeat, Repeat(feature=feature, at=(word(place),)))
+    report = run(paper, repeat, Repeat(feature=feature, at=(word(place),)))
     after = read_back(paper)
     assert report.valid_after.valid and how(report) == ("to tolerance", None)
     (copy,) = report.edit.copies
@@ -95,9 +95,9 @@ def test_a_feature_is_moved_off_a_trimmed_seam(feature):
     """What it leaves is the ground that was there before it."""
     paper = document()
     before = view(paper)
-    job.run(paper, repeat, Repeat(feature=feature, at=(word(on_seam(100.0)),)))
+    run(paper, repeat, Repeat(feature=feature, at=(word(on_seam(100.0)),)))
     top = on_seam(100.0) + np.array([0, 0, HEIGHT])
-    report = job.run(paper, move, Move(feature=f"near:{word(top)},radius:20", to=word(on_seam(100.0, -45.0))))
+    report = run(paper, move, Move(feature=f"near:{word(top)},radius:20", to=word(on_seam(100.0, -45.0))))
     after = read_back(paper)
     (new,) = seams(after)
     assert how(report) == ("to tolerance", None) and new.gap <= 1e-4 and new.angle <= 0.012
@@ -113,11 +113,11 @@ def test_a_feature_is_moved_off_a_trimmed_seam(feature):
 def test_a_seam_that_may_not_move_takes_its_part(feature, options):
     place = word(on_seam(100.0, 10.0))
     with pytest.raises(EditError, match="do not move take"):
-        job.run(document(), repeat, Repeat(feature=feature, at=(place,), **options))
+        run(document(), repeat, Repeat(feature=feature, at=(place,), **options))
     paper = document()
     line = next(edge for edge in view(paper).edges if len(edge.sides) == 2)
     assert line.index == 1
-    report = job.run(paper, repeat, Repeat(feature=feature, at=(place,), clip=True, **options))
+    report = run(paper, repeat, Repeat(feature=feature, at=(place,), clip=True, **options))
     again = next(edge for edge in read_back(paper).edges if len(edge.sides) == 2)
     assert report.edit.copies[0].lost > 0.1 * HEIGHT
     assert np.abs(again.points - line.points).max() < 1e-9
@@ -126,8 +126,8 @@ def test_a_seam_that_may_not_move_takes_its_part(feature, options):
 def test_a_trimmed_seam_that_is_not_sewn_takes_its_part_and_says_so(feature):
     place = word(on_seam(100.0, 10.0))
     with pytest.raises(EditError, match="do not move take"):
-        job.run(document(sewn=False), repeat, Repeat(feature=feature, at=(place,)))
-    report = job.run(document(sewn=False), repeat, Repeat(feature=feature, at=(place,), clip=True))
+        run(document(sewn=False), repeat, Repeat(feature=feature, at=(place,)))
+    report = run(document(sewn=False), repeat, Repeat(feature=feature, at=(place,), clip=True))
     assert {t.reason for t in report.edit.edges} == {Cause(Still.FREE), Cause(Still.UNSEWN)}
 
 
@@ -146,5 +146,5 @@ def test_a_seam_is_no_worse_than_itself_on_finer_nets():
 
 
 def test_edges_beyond_which_no_copy_lies_are_told_as_such(feature):
-    report = job.run(document(), repeat, Repeat(feature=feature, at=(word(on_seam(100.0, -45.0)),)))
+    report = run(document(), repeat, Repeat(feature=feature, at=(word(on_seam(100.0, -45.0)),)))
     assert how(report) == ("frozen", Cause(Still.BARE))

@@ -29,9 +29,10 @@ from typing import Any
 
 import psutil
 
-from mracad import wire
 from mracad.errors import CrashError, LimitError, MracadError
-from mracad.guard import Note, end_with_parent, noting
+from mracad.job import wire
+from mracad.job.guard import end_with_parent
+from mracad.note import Note, noting
 
 TICK = 0.05
 """Seconds between two looks at the workers."""
@@ -192,7 +193,7 @@ class _Worker:
             self.note = Note(page.fileno())
             shared = [] if sys.platform == "win32" else [page.fileno()]
             self.process = subprocess.Popen(
-                [sys.executable, "-P", "-c", f"from mracad.batch.pool import serve; serve(*{shared})"],
+                [sys.executable, "-P", "-c", f"from mracad.job.batch.pool import serve; serve(*{shared})"],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.DEVNULL,

@@ -1,50 +1,17 @@
-"""What the options of every step have in common: which of them are lengths and which name files."""
+"""What the options of every step have in common."""
 
 from __future__ import annotations
 
 import types
 import typing
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import cache
 from typing import Annotated, Any, ClassVar, Literal
 
 from msgspec import Meta, Struct, structs
 
-from mracad.options.quantity import Length, length
-
-
-@dataclass(frozen=True)
-class Naming:
-    """How the text of an option names a file: what stands before the path, how it ends where it is one at all, and
-    whether digits alone name none."""
-
-    prefix: str = ""
-    ending: str = ""
-    or_number: bool = False
-
-    def file(self, text: str) -> str | None:
-        """The path in a text; None where it names no file."""
-        named = text.startswith(self.prefix) and text.endswith(self.ending)
-        return text[len(self.prefix) :] if named and not (self.or_number and text.isdecimal()) else None
-
-    def renamed(self, text: str, files: Mapping[str, str]) -> str:
-        """The text with its path replaced, where it has one that ``files`` knows."""
-        file = self.file(text)
-        return text if file is None else self.prefix + files.get(file, file)
-
-
-File = Annotated[str, Naming()]
-"""The type of a field that names a file."""
-
-FeatureText = Annotated[str, Naming(ending=".feature")]
-"""The type of a field that is a feature, or names the file of one."""
-
-CountText = Annotated[str, Naming(or_number=True)]
-"""The type of a field that is a number, or names a file that holds it."""
-
-PlaceText = Annotated[str, Naming(prefix="@")]
-"""The type of a field that is a place, or names a file of places."""
+from mracad.spec.files import namings
+from mracad.spec.quantity import Length, length
 
 
 def dashed(name: str) -> str:
@@ -56,18 +23,6 @@ def dashed(name: str) -> str:
 def lengths(struct: type[Struct]) -> frozenset[str]:
     """The fields of a struct that hold a length."""
     return frozenset(name for name, kind in plain_types(struct).items() if kind is Length)
-
-
-@cache
-def namings(struct: type[Struct]) -> dict[str, Naming]:
-    """The fields of a struct that name files, and how."""
-    hints = typing.get_type_hints(struct, include_extras=True)
-    found = ((name, _naming(hints[name])) for name in struct.__struct_fields__)
-    return {name: naming for name, naming in found if naming}
-
-
-def _naming(hint: Any) -> Naming | None:
-    return hint if isinstance(hint, Naming) else next(filter(None, map(_naming, typing.get_args(hint))), None)
 
 
 @cache

@@ -11,7 +11,7 @@ from functools import partial
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-from mracad import guard
+from mracad import note
 from mracad.edit.result import Edit, Reason
 from mracad.edit.tolerances import Tolerances, tolerances
 from mracad.edit.torn import gaps, torn
@@ -19,14 +19,14 @@ from mracad.errors import EditError
 from mracad.inspect.deviation import Deviation, deviations
 from mracad.inspect.mended import unmended
 from mracad.inspect.seams import SeamMeasure, key, remeasured, seams
-from mracad.judge import Judged, Original
+from mracad.job.check import Judged, Original
 from mracad.model.brep import Model
-from mracad.options import Fitting, Selection
+from mracad.spec.steps import Fitting, Selection
 
 if TYPE_CHECKING:
     from mracad.occ.check import Validity
     from mracad.occ.document import Document
-    from mracad.recipe import Step
+    from mracad.spec.recipe import Step
 
 ROUNDS = 8
 """How often an edit is done again, each time without the faces that came out worse; then all are left that seams join
@@ -114,7 +114,7 @@ def play(
             put = apply or step is not steps[-1]
             result = run(document, function, step.options, progress=progress, apply=put, spoiled=spoiled)
         else:
-            guard.doing(step.use)
+            note.doing(step.use)
             if progress:
                 progress(step.use, 0, 1)
             result = function(document, step.options, original)
@@ -204,7 +204,7 @@ def run(
 
 def _told(progress: Progress | None, name: str, done: int = 0, total: int = 1) -> None:
     """Say which stage is running."""
-    guard.doing(name)
+    note.doing(name)
     if progress:
         progress(name, done, total)
 

@@ -13,13 +13,13 @@ from typing import Any, Literal, Protocol
 
 from msgspec import structs
 
-from mracad.batch.cluster import lost
-from mracad.batch.find import Item
-from mracad.batch.manifest import Manifest, digest
-from mracad.batch.work import Product, Work, do
 from mracad.errors import Code, FileError, MracadError, UsageError
 from mracad.inspect.faults import ReadBack
-from mracad.recipe import Recipe, record_of
+from mracad.job.batch.cluster import lost
+from mracad.job.batch.find import Item
+from mracad.job.batch.manifest import Manifest, digest
+from mracad.job.batch.work import Product, Work, do
+from mracad.spec.recipe import Recipe, record_of
 
 AHEAD = 2
 """Files given to the executor for each of its workers: enough that none waits, few enough to hold in memory."""

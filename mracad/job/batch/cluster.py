@@ -1,8 +1,8 @@
 """Workers on other machines: Dask's ``distributed`` behind the interface of the local pool.
 
-A task goes to a Dask worker and there into a pool of its own (:mod:`mracad.batch.pool`), so that limits, crashes and
-their reasons are the same as at home, and a bad file never takes a Dask worker with it.  When a Dask worker is lost,
-its tasks are done again elsewhere.
+A task goes to a Dask worker and there into a pool of its own (:mod:`mracad.job.batch.pool`), so that limits, crashes
+and their reasons are the same as at home, and a bad file never takes a Dask worker with it.  When a Dask worker is
+lost, its tasks are done again elsewhere.
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ from collections.abc import Callable
 from concurrent.futures import CancelledError, Executor, Future
 from typing import Any
 
-from mracad.batch.pool import Limits, Pool
-from mracad.batch.work import warm
 from mracad.errors import CrashError, FileError, UsageError
+from mracad.job.batch.pool import Limits, Pool
+from mracad.job.batch.work import warm
 
 PATIENCE = 30
 """Seconds to wait for the scheduler and its first worker."""

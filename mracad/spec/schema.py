@@ -7,8 +7,9 @@ from typing import Any
 
 import msgspec
 
-from mracad.options import STEPS, Options, dashed, lengths
-from mracad.recipe.written import OWN
+from mracad.spec.recipe import OWN
+from mracad.spec.steps import STEPS, Options
+from mracad.spec.steps.base import dashed, lengths
 
 
 def schema() -> dict[str, Any]:
@@ -62,7 +63,7 @@ def _property(part: dict[str, Any], is_length: bool) -> dict[str, Any]:
 
 def page() -> str:
     """Every step with its options, as the Markdown page ``docs/steps.md``."""
-    lines = ["# Steps of recipes", "", "Made by `make docs` from `mracad/options`; see [recipes](recipes.md).", ""]
+    lines = ["# Steps of recipes", "", "Made by `make docs` from `mracad/spec/steps`; see [recipes](recipes.md).", ""]
     for use, definition in schema()["$defs"].items():
         lines += [f"## {use}", "", definition["description"], "", "| option | default | |", "|---|---|---|"]
         for name, part in definition["properties"].items():

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
-import mmap
 import os
 import re
 import select
@@ -14,8 +13,9 @@ import time
 from collections.abc import Callable, Iterator
 from typing import Any, TypeVar
 
-from mracad import wire
 from mracad.errors import CrashError, LimitError, UsageError
+from mracad.job import wire
+from mracad.note import Note, noting
 
 Result = TypeVar("Result")
 
@@ -38,66 +38,7 @@ class TimeLimitError(LimitError):
     """Work that took more time than it may."""
 
 
-class Note:
-    """A few words from a child to its parent, which remain when the child is lost.
-
-    Parameters
-    ----------
-    file : int
-        Descriptor of a file of a page that both have, where the child is no fork.
-    """
-
-    def __init__(self, file: int = -1) -> None:
-        self._memory = mmap.mmap(file, mmap.PAGESIZE)
-        self.stage = self.subject = ""
-
-    def write(self, stage: str, subject: str, ending: bool = False) -> None:
-        self.stage, self.subject = stage, subject
-        text = f"{stage} {subject!r}".encode(errors="replace")[: mmap.PAGESIZE - 2] if subject else stage.encode()
-        self._memory[: len(text) + 2] = bytes([ending or self.ending]) + text + b"\0"
-
-    @property
-    def ending(self) -> bool:
-        return bool(self._memory[0])
-
-    def __str__(self) -> str:
-        text = self._memory[1:].partition(b"\0")[0].decode(errors="replace")
-        return f" while {text}" if text else ""
-
-
-_note: Note | None = None  # of this process, when it is a child
 _memory: int | None = None  # that this process may hold, when it is a child with a limit
-
-
-def noting(note: Note) -> None:
-    """Let :func:`doing` write to a note, as in a child."""
-    global _note
-    _note = note
-
-
-def doing(stage: str = "", subject: str = "") -> None:
-    """Note what this process is at, for the message should it crash or come to a limit.
-
-    Parameters
-    ----------
-    stage : str
-        As ``"reading"``; by default what it was.
-    subject : str
-        The name of the model; by default what it was.
-    """
-    if _note:
-        _note.write(stage or _note.stage, subject or _note.subject)
-
-
-def now() -> str:
-    """What this process is at, as ``" while reading 'part.step'"``; ``""`` where that is not known."""
-    return str(_note or "")
-
-
-def ending() -> None:
-    """Say that the outputs are taking their places now: the time limit does not cut that off."""
-    if _note:
-        _note.write(_note.stage, _note.subject, ending=True)
 
 
 def run(
@@ -121,7 +62,7 @@ def run(
         With the code of a limit when one was hit; with that of an internal error when the child crashed, or raised
         anything else.
     """
-    global _note, _memory
+    global _memory
     if not hasattr(os, "fork"):
         if seconds is None and memory is None:
             return work()
@@ -133,7 +74,8 @@ def run(
     note = Note()
     child = os.fork()
     if not child:
-        _note, _memory = note, memory
+        noting(note)
+        _memory = memory
         os.close(reader)
         _child(work, writer, memory)
     os.close(writer)

@@ -1,4 +1,4 @@
-"""The values of options as they are written, in TOML and on lines, and options from them."""
+"""Options as they are written, in TOML and on lines: values from texts, texts from values, places for messages."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ from typing import Any, Literal, TypeVar
 import msgspec
 
 from mracad.errors import UsageError
-from mracad.options import Options, dashed, lengths, plain_types
+from mracad.spec.steps import Options
+from mracad.spec.steps.base import dashed, lengths, plain_types
 
 Given = TypeVar("Given", bound=Options)
 
@@ -23,7 +24,7 @@ def options(struct: type[Given], values: Mapping[str, Any], place: Callable[[str
     Parameters
     ----------
     struct : type
-        One of :data:`mracad.options.STEPS`.
+        One of :data:`mracad.spec.steps.STEPS`.
     values : mapping
     place : callable, optional
         Says where the value of a name stands, for messages.
@@ -126,3 +127,29 @@ def toml_value(text: str) -> Any:
         return tomllib.loads(f"value = {text}")["value"]
     except tomllib.TOMLDecodeError:
         return text.strip()
+
+
+def places_of_steps(text: str, name: str) -> list[dict[str, str]]:
+    """For each ``[[step]]``, the place of the step and of each of its keys."""
+    found: list[dict[str, str]] = []
+    inside = False
+    for number, line in enumerate(_without_long_strings(text).splitlines(), 1):
+        if line.lstrip().startswith("["):
+            inside = bool(re.match(r"\s*\[\[\s*[\"']?step[\"']?\s*\]\]", line))
+            if inside:
+                found.append({"": f"{name}:{number}"})
+        elif inside and (match := re.match(r"\s*[\"']?([\w-]+)[\"']?\s*=", line)):
+            found[-1].setdefault(dashed(match[1]), f"{name}:{number}")
+    return found
+
+
+def place_of(text: str, key: str, name: str) -> str:
+    """The place of a key or table at the top of a recipe."""
+    lines = _without_long_strings(text).splitlines()
+    pattern = rf"\s*\[?\[?\s*[\"']?{re.escape(key)}[\"']?\s*(=|\]|\.)"
+    return f"{name}:{next((i for i, line in enumerate(lines, 1) if re.match(pattern, line)), 1)}"
+
+
+def _without_long_strings(text: str) -> str:
+    """A TOML text whose strings of several lines are only their line ends."""
+    return re.sub(r'"""[\s\S]*?"""|\'\'\'[\s\S]*?\'\'\'', lambda match: "\n" * match[0].count("\n"), text)

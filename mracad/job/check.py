@@ -1,21 +1,26 @@
-"""Verdicts on whole documents: measured by the kernel, judged on plain data."""
+"""Checks of whole documents, layer by layer: measured by the kernel, judged on plain data."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Collection, Iterable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mracad import guard
-from mracad.errors import CrashError
-from mracad.formats import by_content, unheld
+from mracad.errors import CrashError, FileError
+from mracad.formats import by_content
 from mracad.inspect import check as layers
-from mracad.inspect import compare as audit
+from mracad.inspect.check import SeamLimits
 from mracad.inspect.crossing import crossings
 from mracad.inspect.seams import seams
 from mracad.inspect.verdict import Finding, Layer, Verdict
+from mracad.job import guard
+from mracad.job.judge import Judged, Original
+from mracad.spec.quantity import length
+from mracad.spec.steps import Check
 
 if TYPE_CHECKING:
     from mracad.inspect.seams import SeamMeasure
@@ -23,58 +28,75 @@ if TYPE_CHECKING:
     from mracad.occ.stated import Stated
 
 
-def compare(
-    ref: Document, new: Document, limits: Callable[[float], audit.Limits] | None = None, ignore: Iterable[str] = ()
-) -> Verdict:
-    """Judge a new version of a document by a reference.
+def check(document: Document, options: Check, original: Original | None = None, *, text: bytes | None = None) -> Judged:
+    """Check a document.
 
     Parameters
     ----------
-    ref, new : Document
-    limits : callable, optional
-        What may differ, from the diagonal of the reference in mm; by default faces may deviate by a millionth of a
-        millimetre.
-    ignore : iterable of str
-        Names of layers (see :data:`mracad.inspect.compare.LAYERS`) that are left out.
+    document : Document
+    options : Check
+    original : callable, optional
+        Not needed.
+    text : bytes, optional
+        The file that the document was read from: then every layer is looked at.  Without it there is no file to be
+        judged, and of the layers that take long only those that ``options.fail_on`` names are.
     """
-    place = "assembly" in unheld(ref.schema, new.schema)
-    old, fresh = (_measured(document, place) for document in (ref, new))
-    return audit.compare(old, fresh, limits(old.model.diagonal) if limits else audit.Limits(1e-6), ignore)
+    expected, freeform = expectation(options.expect) if options.expect else (None, False)
+
+    def limits(size: float) -> CheckLimits:
+        gap, tolerance, wall = (
+            None if given is None else length(given, size, name)
+            for given, name in (
+                (options.max_gap, "max-gap"),
+                (options.max_tolerance, "max-tolerance"),
+                (options.min_wall, "min-wall"),
+            )
+        )
+        along = SeamLimits(options.kink, gap, options.max_angle, expected, freeform)
+        return CheckLimits(along, tolerance, wall, options.layer_limit)
+
+    slow = SLOW if text is not None else SLOW.intersection(options.fail_on)
+    verdict = layered(text, document, limits, slow)
+    return Judged(verdict, tuple(failing(verdict, options.fail_on)))
 
 
-def diagonal(document: Document) -> float:
-    """Diagonal of the bounding box of a document, mm."""
-    from mracad.occ.view import view
+def expectation(text: str) -> tuple[int, bool]:
+    """How many seams are to be smooth, and whether only those of NURBS faces count.
 
-    return view(document).diagonal
+    Parameters
+    ----------
+    text : str
+        The number, or the file of a report: of a check, which counts all seams, or of an edit, which counts those of
+        NURBS faces.
+
+    Raises
+    ------
+    FileError
+        When there is no such report, or it says nothing of seams.
+    """
+    if text.isdecimal():
+        return int(text), False
+    hint = "name a JSON report that mracad check or an edit wrote, or give the number of smooth seams"
+    try:
+        found = _smooth(json.loads(Path(text).read_bytes()))
+    except (OSError, ValueError) as error:
+        raise FileError(f"cannot read the report '{text}': {error}", hint) from error
+    if found is None:
+        raise FileError(f"the report '{text}' says nothing of seams", hint)
+    return found
 
 
-def _measured(document: Document, place: bool) -> audit.Subject:
-    """A document, measured; with ``place`` all of its instances where they stand."""
-    from mracad.occ.check import check, lone_faces
-    from mracad.occ.contents import contents
-    from mracad.occ.measure import Gauge, face_masses, mass
-    from mracad.occ.placed import placed
-    from mracad.occ.view import view
-
-    whole = placed(document) if place else None
-    seen = whole.document if whole else document
-    model = view(seen)
-    if whole:
-        faces = (replace(face, colour=colour) for face, colour in zip(model.faces, whole.colours, strict=True))
-        model = replace(model, faces=tuple(faces))
-    return audit.Subject(
-        model=model,
-        schema=document.schema,
-        contents=contents(document),
-        mass=mass(document),
-        faces=face_masses(seen),
-        validity=check(seen),
-        lone_faces=lone_faces(seen),
-        gauge=Gauge(seen),
-        face_numbers=whole.faces if whole else range(len(model.faces)),
-        edge_numbers=whole.edges if whole else range(len(model.edges)),
-    )
+def _smooth(report: object) -> tuple[int, bool] | None:
+    """What :func:`expectation` finds in a report; in that of several steps, what the last one says."""
+    match report:
+        case {"layers": [*layers]}:
+            counts = [x["figures"]["smooth"] for x in layers if x["name"] == "seams"]
+            return (counts[0], False) if counts else None
+        case {"seams": {"each": [*each]}}:
+            return sum(seam.get("after", seam)["smooth"] for seam in each), True
+        case {"steps": [*steps]}:
+            return next(filter(None, map(_smooth, reversed(steps))), None)
+    return None
 
 
 _DECISIVE = ("load", "brep", "shells")  # what makes a model invalid
@@ -106,7 +128,7 @@ SLOW = frozenset({"self-intersection", "mesh"})
 """Layers that take long."""
 
 
-def check(
+def layered(
     text: bytes | None, document: Document, limits: Callable[[float], CheckLimits], slow: Collection[str] = SLOW
 ) -> Verdict:
     """Check a document, layer by layer.

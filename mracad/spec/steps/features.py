@@ -9,8 +9,9 @@ from typing import Annotated, ClassVar, Literal
 from msgspec import Meta
 
 from mracad.errors import UsageError
-from mracad.options.base import FeatureText, File, PlaceText, Selection, dashed
-from mracad.options.quantity import Length, band_of
+from mracad.spec.files import FeatureText, File, PlaceText
+from mracad.spec.quantity import Length, band_of
+from mracad.spec.steps.base import Selection, dashed
 
 
 class Featured(Selection, frozen=True, kw_only=True, forbid_unknown_fields=True):

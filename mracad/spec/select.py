@@ -9,7 +9,7 @@ import numpy as np
 
 from mracad.errors import UsageError
 from mracad.model.brep import Face, Model
-from mracad.options import Selection
+from mracad.spec.steps import Selection
 
 HINT = "select by #3, a product or face name, type:bspline, colour:#ff0000, near:X,Y,Z or cq:'>Z'; see mracad info"
 NURBS = frozenset({"bspline", "bezier"})

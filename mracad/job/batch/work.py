@@ -11,14 +11,15 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from mracad import guard
+from mracad import note
 from mracad.errors import Code, MracadError
 from mracad.inspect.faults import ReadBack
-from mracad.options import STEPS
-from mracad.recipe import Step, title, versions
+from mracad.spec.recipe import Step, title, versions
+from mracad.spec.steps import STEPS
 
 if TYPE_CHECKING:
-    from mracad.job import Judged, Report
+    from mracad.job.document import Report
+    from mracad.job.judge import Judged
     from mracad.occ import Document
 
 
@@ -85,8 +86,8 @@ def do(work: Work) -> Product:
     MracadError
         When a step cannot be done or a check fails.
     """
-    from mracad.job import Judged
-    from mracad.produce import Target, produce
+    from mracad.job.judge import Judged
+    from mracad.job.produce import Target, produce
 
     start = time.perf_counter()
     for name, version in versions().items():
@@ -100,7 +101,7 @@ def do(work: Work) -> Product:
     target = Target(work.name, work.format, work.schema)
     with tempfile.TemporaryDirectory() as folder:
         steps = _here(work, Path(folder))
-        guard.doing("reading", work.name)
+        note.doing("reading", work.name)
         document = _read(work)
         done = produce(document, lambda: _read(work), steps, [target], title=title(work.steps), verify=work.verify)
     last = done.results[-1]
@@ -134,7 +135,7 @@ def _here(work: Work, folder: Path) -> list[Step]:
 
 def _short(result: Report | Judged) -> dict[str, Any]:
     """What a step did, without the long lists."""
-    from mracad.job import Judged
+    from mracad.job.judge import Judged
 
     if isinstance(result, Judged):
         return {"passed": result.passed}

@@ -9,19 +9,20 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, BinaryIO
 
-from mracad import guard, review
+from mracad import note
 from mracad.errors import EditError, FileError
 from mracad.formats import FORMATS, by_content
 from mracad.inspect import accept
 from mracad.inspect.accept import Slack
 from mracad.inspect.faults import Facts, Fault, ReadBack, Reason
-from mracad.job import Judged, Original, Progress, Report, play
-from mracad.options import length
+from mracad.job.document import Progress, Report, play
+from mracad.job.judge import Judged, Original
+from mracad.spec.quantity import length
 
 if TYPE_CHECKING:
     from mracad.occ.document import Document
     from mracad.occ.files import Written
-    from mracad.recipe import Step
+    from mracad.spec.recipe import Step
 
 ROUNDS = 8
 """How often an edit is done again, each time without the faces of which the file would be worse."""
@@ -173,7 +174,7 @@ def read_back(
 
 
 def _tell(stage: str, progress: Progress | None) -> None:
-    guard.doing(stage)
+    note.doing(stage)
     if progress:
         progress(stage, 0, 1)
 
@@ -244,12 +245,19 @@ def _made(document: Document, target: Target, title: str) -> Made:
         stream,
         target.format,
         schema=target.schema,
-        chord=length(target.chord, review.diagonal(document), "chord") if meshed else None,
+        chord=length(target.chord, _diagonal(document), "chord") if meshed else None,
         angle=target.angle,
         ascii=target.ascii,
         options_text=title,
     )
     return Made(target, stream.getvalue(), written)
+
+
+def _diagonal(document: Document) -> float:
+    """Diagonal of the bounding box of a document, mm."""
+    from mracad.occ.view import view
+
+    return view(document).diagonal
 
 
 def _read_back(data: bytes, target: Target) -> Facts:

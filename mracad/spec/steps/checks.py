@@ -6,14 +6,15 @@ from typing import Annotated, ClassVar, Literal
 
 from msgspec import Meta
 
-from mracad.options.base import CountText, File, Options
-from mracad.options.quantity import Length
+from mracad.spec.files import CountText, File
+from mracad.spec.quantity import Length
+from mracad.spec.steps.base import Options
 
 
 class Check(Options, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Check validity and continuity; what fails it stops a recipe, and a command ends with exit code 1."""
 
-    function: ClassVar[str] = "mracad.judge:check"
+    function: ClassVar[str] = "mracad.job.check:check"
 
     max_gap: Annotated[Length | None, Meta(description="Largest gap along any seam.")] = None
     max_angle: Annotated[
@@ -46,7 +47,7 @@ class Check(Options, frozen=True, kw_only=True, forbid_unknown_fields=True):
 class Compare(Options, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Compare with a reference; what differs beyond its limit stops a recipe, and a command ends with exit code 1."""
 
-    function: ClassVar[str] = "mracad.judge:compare"
+    function: ClassVar[str] = "mracad.job.compare:compare"
 
     reference: Annotated[
         File | None, Meta(description="File to compare with; by default the model as it came into the recipe.")

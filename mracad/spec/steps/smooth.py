@@ -8,8 +8,8 @@ from typing import Annotated, ClassVar, Literal
 from msgspec import Meta
 
 from mracad.errors import UsageError
-from mracad.options.base import Selection
-from mracad.options.quantity import Length
+from mracad.spec.quantity import Length
+from mracad.spec.steps.base import Selection
 
 
 class Fitting(Selection, frozen=True, kw_only=True, forbid_unknown_fields=True):

@@ -1,0 +1,95 @@
+"""Comparisons of whole documents: measured by the kernel, judged on plain data."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from mracad.errors import UsageError
+from mracad.formats import unheld
+from mracad.inspect import compare as audit
+from mracad.inspect.verdict import Verdict
+from mracad.job.judge import Judged, Original
+from mracad.spec.quantity import length
+from mracad.spec.steps import Compare
+
+if TYPE_CHECKING:
+    from mracad.occ.document import Document
+
+
+def compare(document: Document, options: Compare, original: Original | None = None) -> Judged:
+    """Compare a document with the reference that ``options`` names, or else with the original.
+
+    Raises
+    ------
+    UsageError
+        When there is neither.
+    """
+    from mracad.occ.files import read
+
+    if options.reference:
+        reference = read(options.reference, options.reference_unit)
+    elif original:
+        reference = original()
+    else:
+        raise UsageError("compare has nothing to compare with", "name a reference")
+
+    def limits(size: float) -> audit.Limits:
+        growth, volume = options.max_gap_growth, options.max_volume_change
+        return audit.Limits(
+            deviation=length(options.max_deviation, size, "max-deviation"),
+            gap_growth=None if growth is None else length(growth, size, "max-gap-growth"),
+            angle_growth=options.max_angle_growth,
+            volume_change=None if volume is None else volume / 100,
+        )
+
+    verdict = compared(reference, document, limits, options.ignore)
+    return Judged(verdict, verdict.failed())
+
+
+def compared(
+    ref: Document, new: Document, limits: Callable[[float], audit.Limits] | None = None, ignore: Iterable[str] = ()
+) -> Verdict:
+    """Judge a new version of a document by a reference.
+
+    Parameters
+    ----------
+    ref, new : Document
+    limits : callable, optional
+        What may differ, from the diagonal of the reference in mm; by default faces may deviate by a millionth of a
+        millimetre.
+    ignore : iterable of str
+        Names of layers (see :data:`mracad.inspect.compare.LAYERS`) that are left out.
+    """
+    place = "assembly" in unheld(ref.schema, new.schema)
+    old, fresh = (_measured(document, place) for document in (ref, new))
+    return audit.compare(old, fresh, limits(old.model.diagonal) if limits else audit.Limits(1e-6), ignore)
+
+
+def _measured(document: Document, place: bool) -> audit.Subject:
+    """A document, measured; with ``place`` all of its instances where they stand."""
+    from mracad.occ.check import check, lone_faces
+    from mracad.occ.contents import contents
+    from mracad.occ.measure import Gauge, face_masses, mass
+    from mracad.occ.placed import placed
+    from mracad.occ.view import view
+
+    whole = placed(document) if place else None
+    seen = whole.document if whole else document
+    model = view(seen)
+    if whole:
+        faces = (replace(face, colour=colour) for face, colour in zip(model.faces, whole.colours, strict=True))
+        model = replace(model, faces=tuple(faces))
+    return audit.Subject(
+        model=model,
+        schema=document.schema,
+        contents=contents(document),
+        mass=mass(document),
+        faces=face_masses(seen),
+        validity=check(seen),
+        lone_faces=lone_faces(seen),
+        gauge=Gauge(seen),
+        face_numbers=whole.faces if whole else range(len(model.faces)),
+        edge_numbers=whole.edges if whole else range(len(model.edges)),
+    )

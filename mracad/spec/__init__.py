@@ -1,0 +1,1 @@
+"""What is asked for: quantities, selectors, the options of every step, recipes."""

@@ -1,0 +1,27 @@
+"""The options of every step, declared once: command line, recipes, schemas and documentation come from here.
+
+A ``Struct`` per edit or check, listed in ``STEPS``; a field's ``Meta`` carries its help.  This package imports no
+numerical library, so that the command line can show its help at once.
+"""
+
+from __future__ import annotations
+
+from mracad.spec.steps.base import Options, Selection
+from mracad.spec.steps.checks import Check, Compare
+from mracad.spec.steps.features import Featured, Move, Repeat, Single, Transfer
+from mracad.spec.steps.smooth import Fitting, Smooth
+
+__all__ = [
+    "STEPS", "Check", "Compare", "Featured", "Fitting", "Move", "Options", "Repeat", "Selection", "Single", "Smooth",
+    "Transfer",
+]  # fmt: skip
+
+STEPS: dict[str, type[Options]] = {
+    "smooth": Smooth,
+    "move": Move,
+    "repeat": Repeat,
+    "transfer": Transfer,
+    "check": Check,
+    "compare": Compare,
+}
+"""Every step by the name of its command: edits (subclasses of ``Selection``) and checks."""
