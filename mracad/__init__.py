@@ -15,6 +15,8 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from mracad.version import __version__
+
 if TYPE_CHECKING:
     from mracad.edit.feature.edits import move, repeat, transfer
     from mracad.edit.smooth import smooth
@@ -29,8 +31,6 @@ if TYPE_CHECKING:
     from mracad.occ.files import read, write
     from mracad.occ.view import view as snapshot
     from mracad.spec.steps import Move, Repeat, Smooth, Transfer
-
-__version__ = "0.1.0"
 
 _HOMES = {
     "Displacement": "model.displacement",
@@ -56,8 +56,27 @@ _HOMES = {
 }
 
 __all__ = [
-    "Displacement", "Model", "Move", "MracadError", "Repeat", "Smooth", "Transfer", "apply", "check", "deviations",
-    "move", "read", "read_back", "repeat", "run", "seams", "smooth", "snapshot", "transfer", "write",
+    "Displacement",
+    "Model",
+    "Move",
+    "MracadError",
+    "Repeat",
+    "Smooth",
+    "Transfer",
+    "__version__",
+    "apply",
+    "check",
+    "deviations",
+    "move",
+    "read",
+    "read_back",
+    "repeat",
+    "run",
+    "seams",
+    "smooth",
+    "snapshot",
+    "transfer",
+    "write",
 ]  # fmt: skip
 
 

@@ -10,7 +10,8 @@ from pathlib import Path
 
 from mracad.inspect.seams import SeamMeasure, seams
 from mracad.model.brep import Model
-from mracad.occ.check import Validity, check
+from mracad.model.facts import Validity
+from mracad.occ.check import check
 from mracad.occ.settings import exchange, quiet
 from mracad.occ.step import read_step
 from mracad.occ.view import view

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from mracad.job.document import Report
     from mracad.job.judge import Judged
     from mracad.job.produce import Made
-    from mracad.occ.check import Validity
+    from mracad.model.facts import Validity
     from mracad.spec.recipe import Step
 
 SHOWN = 6

@@ -10,15 +10,12 @@ from collections import Counter, defaultdict
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mracad.inspect.faults import Facts, Fault, Line, ReadBack, Reason
-from mracad.inspect.seams import SeamMeasure
-
-if TYPE_CHECKING:
-    pass
+from mracad.inspect.faults import Fault, ReadBack, Reason
+from mracad.inspect.seams import SeamMeasure, seams
+from mracad.model.facts import Facts, Line
 
 Array = np.ndarray
 
@@ -120,7 +117,7 @@ class _File:
         if any(near.intersection(self.pairs[number]) for number in free):  # seams that are not sewn are found by place
             edges |= free
         found: dict[tuple[int, ...], list[SeamMeasure]] = defaultdict(list)
-        for measure in self.facts.probe.seams(edges) if edges else ():
+        for measure in seams(self.facts.probe.along(edges)) if edges else ():
             found[tuple(sorted(self.partners.get(face, -1) for face in measure.faces))].append(measure)
         return found
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import defaultdict, deque
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,10 +12,7 @@ from mracad.inspect.crossing import unpaired
 from mracad.inspect.seams import SMOOTH, SeamMeasure
 from mracad.inspect.verdict import Finding, Layer
 from mracad.model.brep import Model
-
-if TYPE_CHECKING:
-    from mracad.occ.check import Validity
-    from mracad.occ.triangles import Triangles
+from mracad.model.facts import Triangles, Validity
 
 Array = np.ndarray
 

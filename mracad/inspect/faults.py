@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from mracad.inspect.seams import SeamMeasure
-
-if TYPE_CHECKING:
-    from mracad.occ.check import Validity
+from mracad.model.facts import Counts
 
 Array = np.ndarray
 
@@ -35,16 +30,6 @@ class Reason(StrEnum):
     GAP = "gap"
     ANGLE = "angle"
     OPEN = "open mesh"  # of a closed body
-
-
-@dataclass(frozen=True)
-class Counts:
-    """How many there are, all instances counted."""
-
-    solids: int
-    shells: int
-    faces: int
-    free_edges: int
 
 
 @dataclass(frozen=True)
@@ -140,79 +125,3 @@ class ReadBack:
     seams: int = 0
     gap: float = 0.0
     angle: float = 0.0
-
-
-class Probe(Protocol):
-    """Measures that are taken only where something differs; see :class:`mracad.occ.facts.Probe`."""
-
-    def validity(self) -> Validity: ...
-
-    def seams(self, edges: Collection[int]) -> list[SeamMeasure]: ...
-
-    def area(self, face: int, exact: bool) -> float: ...
-
-    def volume(self) -> float: ...
-
-    def box(self) -> Array: ...
-
-
-@dataclass(frozen=True, eq=False)
-class Line:
-    """An edge at a few places.
-
-    Attributes
-    ----------
-    faces : tuple of int
-        Those that use it, once for each use.
-    points : ndarray (1 + n, k, 6)
-        Points of its own curve and of each face along it, in the part's frame, mm; and the unit normals of the
-        surfaces there (for the curve zero).
-    tolerance : float
-        mm.
-    """
-
-    faces: tuple[int, ...]
-    points: Array
-    tolerance: float
-
-
-@dataclass(frozen=True, eq=False)
-class Facts:
-    """What is known of a document, in memory or as read back.
-
-    Attributes
-    ----------
-    diagonal : float
-        mm.
-    counts : Counts
-    spots : ndarray (p, 9)
-        Where each placed face is: corners of its box, middle of its vertices, mm.
-    owners : ndarray of int (p,)
-        The face that each of them is.
-    closing : frozenset of int
-        Faces on surfaces that close, without a closing edge: the others do not tell which side of them is meant.
-    vertices : ndarray (f,)
-        The largest tolerance among the vertices of each face, mm.
-    edges : tuple of Line
-        All that are not degenerate or, where they are, have no faces.
-    probe : Probe
-    """
-
-    diagonal: float
-    counts: Counts
-    spots: Array
-    owners: Array
-    closing: frozenset[int]
-    vertices: Array
-    edges: tuple[Line, ...]
-    probe: Probe
-
-    @property
-    def count(self) -> int:
-        """The number of faces, instances counted once."""
-        return len(self.vertices)
-
-    @property
-    def tolerance(self) -> float:
-        """The largest, mm."""
-        return max([*(edge.tolerance for edge in self.edges), float(self.vertices.max(initial=0.0))])

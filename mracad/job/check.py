@@ -24,8 +24,8 @@ from mracad.spec.steps import Check
 
 if TYPE_CHECKING:
     from mracad.inspect.seams import SeamMeasure
+    from mracad.model.facts import Stated
     from mracad.occ.document import Document
-    from mracad.occ.stated import Stated
 
 
 def check(document: Document, options: Check, original: Original | None = None, *, text: bytes | None = None) -> Judged:
@@ -280,13 +280,13 @@ def _crossed(document: Document, measures: list[SeamMeasure], diagonal: float) -
 
 def _walls(document: Document, least: float | None) -> Layer:
     """The thinnest wall of the solids."""
-    from mracad.occ.measure import Gauge
+    from mracad.occ.measure import KernelGauge
     from mracad.occ.topology import has_solids
 
     if least is None:
         return Layer("walls", "skipped", "no least thickness was given")
     parts = [part for part in document.parts if has_solids(part.shape)]
-    gauge = Gauge(document)
+    gauge = KernelGauge(document)
     found = [
         (index, *gauge.thinnest(index, part))
         for part in parts

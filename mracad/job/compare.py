@@ -71,7 +71,7 @@ def _measured(document: Document, place: bool) -> audit.Subject:
     """A document, measured; with ``place`` all of its instances where they stand."""
     from mracad.occ.check import check, lone_faces
     from mracad.occ.contents import contents
-    from mracad.occ.measure import Gauge, face_masses, mass
+    from mracad.occ.measure import KernelGauge, face_masses, mass
     from mracad.occ.placed import placed
     from mracad.occ.view import view
 
@@ -89,7 +89,7 @@ def _measured(document: Document, place: bool) -> audit.Subject:
         faces=face_masses(seen),
         validity=check(seen),
         lone_faces=lone_faces(seen),
-        gauge=Gauge(seen),
+        gauge=KernelGauge(seen),
         face_numbers=whole.faces if whole else range(len(model.faces)),
         edge_numbers=whole.edges if whole else range(len(model.edges)),
     )

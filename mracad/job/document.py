@@ -24,7 +24,7 @@ from mracad.model.brep import Model
 from mracad.spec.steps import Fitting, Selection
 
 if TYPE_CHECKING:
-    from mracad.occ.check import Validity
+    from mracad.model.facts import Validity
     from mracad.occ.document import Document
     from mracad.spec.recipe import Step
 

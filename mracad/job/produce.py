@@ -14,9 +14,10 @@ from mracad.errors import EditError, FileError
 from mracad.formats import FORMATS, by_content
 from mracad.inspect import accept
 from mracad.inspect.accept import Slack
-from mracad.inspect.faults import Facts, Fault, ReadBack, Reason
+from mracad.inspect.faults import Fault, ReadBack, Reason
 from mracad.job.document import Progress, Report, play
 from mracad.job.judge import Judged, Original
+from mracad.model.facts import Facts
 from mracad.spec.quantity import length
 
 if TYPE_CHECKING:

@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from mracad import __version__
 from mracad.mesh.scene import GREY, Body, Node, Scene, rgba
+from mracad.version import __version__
 
 _UPRIGHT = [-(0.5**0.5), 0.0, 0.0, 0.5**0.5]  # quaternion: Z up to Y up
 _FLOAT, _INDEX, _POINTS, _TRIANGLES = 5126, 5125, 34962, 34963  # component types and buffer targets

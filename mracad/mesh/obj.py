@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from mracad import __version__
 from mracad.mesh.scene import GREY, Body, Scene, rgba
+from mracad.version import __version__
 
 
 def write(scene: Scene) -> bytes:

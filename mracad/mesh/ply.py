@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from mracad import __version__
 from mracad.mesh.scene import GREY, Scene, rgba
+from mracad.version import __version__
 
 _LAYOUT = np.dtype([("count", "u1"), ("corners", "<i4", 3), ("face", "<i4"), ("colour", "u1", 4)])
 _HEADER = """ply

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from mracad import __version__
 from mracad.mesh.scene import Scene
+from mracad.version import __version__
 
 Array = np.ndarray
 _LAYOUT = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])

@@ -13,8 +13,8 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from mracad import __version__
 from mracad.mesh.scene import Body, Node, Scene, rgba
+from mracad.version import __version__
 
 _TYPES = (
     '<?xml version="1.0" encoding="UTF-8"?>\n'

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 
 from OCP.Adaptor3d import Adaptor3d_CurveOnSurface
 from OCP.BRep import BRep_Tool
@@ -16,6 +15,7 @@ from OCP.ShapeAnalysis import ShapeAnalysis_ShapeTolerance
 from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_FORWARD, TopAbs_SHELL, TopAbs_SOLID, TopAbs_VERTEX, TopAbs_WIRE
 from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Shape
 
+from mracad.model.facts import Failure, Validity
 from mracad.occ.document import Document
 from mracad.occ.settings import quiet, threads
 from mracad.occ.topology import compound, edge_uses, inside
@@ -24,58 +24,6 @@ _KINDS = {
     TopAbs_SOLID: "solid", TopAbs_SHELL: "shell", TopAbs_FACE: "face", TopAbs_WIRE: "wire", TopAbs_EDGE: "edge",
     TopAbs_VERTEX: "vertex",
 }  # fmt: skip
-
-
-@dataclass(frozen=True)
-class Failure:
-    """One finding of the kernel's check.
-
-    Attributes
-    ----------
-    kind : str
-        ``"face"``, ``"wire"``, ``"edge"``, ``"vertex"``, ``"shell"`` or ``"solid"``.
-    status : str
-        The kernel's name for it, as ``"SelfIntersectingWire"``.
-    face : int or None
-        Index of the face in which it was found; None for shells and solids.
-    """
-
-    kind: str
-    status: str
-    face: int | None
-
-    def __str__(self) -> str:
-        return f"{self.status} in a {self.kind}" + (f" of #{self.face + 1}" if self.face is not None else "")
-
-
-@dataclass(frozen=True)
-class Validity:
-    """What the kernel says of a document; a part that is instanced counts once.
-
-    Attributes
-    ----------
-    valid : bool
-    failures : tuple of Failure
-    solids, shells, faces, open_shells : int
-        Of the whole document.
-    free_edges : int
-        Edges that one face uses once.
-    edge_tolerance, vertex_tolerance : float
-        The largest among the faces that were checked, mm.
-    curve_distance : float or None
-        Largest distance between an edge's 3D curve and its curve on a face that was checked, at equal parameters, mm.
-    """
-
-    valid: bool
-    failures: tuple[Failure, ...]
-    solids: int
-    shells: int
-    faces: int
-    open_shells: int
-    free_edges: int
-    edge_tolerance: float
-    vertex_tolerance: float
-    curve_distance: float | None = None
 
 
 def check(document: Document, faces: Iterable[int] | None = None, distances: bool = False) -> Validity:

@@ -20,9 +20,9 @@ from OCP.TopAbs import TopAbs_FACE, TopAbs_FORWARD, TopAbs_SHELL, TopAbs_SOLID, 
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS, TopoDS_Edge, TopoDS_Face
 
-from mracad.inspect.faults import Counts, Facts, Line
-from mracad.inspect.seams import SeamMeasure, seams
-from mracad.occ.check import Validity, check
+from mracad.model.brep import Model
+from mracad.model.facts import Counts, Facts, Line, Validity
+from mracad.occ.check import check
 from mracad.occ.document import Document
 from mracad.occ.measure import mass
 from mracad.occ.settings import quiet
@@ -35,7 +35,7 @@ _PLACES = (0.04, 0.46, 0.91)  # of the range of an edge
 
 
 @dataclass(frozen=True, eq=False)
-class Probe:
+class KernelProbe:
     """Measures of a document that take long, taken when asked for."""
 
     document: Document
@@ -44,9 +44,9 @@ class Probe:
         """The kernel's verdict on everything."""
         return self._validity
 
-    def seams(self, edges: Collection[int]) -> list[SeamMeasure]:
-        """The seams along some edges."""
-        return seams(view(self.document, edges=frozenset(edges)))
+    def along(self, edges: Collection[int]) -> Model:
+        """The document with samples along some edges alone."""
+        return view(self.document, edges=frozenset(edges))
 
     def area(self, face: int, exact: bool) -> float:
         """Of a face, mm², by a quadrature that is the same for the same face, or exactly."""
@@ -85,7 +85,7 @@ def facts(document: Document) -> Facts:
     vertices[owners] = loose
     size = float(np.linalg.norm(spots[:, 3:6].max(axis=0) - spots[:, :3].min(axis=0)))
     return Facts(
-        size, _counts(document, lines), spots, owners, frozenset(closing), vertices, tuple(lines), Probe(document)
+        size, _counts(document, lines), spots, owners, frozenset(closing), vertices, tuple(lines), KernelProbe(document)
     )
 
 

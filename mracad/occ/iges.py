@@ -18,7 +18,6 @@ from OCP.IGESSelect import IGESSelect_WorkLibrary
 from OCP.TCollection import TCollection_HAsciiString
 from OCP.TopoDS import TopoDS_Shape
 
-from mracad import __version__
 from mracad.errors import FileError
 from mracad.occ.document import Document, empty, label_name, name_label, named_labels, no_faces
 from mracad.occ.iges_text import prepared
@@ -26,6 +25,7 @@ from mracad.occ.load import load
 from mracad.occ.settings import all_digits, exchange, moment, quiet
 from mracad.occ.units import UNITS, Units, named
 from mracad.occ.writable import Cut, writable
+from mracad.version import __version__
 
 _FLAGS = {1: "in", 2: "mm", 4: "ft", 5: "mi", 6: "m", 7: "km", 8: "mil", 9: "um", 10: "cm", 11: "uin"}
 _MODES = ("Name", "Color", "Layer")

@@ -23,6 +23,7 @@ from OCP.TopAbs import TopAbs_FORWARD, TopAbs_IN, TopAbs_REVERSED, TopAbs_SOLID
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS, TopoDS_Shape
 
+from mracad.model.facts import Mass
 from mracad.occ.document import Document, Part
 from mracad.occ.settings import quiet
 from mracad.occ.topology import compound, inside, matrix
@@ -31,25 +32,6 @@ Array = np.ndarray
 Point = tuple[float, float, float]
 _EXACT = 1e-6  # relative error of volumes and areas; the kernel's default is off by a hundredth on NURBS faces
 _LEAST = 9  # sample lines across a face in each direction
-
-
-@dataclass(frozen=True)
-class Mass:
-    """Size of something: all placed instances of a document, or one face in its part's frame.
-
-    Attributes
-    ----------
-    volume : float
-        Of the solids, mm³; 0 for a face.
-    area : float
-        Of the faces, mm².
-    centre : (float, float, float)
-        Of the solids or, where there are none, of the faces, mm.
-    """
-
-    volume: float
-    area: float
-    centre: tuple[float, float, float]
 
 
 def mass(document: Document) -> Mass:
@@ -82,7 +64,7 @@ def face_masses(document: Document) -> list[Mass]:
 
 
 @dataclass(frozen=True, eq=False)
-class Gauge:
+class KernelGauge:
     """Points on the faces of a document and exact distances from them; lengths in mm, in the part's frame."""
 
     document: Document

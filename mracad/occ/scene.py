@@ -12,6 +12,7 @@ from OCP.XCAFDoc import XCAFDoc_ShapeTool
 
 from mracad.errors import FileError, UsageError
 from mracad.mesh.scene import Body, Node, Scene
+from mracad.model.facts import Triangles
 from mracad.occ.document import (
     Document,
     components,
@@ -23,7 +24,7 @@ from mracad.occ.document import (
     referred,
 )
 from mracad.occ.topology import inside, matrix
-from mracad.occ.triangles import Triangles, triangles
+from mracad.occ.triangles import triangles
 
 
 def scene(

@@ -6,44 +6,16 @@ import io
 import math
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Any
 
 from OCP.IFSelect import IFSelect_RetDone
 from OCP.STEPControl import STEPControl_Reader
 
 from mracad.errors import FileError
+from mracad.model.facts import Stated
 from mracad.occ.settings import exchange, quiet
 
 _SHELLS = ("StepShape_ClosedShell", "StepShape_OpenShell", "StepShape_ConnectedFaceSet")
-
-
-@dataclass(frozen=True)
-class Stated:
-    """A STEP file as parsed.
-
-    Attributes
-    ----------
-    entities : int
-    faces : int
-        Of all shells, each once.
-    uses : tuple of (int, int, bool)
-        Every use of an edge: a number for the edge, the position of the face among all, and whether the face's
-        boundary runs along the edge.
-    centres : tuple of (float, float, float)
-        Of the vertices of each face, in the file's unit.
-    senses : tuple of (bool or None)
-        Whether each face looks as its surface does; None where that is not stated.
-    broken : tuple of str
-        Entities that could not be understood, at most a hundred: their place in the file and the reason.
-    """
-
-    entities: int
-    faces: int
-    uses: tuple[tuple[int, int, bool], ...]
-    centres: tuple[tuple[float, float, float], ...]
-    senses: tuple[bool | None, ...]
-    broken: tuple[str, ...]
 
 
 def stated(text: bytes, name: str) -> Stated:

@@ -16,7 +16,6 @@ from OCP.StepData import StepData_StepModel, StepData_StepWriter
 from OCP.TCollection import TCollection_HAsciiString
 from OCP.TopoDS import TopoDS_Shape
 
-from mracad import __version__
 from mracad.errors import FileError, UsageError
 from mracad.formats import by_content
 from mracad.occ.document import Document, empty, no_faces, set_unit
@@ -29,6 +28,7 @@ from mracad.occ.titles import marked, marking, put_names
 from mracad.occ.units import UNITS, of_file
 from mracad.occ.writable import Cut, writable
 from mracad.output import put
+from mracad.version import __version__
 
 _READ_MODES = ("Name", "Color", "Layer", "GDT", "Mat", "Props", "View", "SHUO", "Meta", "ProductMeta")
 _READ_SETTINGS = {"read.stepcaf.subshapes.name": "On"}

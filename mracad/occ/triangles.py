@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from OCP.BRep import BRep_Tool
 from OCP.BRepMesh import BRepMesh_IncrementalMesh
@@ -13,6 +11,7 @@ from OCP.TopAbs import TopAbs_REVERSED
 from OCP.TopLoc import TopLoc_Location
 
 from mracad.errors import UsageError
+from mracad.model.facts import Triangles
 from mracad.occ.document import Document
 from mracad.occ.settings import quiet
 from mracad.occ.topology import box, compound, matrix
@@ -28,29 +27,6 @@ _ALGORITHMS = (
     IMeshTools_MeshAlgoType.IMeshTools_MeshAlgoType_Delabella,
 )
 _WELD = 2e-7  # of a part's diagonal: about the resolution of 32-bit numbers
-
-
-@dataclass(frozen=True, eq=False)
-class Triangles:
-    """A mesh of all parts, each once and in its own frame, mm.
-
-    Attributes
-    ----------
-    points : ndarray (n, 3)
-        Corners that coincide within rounding are one point of their part.
-    corners : ndarray of int (m, 3)
-        Point numbers, anticlockwise seen from outside.
-    faces, parts : ndarray of int (m,)
-        Which face and which part each triangle belongs to.
-    missing : tuple of int
-        Faces that the kernel could not mesh.
-    """
-
-    points: Array
-    corners: Array
-    faces: Array
-    parts: Array
-    missing: tuple[int, ...]
 
 
 def triangles(document: Document, chord: float | None = None, angle: float | None = None) -> Triangles:

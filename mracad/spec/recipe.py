@@ -26,11 +26,11 @@ from typing import Any
 
 from msgspec import structs
 
-from mracad import __version__
 from mracad.errors import FileError, UsageError
 from mracad.spec.steps import STEPS, Options
 from mracad.spec.steps.base import dashed, plain_types
 from mracad.spec.text import braced, filled, nearest, options, place_of, places_of_steps, toml, toml_value
+from mracad.version import __version__
 
 OWN = ("use", "id")
 """The keys of a step that are not options."""

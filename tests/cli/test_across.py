@@ -15,9 +15,9 @@ from OCP.TopExp import TopExp_Explorer
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS
 
-from mracad import occ
 from mracad.formats import unheld
 from mracad.occ.files import read, write
+from mracad.occ.step import write_step
 from mracad.occ.topology import compound, inside
 from tests.cli.test_check import flat
 from tests.occ import shapes
@@ -218,10 +218,10 @@ def test_instances_are_compared_where_they_stand(mracad, tmp_path):
 
     block = BRepPrimAPI_MakeBox(10, 20, 30).Shape()
     ref = tmp_path / "ref.step"
-    occ.write_step(shapes.assembly(block, *places(0, 10, 40)), ref)  # the first two touch in a whole face
+    write_step(shapes.assembly(block, *places(0, 10, 40)), ref)  # the first two touch in a whole face
     assert compared(mracad, ref, converted(mracad, ref, tmp_path / "same.igs"))[0]["passed"]
     apart = tmp_path / "apart.step"
-    occ.write_step(shapes.assembly(block, *places(0, 10, 40.001)), apart)
+    write_step(shapes.assembly(block, *places(0, 10, 40.001)), apart)
     body, _ = compared(mracad, ref, converted(mracad, apart, tmp_path / "apart.igs"))
     assert "deviation" in body["failed"]
 

@@ -14,11 +14,12 @@ from OCP.TopAbs import TopAbs_FACE
 from OCP.TopExp import TopExp_Explorer
 from OCP.TopoDS import TopoDS, TopoDS_Shell
 
-from mracad import occ
 from mracad.errors import LimitError
 from mracad.inspect.verdict import Layer
 from mracad.job import check as checks
 from mracad.job import guard
+from mracad.occ.files import read
+from mracad.occ.view import view
 from tests.occ import shapes
 
 
@@ -87,7 +88,7 @@ def test_a_flipped_face_is_named(mracad, box):
     assert finding["rule"] == "flipped-face"
     # the kernel puts the faces in another order; the third of the file is y = 0
     (face,) = finding["faces"]
-    assert occ.view(occ.read(box)).faces[face - 1].box[:, 1] == pytest.approx(0, abs=1e-6)
+    assert view(read(box)).faces[face - 1].box[:, 1] == pytest.approx(0, abs=1e-6)
 
 
 def test_a_hole_torn_open_by_a_hundredth(mracad, tmp_path):
@@ -200,7 +201,7 @@ def test_a_wrong_same_sense_is_named(mracad, box):
     assert finding["rule"] == "same-sense"
     # the kernel puts the faces in another order; the first of the file is x = 0
     (face,) = finding["faces"]
-    assert occ.view(occ.read(box)).faces[face - 1].box[:, 0] == pytest.approx(0, abs=1e-6)
+    assert view(read(box)).faces[face - 1].box[:, 0] == pytest.approx(0, abs=1e-6)
 
 
 def test_a_face_that_cannot_be_loaded_is_named(mracad, samples, tmp_path):

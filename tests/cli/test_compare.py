@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox, BRepPrimAPI_MakeCylinder
 
-from mracad import occ
 from mracad.bspline.closest import distances
+from mracad.occ.step import read_step, write_step
 from mracad.occ.units import UNITS, Units
+from mracad.occ.view import view
 from tests.occ import shapes
 
 SAMPLES = ("assembly", "blade", "bottle", "trimmed")
@@ -30,7 +31,7 @@ def saved(shape, path, unit="mm"):
     """A file with one part."""
     made = shapes.document(shape, names={0: "part"})
     made.units = Units(unit, UNITS[unit][0])
-    occ.write_step(made, path)
+    write_step(made, path)
     return path
 
 
@@ -159,7 +160,7 @@ def test_reports(mracad, samples, tmp_path):
 
 def test_nearest_points_are_exact_on_every_kind_of_net(samples):
     for name in ("panel", "bottle", "blade"):
-        model = occ.view(occ.read_step(samples / f"{name}.step"))
+        model = view(read_step(samples / f"{name}.step"))
         net = model.surfaces[0].net
         grid = [np.linspace(*k.domain, 14)[1:-1] for k in (net.u, net.v)]
         uv = np.stack(np.meshgrid(*grid), -1).reshape(-1, 2)

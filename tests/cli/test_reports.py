@@ -7,11 +7,13 @@ import pytest
 from mracad_cli import render, verdicts
 from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
 
-from mracad import occ
 from mracad.edit.smooth import smooth
 from mracad.inspect.words import words
 from mracad.job import check, compare
 from mracad.job.document import run
+from mracad.occ.files import read, write
+from mracad.occ.step import write_step
+from mracad.occ.view import view
 from mracad.spec.steps import Check, Compare, Smooth
 from tests.occ import shapes
 
@@ -40,14 +42,14 @@ def raw(verdict):
 
 @pytest.fixture
 def panels(samples):
-    return [occ.read(samples / f"{name}.step") for name in ("panel_clean", "panel")]
+    return [read(samples / f"{name}.step") for name in ("panel_clean", "panel")]
 
 
 def test_a_comparison_is_plain_data(panels, samples, tmp_path):
     strict = Compare(max_gap_growth="1e-12mm", max_angle_growth=0.0, max_volume_change=0.0)
     other = tmp_path / "other.igs"
-    occ.write(occ.read(samples / "assembly.step"), other)
-    pairs = [tuple(panels), (occ.read(samples / "assembly.step"), occ.read(other)), (panels[0], occ.read(other))]
+    write(read(samples / "assembly.step"), other)
+    pairs = [tuple(panels), (read(samples / "assembly.step"), read(other)), (panels[0], read(other))]
     for ref, new in pairs:
         judged = compare.compare(new, strict, lambda ref=ref: ref)
         assert odd(raw(judged.verdict)) == []
@@ -81,10 +83,10 @@ def test_a_name_like_a_face_is_a_name(mracad, tmp_path):
     path = tmp_path / "pins.step"
     boxes = [BRepPrimAPI_MakeBox(size, 2, 3).Shape() for size in (1, 5)]
     colours = {0: "#ff0000", 1: "#00ff00"}
-    occ.write_step(shapes.document(*boxes, names={0: "pin #99", 1: "pin #1"}, colours=colours), path)
+    write_step(shapes.document(*boxes, names={0: "pin #99", 1: "pin #1"}, colours=colours), path)
     assert mracad("compare", path, path).code == 0
     other = tmp_path / "other.step"
-    occ.write_step(shapes.document(*boxes, names={0: "pin #99", 1: "pin #1"}, colours=colours | {0: "#0000ff"}), other)
+    write_step(shapes.document(*boxes, names={0: "pin #99", 1: "pin #1"}, colours=colours | {0: "#0000ff"}), other)
     body = json.loads(mracad("compare", path, other, "--json").out)
     assert body["failed"] == ["colours"]
     found = next(x for x in body["layers"] if x["name"] == "colours")["findings"]
@@ -97,15 +99,15 @@ def test_control_characters_of_names_never_reach_the_terminal(mracad, tmp_path):
     name, path = "evil\x1b[2J\x9b31m\nname", tmp_path / "evil.step"
     document = shapes.document(BRepPrimAPI_MakeBox(1, 2, 3).Shape(), names={0: name})
     other = shapes.document(BRepPrimAPI_MakeBox(1, 2, 3).Shape(), names={0: "good"})
-    occ.write_step(document, path)
-    occ.write_step(other, tmp_path / "good.step")
-    read = occ.view(occ.read(path)).products[0]
-    assert "\x1b" in read and "\x9b" in read
+    write_step(document, path)
+    write_step(other, tmp_path / "good.step")
+    named = view(read(path)).products[0]
+    assert "\x1b" in named and "\x9b" in named
     for line in (("info", path), ("compare", path, tmp_path / "good.step")):
         result = mracad(*line)
         assert not any(c in result.out + result.err for c in "\x1b\x9b"), line
         assert "evil\\u001b[2J\\u009b31m" in result.out
     result = mracad("info", path, "--json")
-    assert json.loads(result.out)["products"] == [read] and "\x1b" not in result.out and "\x9b" not in result.out
+    assert json.loads(result.out)["products"] == [named] and "\x1b" not in result.out and "\x9b" not in result.out
     result = mracad("info", tmp_path / "no\x1b[2J.step")
     assert result.code == 3 and "no\\u001b[2J.step" in result.err and "\x1b" not in result.err

@@ -5,10 +5,13 @@ import json
 import numpy as np
 import pytest
 
-from mracad import occ
 from mracad.model.displacement import Displacement, Offset
 from mracad.model.region import face_region, supported
+from mracad.occ.apply import apply
 from mracad.occ.contents import contents
+from mracad.occ.files import read
+from mracad.occ.step import read_step, write_step
+from mracad.occ.view import view
 from tests.conftest import CORPUS
 
 EXPECTED = {  # usages, products, colours, layers, annotations
@@ -33,13 +36,13 @@ def inner(model, surface):
 
 def round_trip(source, target):
     """Edit one face, write, read back, compare; what the document says beside geometry."""
-    document = occ.read_step(source)
-    model, before = occ.view(document), contents(document)
+    document = read_step(source)
+    model, before = view(document), contents(document)
     surface, offset = next((s, o) for s in model.surfaces for o in [inner(model, s)] if o is not None)
-    occ.apply(document, model, Displacement({surface.index: offset}))
-    occ.write_step(document, target)
-    again = occ.read_step(target)
-    seen, after = occ.view(again), contents(again)
+    apply(document, model, Displacement({surface.index: offset}))
+    write_step(document, target)
+    again = read_step(target)
+    seen, after = view(again), contents(again)
     assert after == before
     for old, new in zip(model.faces, seen.faces, strict=True):
         for word in ("name", "product", "colour", "instances"):
@@ -76,7 +79,7 @@ def test_one_edit_changes_every_instance(mracad, samples, tmp_path):
     body = json.loads(mracad("compare", samples / "assembly.step", out, "--json").out)
     assert body["failed"] == ["deviation"]
     assert {face for finding in body["layers"][1]["findings"] for face in finding["faces"]} == {7}
-    assert next(p for p in occ.view(occ.read_step(out)).faces if p.index == 6).instances == 4
+    assert next(p for p in view(read_step(out)).faces if p.index == 6).instances == 4
 
 
 def smoothed(mracad, samples, out, *words):
@@ -86,7 +89,7 @@ def smoothed(mracad, samples, out, *words):
 def test_one_instance_is_edited_alone(mracad, samples, tmp_path):
     out = tmp_path / "out.step"
     assert smoothed(mracad, samples, out, "--instance", "front pair/pad left").code == 0
-    old, new = occ.read(samples / "assembly.step"), occ.read(out)
+    old, new = read(samples / "assembly.step"), read(out)
     before, after = contents(old), contents(new)
     assert after.tree == before.tree and after.layers == before.layers
     assert {(what, colour) for _, what, colour in after.colours} == {
@@ -94,8 +97,8 @@ def test_one_instance_is_edited_alone(mracad, samples, tmp_path):
     }
     pads = [part for part in new.parts if part.product == "pad"]
     assert sorted(len(part.placements) for part in pads) == [1, 3]
-    nets = {len(part.placements): occ.view(new).surfaces[i].net for i, part in enumerate(pads)}
-    assert np.array_equal(nets[3].poles, occ.view(old).surfaces[0].net.poles)
+    nets = {len(part.placements): view(new).surfaces[i].net for i, part in enumerate(pads)}
+    assert np.array_equal(nets[3].poles, view(old).surfaces[0].net.poles)
     assert np.abs(nets[1].poles - nets[3].over(nets[1].u, nets[1].v).poles).max() > 1e-3
     assert all(set(part.face_colours.values()) == {"#ff0000"} for part in pads)
 
@@ -110,7 +113,7 @@ def test_faces_of_an_instance_have_the_numbers_of_its_part(mracad, samples, tmp_
         assert none.code == 2 and "no selected face" in none.err
     steps = "smooth --scale 8mm --instance 'front pair/pad left' ! smooth --scale 9mm --faces #7 --instance"
     again = mracad("pipeline", f"{steps} 'front pair/pad left'", samples / "assembly.step", "-o", out)
-    assert again.code == 0 and len([p for p in occ.read(out).parts if p.product == "pad"]) == 2
+    assert again.code == 0 and len([p for p in read(out).parts if p.product == "pad"]) == 2
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,6 @@ from OCP.BRepBuilderAPI import BRepBuilderAPI_Transform
 from OCP.gp import gp_Trsf, gp_Vec
 from OCP.TopLoc import TopLoc_Location
 
-from mracad import occ
 from mracad.bspline.surface import Net
 from mracad.constraint.cause import Cause, Still
 from mracad.constraint.coincide import TORN, coinciding, touching
@@ -17,6 +16,7 @@ from mracad.edit.smooth import smooth
 from mracad.inspect.seams import seams
 from mracad.job.document import run
 from mracad.occ.document import Document, empty
+from mracad.occ.files import read, write
 from mracad.occ.load import Text
 from mracad.occ.view import view
 from mracad.spec.steps import Smooth
@@ -62,8 +62,8 @@ def test_edges_coincide_within_the_tolerances_that_they_have():
 
 def exchanged(document, format):
     stream = io.BytesIO()
-    occ.write(document, stream, format)
-    return occ.read(Text(stream.getvalue(), "again"))
+    write(document, stream, format)
+    return read(Text(stream.getvalue(), "again"))
 
 
 @pytest.mark.parametrize("format", ["", "iges", "step"])

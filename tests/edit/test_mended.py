@@ -4,10 +4,10 @@ import json
 
 import pytest
 
-from mracad import occ
 from mracad.edit.smooth import smooth
 from mracad.inspect.seams import seams
 from mracad.job.document import run
+from mracad.occ.step import write_step
 from mracad.occ.view import view
 from mracad.spec.steps import Smooth
 from tests.edit import panels
@@ -46,7 +46,7 @@ def test_what_is_mended_needs_no_note_and_what_needs_none_is_said(patches):
 
 def test_notes_are_printed_and_reported(mracad, patches, tmp_path):
     path = tmp_path / "in.step"
-    occ.write_step(torn(patches, False), path)
+    write_step(torn(patches, False), path)
     words = ("smooth", path, "--level", "1", "--close-gaps", "--edges", "frozen", "-o", tmp_path / "out.step")
     result = mracad(*words, "--report", tmp_path / "r.json")
     assert result.code == 0 and "note: close-gaps: closed 0 of" in result.out

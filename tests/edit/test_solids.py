@@ -8,7 +8,6 @@ from OCP.BRepBuilderAPI import BRepBuilderAPI_NurbsConvert
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS
 
-from mracad import occ
 from mracad.edit.result import Reason
 from mracad.edit.smooth import smooth
 from mracad.edit.tolerances import MORE, Tolerances
@@ -16,6 +15,8 @@ from mracad.job.document import run
 from mracad.model.displacement import Displacement, Offset
 from mracad.occ.apply import apply
 from mracad.occ.check import check
+from mracad.occ.files import write
+from mracad.occ.step import read_step
 from mracad.occ.view import view
 from mracad.spec.steps import Smooth
 from samples import make
@@ -46,7 +47,7 @@ def rounded_box():
 
 
 def sample(name):
-    return lambda folder: occ.read_step(folder / f"{name}.step")
+    return lambda folder: read_step(folder / f"{name}.step")
 
 
 @pytest.mark.parametrize(
@@ -67,7 +68,7 @@ def test_solids_stay_solid_and_smooth(samples, tmp_path, source, scale):
         assert after.gap <= max(before.gap, 1e-4)
         if before.smooth:
             assert after.angle <= before.angle + 0.01
-    occ.write(document, tmp_path / "out.stl")
+    write(document, tmp_path / "out.stl")
     assert is_watertight(corners(tmp_path / "out.stl"))
 
 

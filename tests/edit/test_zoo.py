@@ -4,14 +4,16 @@ import io
 
 import pytest
 
-from mracad import occ
 from mracad.edit.feature.edits import move, repeat
 from mracad.edit.smooth import smooth
 from mracad.errors import EditError
 from mracad.inspect.seams import seams
 from mracad.job.document import run
+from mracad.occ.check import check
+from mracad.occ.files import read, write
 from mracad.occ.load import Text
 from mracad.occ.measure import mass
+from mracad.occ.view import view
 from mracad.spec.steps import Move, Repeat, Smooth
 from tests import zoo
 from tests.occ import shapes
@@ -39,9 +41,9 @@ def body(name):
 def assert_kept(document, format):
     """The file of a document, read back, is no worse than the document."""
     stream = io.BytesIO()
-    cut = occ.write(document, stream, format).cut
-    found = occ.read(Text(stream.getvalue(), "again"))
-    before, after = occ.check(document, distances=True), occ.check(found, distances=True)
+    cut = write(document, stream, format).cut
+    found = read(Text(stream.getvalue(), "again"))
+    before, after = check(document, distances=True), check(found, distances=True)
     assert after.valid or not before.valid, after.failures[:3]
     assert (after.solids, after.free_edges) == (before.solids, before.free_edges)
     assert after.faces == before.faces + sum(each.parts - 1 for each in cut)
@@ -49,7 +51,7 @@ def assert_kept(document, format):
     assert (new.volume, new.area) == pytest.approx((old.volume, old.area), rel=5e-5)
     for size in ("edge_tolerance", "vertex_tolerance", "curve_distance"):
         assert getattr(after, size) <= 1.5 * getattr(before, size) + 1e-5, size
-    ours, theirs = (seams(occ.view(each)) for each in (document, found))
+    ours, theirs = (seams(view(each)) for each in (document, found))
     assert max((m.gap for m in theirs), default=0) <= 1.5 * max((m.gap for m in ours), default=0) + 1e-5
     assert sum(m.smooth for m in theirs) >= sum(m.smooth for m in ours)
     turned = [max((m.angle for m in each if m.smooth), default=0) for each in (ours, theirs)]

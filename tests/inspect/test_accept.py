@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import sys
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -201,14 +200,13 @@ def test_a_few_seams_measure_as_all_do() -> None:
     every = seams(view(part))
     for number in (0, len(every) // 2):
         edge = every[number].edge
-        (found,) = facts(part).probe.seams([edge])
+        (found,) = seams(facts(part).probe.along([edge]))
         assert found == every[number]
 
 
-def test_a_few_edges_are_seen_without_the_true_box(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_few_edges_are_seen_without_the_true_box() -> None:
     """The box of a face needs all of its edges: of a few of them it came out without an end, and a sound file as
     damaged."""
-    part = document(body().wrapped)
+    part = document(cq.Workplane().spline([(0, 0), (1, 1), (2, 0), (1, -1)]).close().extrude(3).val().wrapped)
     whole = view(part).diagonal
-    monkeypatch.setattr(sys.modules[view.__module__], "diagonal", lambda document, model: np.inf)
-    assert whole <= view(part, edges=frozenset({0})).diagonal <= 1.01 * whole
+    assert whole <= view(part, edges=frozenset({0})).diagonal <= 1.1 * whole

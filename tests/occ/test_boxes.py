@@ -8,8 +8,8 @@ from OCP.BRepPrimAPI import BRepPrimAPI_MakeTorus
 from OCP.gp import gp_Ax1, gp_Dir, gp_Pnt, gp_Trsf
 from OCP.TopLoc import TopLoc_Location
 
-from mracad import occ
 from mracad.occ.boxes import face_boxes
+from mracad.occ.step import write_step
 from mracad.occ.view import view
 from tests.occ import shapes
 
@@ -58,7 +58,7 @@ def test_a_torus_is_as_large_as_it_is():
 
 def test_two_percent_and_info_mean_the_face_itself(mracad, tmp_path):
     path = tmp_path / "hill.step"
-    occ.write_step(shapes.document(hill(), names={0: "hill"}), path)
+    write_step(shapes.document(hill(), names={0: "hill"}), path)
     found = json.loads(mracad("info", path, "--json").out)
     size = np.linalg.norm([3.0, 3.0, HIGH * (3 / 4) ** 2])
     assert found["diagonal"] == pytest.approx(size, rel=2e-4) and found["scale"] == pytest.approx(size / 50, rel=2e-4)

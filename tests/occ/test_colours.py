@@ -17,9 +17,9 @@ from OCP.TopExp import TopExp_Explorer
 from OCP.TopLoc import TopLoc_Location
 from OCP.XCAFDoc import XCAFDoc_ColorType, XCAFDoc_DocumentTool, XCAFDoc_GraphNode
 
-from mracad import occ
 from mracad.occ.contents import contents
 from mracad.occ.document import Document, components, empty, labels, name_label
+from mracad.occ.files import read, write
 from mracad.occ.load import Text
 from tests.occ import shapes
 
@@ -94,20 +94,20 @@ def test_every_instance_has_its_colour(document):
 
 
 def again(document):
-    return occ.read(Text(written(document, "step"), "again.step"))
+    return read(Text(written(document, "step"), "again.step"))
 
 
 def written(document, format):
     stream = io.BytesIO()
-    occ.write(document, stream, format)
+    write(document, stream, format)
     return stream.getvalue()
 
 
 def test_transparency_survives_step(document):
-    (lost,) = occ.write(document, io.BytesIO(), "step").lost  # but for the one that the kernel writes without
+    (lost,) = write(document, io.BytesIO(), "step").lost  # but for the one that the kernel writes without
     assert (lost.what, lost.stated) == ("transparencies", 1)
     once = again(document)
-    assert occ.write(once, io.BytesIO(), "step").lost == ()
+    assert write(once, io.BytesIO(), "step").lost == ()
     twice = again(once)
     assert {text for _, _, text in contents(once).colours} >= {RED, GLASS, GREEN}
     assert contents(twice).colours == contents(once).colours

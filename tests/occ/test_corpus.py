@@ -14,10 +14,12 @@ from OCP.TopAbs import TopAbs_FORWARD
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS
 
-from mracad import occ
+from mracad.occ.check import check
 from mracad.occ.geometry import basis
 from mracad.occ.settings import quiet
+from mracad.occ.step import read_step, write_step
 from mracad.occ.topology import edge_uses
+from mracad.occ.view import view
 
 FOLDER = os.environ.get("MRACAD_CORPUS", "")
 FILES = sorted(Path(FOLDER).glob("*.st*p")) if FOLDER else []
@@ -31,12 +33,12 @@ def source(request):
 
 @pytest.fixture(scope="module")
 def document(source):
-    return occ.read_step(source)
+    return read_step(source)
 
 
 @pytest.fixture(scope="module")
 def model(document):
-    return occ.view(document)
+    return view(document)
 
 
 def plainly(source, target):
@@ -48,20 +50,20 @@ def plainly(source, target):
         reader.Transfer(xcaf)
         writer.Transfer(xcaf, STEPControl_AsIs)
         writer.Write(str(target))
-    return occ.read_step(target)
+    return read_step(target)
 
 
 def test_round_trip_is_as_good_as_the_kernels_own(source, document, model, tmp_path):
-    occ.write_step(document, tmp_path / "out.step")
-    again, other = occ.read_step(tmp_path / "out.step"), plainly(source, tmp_path / "plain.step")
-    first, ours, plain = (occ.check(d, distances=True) for d in (document, again, other))
+    write_step(document, tmp_path / "out.step")
+    again, other = read_step(tmp_path / "out.step"), plainly(source, tmp_path / "plain.step")
+    first, ours, plain = (check(d, distances=True) for d in (document, again, other))
     for count in ("solids", "shells", "faces", "open_shells", "free_edges"):
         assert getattr(ours, count) == getattr(first, count) == getattr(plain, count), count
     assert ours.valid == plain.valid
     for size in ("edge_tolerance", "vertex_tolerance", "curve_distance"):
         assert getattr(ours, size) <= 1.25 * getattr(plain, size) + 1e-6, size
     assert again.unit == document.unit
-    seen, expected = occ.view(again), occ.view(other)
+    seen, expected = view(again), view(other)
     assert seen.products == model.products
     for old, new, same in zip(model.faces, seen.faces, expected.faces, strict=True):
         assert new.kind == same.kind

@@ -26,10 +26,13 @@ from OCP.gp import gp_Ax1, gp_Ax2, gp_Dir, gp_Pnt, gp_Trsf, gp_Vec
 from OCP.TColgp import TColgp_Array1OfPnt
 from OCP.TopLoc import TopLoc_Location
 
-from mracad import occ
 from mracad.errors import MracadError, UsageError
 from mracad.model.displacement import Displacement, Offset
+from mracad.occ.apply import apply
+from mracad.occ.check import check
 from mracad.occ.geometry import basis, set_poles
+from mracad.occ.step import read_step, write_step
+from mracad.occ.view import view
 from tests.occ import shapes
 
 
@@ -109,7 +112,7 @@ def solid(name):
 def test_nets_are_the_kernels_own(rational):
     weights = 1 + np.random.default_rng(2).random((9, 7)) if rational else None
     document = shapes.document(shapes.face_on(shapes.bspline(shapes.wavy_poles(9, 7), weights=weights)))
-    model = occ.view(document)
+    model = view(document)
     net = model.surfaces[0].net
     assert np.array_equal(net.poles, kernel_poles(document, 0))
     assert net.u.degree == 3 and net.u.domain == (0.0, 1.0)
@@ -123,7 +126,7 @@ def test_nets_are_the_kernels_own(rational):
 def test_trimmed_and_bezier_surfaces_are_nurbs_too():
     surface = shapes.bspline(shapes.wavy_poles(9, 7))
     trimmed = shapes.face_on(Geom_RectangularTrimmedSurface(surface, 0.1, 0.6, 0.2, 0.9))
-    model = occ.view(shapes.document(trimmed, shapes.face_on(shapes.bezier(shapes.wavy_poles(5, 4)))))
+    model = view(shapes.document(trimmed, shapes.face_on(shapes.bezier(shapes.wavy_poles(5, 4)))))
     assert [face.kind for face in model.faces] == ["bspline", "bezier"]
     assert model.surfaces[0].net.poles.shape == (9, 7, 3)
     ends = np.concatenate([trim.curve.poles for trim in model.faces[0].trims])
@@ -136,14 +139,14 @@ def test_faces_on_one_handle_share_a_surface():
     surface = shapes.bspline(shapes.wavy_poles(9, 7))
     halves = shapes.face_on(surface, 0.0, 0.5, 0.0, 1.0), shapes.face_on(surface, 0.5, 1.0, 0.0, 1.0)
     other = shapes.face_on(shapes.bspline(shapes.wavy_poles(9, 7, seed=5)))
-    model = occ.view(shapes.document(shapes.compound(*halves, other)))
+    model = view(shapes.document(shapes.compound(*halves, other)))
     assert [face.surface for face in model.faces] == [0, 0, 1]
     assert model.surfaces[0].faces == (0, 1)
 
 
 @pytest.mark.parametrize("name", SOLIDS)
 def test_every_side_lies_on_its_edge_and_normals_point_out(name):
-    model = occ.view(shapes.document(solid(name)))
+    model = view(shapes.document(solid(name)))
     assert gaps(model) < 1e-6
     assert not any(edge.free for edge in model.edges)
     middle = np.mean([face.box for face in model.faces], axis=(0, 1))
@@ -153,7 +156,7 @@ def test_every_side_lies_on_its_edge_and_normals_point_out(name):
 
 
 def test_closing_and_degenerate_edges_are_flagged():
-    model = occ.view(shapes.document(solid("apex")))
+    model = view(shapes.document(solid("apex")))
     assert sum(edge.closing for edge in model.edges) == 1
     assert sum(edge.degenerate for edge in model.edges) == 1
     degenerate = next(edge for edge in model.edges if edge.degenerate)
@@ -162,29 +165,29 @@ def test_closing_and_degenerate_edges_are_flagged():
 
 def test_only_asked_poles_move_and_the_rest_keep_every_bit(tmp_path):
     surface = shapes.bspline(shapes.wavy_poles(12, 11))
-    document = occ.read_step(shapes.save(shapes.face_on(surface), tmp_path / "in.step", "INCH"))
-    model = occ.view(document)
+    document = read_step(shapes.save(shapes.face_on(surface), tmp_path / "in.step", "INCH"))
+    model = view(document)
     before = kernel_poles(document, 0)
     offset = bump(model.surfaces[0].net)
-    occ.apply(document, model, Displacement({0: offset}))
+    apply(document, model, Displacement({0: offset}))
     after = kernel_poles(document, 0)
     moved = offset.poles.any(axis=2)
     assert np.array_equal(after[~moved], before[~moved])
     assert (after - before)[moved] == pytest.approx(offset.poles[moved])
     seen = model.surfaces[0].net.poles + offset.poles
-    assert occ.view(document).surfaces[0].net.poles == pytest.approx(seen, abs=1e-12)
-    assert occ.check(document).valid
+    assert view(document).surfaces[0].net.poles == pytest.approx(seen, abs=1e-12)
+    assert check(document).valid
 
 
 def test_inserted_knots_are_exact_and_poles_line_up(tmp_path):
     weights = 1 + np.random.default_rng(2).random((9, 7))
     document = shapes.document(shapes.face_on(shapes.bspline(shapes.wavy_poles(9, 7), weights=weights)))
-    model = occ.view(document)
+    model = view(document)
     u, v = np.array([0.05, 0.05, 1 / 6]), np.array([0.3])
     fine = model.surfaces[0].net.refined(u, v)
     offset = Offset(np.zeros(fine.poles.shape), u, v)
-    occ.apply(document, model, Displacement({0: offset}))
-    net = occ.view(document).surfaces[0].net
+    apply(document, model, Displacement({0: offset}))
+    net = view(document).surfaces[0].net
     assert net.u == fine.u and net.v == fine.v
     assert net.poles == pytest.approx(fine.poles, abs=1e-13) and net.weights == pytest.approx(fine.weights, abs=1e-13)
 
@@ -192,117 +195,117 @@ def test_inserted_knots_are_exact_and_poles_line_up(tmp_path):
 @pytest.mark.parametrize("name", ["cylinder", "sphere", "torus"])
 def test_knots_go_into_periodic_surfaces(name):
     document = shapes.document(solid(name))
-    model = occ.view(document, convert=[0])
+    model = view(document, convert=[0])
     net = model.surfaces[0].net
     assert net.u.periodic
     u, v = np.array([1.0, 1.0]), np.array([sum(net.v.domain) / 2 + 0.1])
     fine = net.refined(u, v)
-    occ.apply(document, model, Displacement({0: Offset(np.zeros(fine.poles.shape), u, v)}))
-    assert occ.view(document).surfaces[0].net.poles == pytest.approx(fine.poles, abs=1e-12)
-    assert occ.check(document).valid
+    apply(document, model, Displacement({0: Offset(np.zeros(fine.poles.shape), u, v)}))
+    assert view(document).surfaces[0].net.poles == pytest.approx(fine.poles, abs=1e-12)
+    assert check(document).valid
 
 
 def test_a_bezier_face_moves_with_and_without_knots():
     for knots in (np.empty(0), np.array([0.5])):
         document = shapes.document(shapes.face_on(shapes.bezier(shapes.wavy_poles(8, 8))))
-        model = occ.view(document)
+        model = view(document)
         fine = model.surfaces[0].net.refined(knots, knots)
         offset = Offset(bump(fine).poles, knots, knots)
-        occ.apply(document, model, Displacement({0: offset}))
-        again = occ.view(document)
+        apply(document, model, Displacement({0: offset}))
+        again = view(document)
         assert again.surfaces[0].origin == ("bspline" if knots.size else "bezier")
         assert again.surfaces[0].net.poles == pytest.approx(fine.poles + offset.poles, abs=1e-12)
-        assert occ.check(document).valid and gaps(again) < 1e-9
+        assert check(document).valid and gaps(again) < 1e-9
 
 
 def test_wrong_offsets_are_refused():
     document = shapes.document(shapes.face_on(shapes.bspline(shapes.wavy_poles(9, 7))))
     with pytest.raises(MracadError, match="shape"):
-        occ.apply(document, occ.view(document), Displacement({0: Offset(np.zeros((3, 3, 3)))}))
+        apply(document, view(document), Displacement({0: Offset(np.zeros((3, 3, 3)))}))
     with pytest.raises(UsageError, match="no face #9"):
-        occ.view(document, convert=[8])
+        view(document, convert=[8])
 
 
 def test_instances_share_one_edit(tmp_path):
     face = shapes.face_on(shapes.bspline(shapes.wavy_poles(9, 9)))
     made = shapes.assembly(shapes.compound(face), placed(0, 0, 0, 0), placed(0.5, 30, 0, 0), placed(1, 60, 0, 9))
-    occ.write_step(made, tmp_path / "in.step")
-    document = occ.read_step(tmp_path / "in.step")
-    model = occ.view(document)
+    write_step(made, tmp_path / "in.step")
+    document = read_step(tmp_path / "in.step")
+    model = view(document)
     assert len(model.faces) == 1 and model.faces[0].instances == 3
     assert model.diagonal > 60
-    occ.apply(document, model, Displacement({0: bump(model.surfaces[0].net)}))
-    occ.write_step(document, tmp_path / "out.step")
-    again = occ.view(occ.read_step(tmp_path / "out.step"))
+    apply(document, model, Displacement({0: bump(model.surfaces[0].net)}))
+    write_step(document, tmp_path / "out.step")
+    again = view(read_step(tmp_path / "out.step"))
     assert again.faces[0].instances == 3
-    assert np.array_equal(again.surfaces[0].net.poles, occ.view(document).surfaces[0].net.poles)
+    assert np.array_equal(again.surfaces[0].net.poles, view(document).surfaces[0].net.poles)
 
 
 def test_a_placed_body_inside_a_part_moves_in_its_own_frame():
     face = shapes.face_on(shapes.bspline(shapes.wavy_poles(9, 9)))
     place = placed(0.8, 7, 8, 9)
     document = shapes.document(shapes.compound(face, face.Moved(place)))
-    model = occ.view(document)
+    model = view(document)
     assert [f.surface for f in model.faces] == [0, 0]
     assert not np.allclose(model.faces[1].frame, np.eye(4)) and gaps(model) < 1e-12
     offset = Offset(np.full(model.surfaces[0].net.poles.shape, 0.25))
-    occ.apply(document, model, Displacement({0: offset}))
-    again = occ.view(document)
+    apply(document, model, Displacement({0: offset}))
+    again = view(document)
     assert gaps(again) < 1e-7 and again.surfaces[0].net.poles == pytest.approx(model.surfaces[0].net.poles + 0.25)
-    assert occ.check(document).valid
+    assert check(document).valid
 
 
 @pytest.mark.parametrize("name", SOLIDS)
 def test_converted_faces_stay_valid_and_closed(name, tmp_path):
-    document = occ.read_step(shapes.save(solid(name), tmp_path / "in.step"))
-    before = occ.check(document, distances=True)
-    model = occ.view(document, convert=range(len(document.faces)))
+    document = read_step(shapes.save(solid(name), tmp_path / "in.step"))
+    before = check(document, distances=True)
+    model = view(document, convert=range(len(document.faces)))
     assert gaps(model) < 1e-6
     assert len(model.surfaces) == len(model.faces) and "bspline" not in {s.origin for s in model.surfaces}
     still = {s.index: Offset(np.zeros(s.net.poles.shape)) for s in model.surfaces}
-    occ.apply(document, model, Displacement(still))
-    occ.write_step(document, tmp_path / "out.step")
-    for after in (occ.check(document, distances=True), occ.check(occ.read_step(tmp_path / "out.step"), distances=True)):
+    apply(document, model, Displacement(still))
+    write_step(document, tmp_path / "out.step")
+    for after in (check(document, distances=True), check(read_step(tmp_path / "out.step"), distances=True)):
         assert after.valid and after.free_edges == before.free_edges == 0
         assert after.edge_tolerance <= before.edge_tolerance + 1e-6
         assert after.curve_distance <= before.curve_distance + 1e-6
-    assert {face.kind for face in occ.view(document).faces} == {"bspline"}
+    assert {face.kind for face in view(document).faces} == {"bspline"}
 
 
 def test_only_selected_faces_are_converted():
     document = shapes.document(solid("drilled"))
-    kinds = [face.kind for face in occ.view(document).faces]
+    kinds = [face.kind for face in view(document).faces]
     chosen = kinds.index("cylinder")
-    model = occ.view(document, convert=[chosen])
+    model = view(document, convert=[chosen])
     assert [face.index for face in model.faces if face.surface is not None] == [chosen]
-    assert [face.kind for face in occ.view(document).faces] == kinds
-    occ.apply(document, model, Displacement({0: Offset(np.zeros(model.surfaces[0].net.poles.shape))}))
-    assert [face.kind for face in occ.view(document).faces].count("bspline") == 1
-    assert occ.check(document).valid
+    assert [face.kind for face in view(document).faces] == kinds
+    apply(document, model, Displacement({0: Offset(np.zeros(model.surfaces[0].net.poles.shape))}))
+    assert [face.kind for face in view(document).faces].count("bspline") == 1
+    assert check(document).valid
 
 
 def test_an_offset_surface_converts():
     base = shapes.bspline(shapes.wavy_poles(9, 9))
     document = shapes.document(shapes.face_on(Geom_OffsetSurface(base, 0.2)))
-    assert occ.view(document).faces[0].kind == "offset"
-    model = occ.view(document, convert=[0])
+    assert view(document).faces[0].kind == "offset"
+    model = view(document, convert=[0])
     assert model.surfaces[0].origin == "offset" and gaps(model) < 1e-3
 
 
 @pytest.mark.parametrize("name", ["drilled", "apex", "sphere", "torus", "revolution", "placed"])
 def test_edges_follow_faces_that_move_together(name):
     document = shapes.document(solid(name))
-    model = occ.view(document, convert=range(len(document.faces)))
+    model = view(document, convert=range(len(document.faces)))
     shift = np.full(3, 0.5)
     offsets = {}
     for surface in model.surfaces:
         in_own_frame = shift @ model.faces[surface.faces[0]].frame[:3, :3]
         offsets[surface.index] = Offset(np.broadcast_to(in_own_frame, surface.net.poles.shape))
-    occ.apply(document, model, Displacement(offsets))
-    after = occ.check(document, distances=True)
+    apply(document, model, Displacement(offsets))
+    after = check(document, distances=True)
     assert after.valid and after.free_edges == 0
     assert after.edge_tolerance < 1e-6 and after.vertex_tolerance < 1e-6 and after.curve_distance < 1e-6
-    again = occ.view(document)
+    again = view(document)
     assert gaps(again) < 1e-6
     for old, new in zip(model.edges, again.edges, strict=True):
         assert new.points == pytest.approx(old.points + (not old.degenerate) * shift, abs=1e-6)
@@ -312,16 +315,16 @@ def test_edges_that_stay_are_as_loose_as_the_kernel_finds_them():
     """Their curves lie as far off as their tolerance says; the face moves by less than what edges follow for."""
     off, by = 1e-5, 9e-10
     document = shapes.document(shapes.face_on(shapes.bspline(shapes.wavy_poles(9, 9))))
-    lifted = np.add(occ.view(document).surfaces[0].net.poles, [0.0, 0.0, off])
+    lifted = np.add(view(document).surfaces[0].net.poles, [0.0, 0.0, off])
     set_poles(basis(BRep_Tool.Surface_s(document.faces[0], TopLoc_Location())), lifted)
     for edge in document.edges:
         BRep_Builder().UpdateEdge(edge, off + by / 10)
-    assert occ.check(document).valid
-    model = occ.view(document)
+    assert check(document).valid
+    model = view(document)
     curves = [BRep_Tool.Curve_s(edge, 0.0, 0.0) for edge in document.edges]
-    occ.apply(document, model, Displacement({0: Offset(np.full((9, 9, 3), [0.0, 0.0, by]))}))
+    apply(document, model, Displacement({0: Offset(np.full((9, 9, 3), [0.0, 0.0, by]))}))
     assert [BRep_Tool.Curve_s(edge, 0.0, 0.0) for edge in document.edges] == curves
-    verdict = occ.check(document)
+    verdict = check(document)
     assert verdict.valid and off < verdict.edge_tolerance < off + 2 * by
 
 
@@ -329,27 +332,27 @@ def test_a_crack_is_found():
     document = shapes.document(shapes.sewn(*(
         shapes.face_on(shapes.bspline(shapes.wavy_poles(9, 9)), *bounds) for bounds in ((0, 0.5, 0, 1), (0.5, 1, 0, 1))
     )))  # fmt: skip
-    assert occ.check(document).valid
-    model = occ.view(document)
+    assert check(document).valid
+    model = view(document)
     poles = np.zeros(model.surfaces[0].net.poles.shape)
     poles[...] = [0, 0, 0.5]
-    occ.apply(document, model, Displacement({0: Offset(poles)}))
-    verdict = occ.check(document, faces=[0], distances=True)
+    apply(document, model, Displacement({0: Offset(poles)}))
+    verdict = check(document, faces=[0], distances=True)
     assert verdict.edge_tolerance > 0.1 or not verdict.valid
 
 
 def test_check_names_what_fails():
     document = shapes.document(shapes.sewn(solid("box")), shapes.face_on(shapes.bspline(shapes.wavy_poles(9, 9))))
-    good = occ.check(document)
+    good = check(document)
     assert (good.valid, good.solids + good.shells, good.faces, good.free_edges) == (True, good.solids + 1, 7, 4)
-    model = occ.view(document)
+    model = view(document)
     poles = np.zeros(model.surfaces[0].net.poles.shape)
     poles[4, 4] = 1.0
     surface = basis(BRep_Tool.Surface_s(document.faces[6], TopLoc_Location()))
     surface.SetPole(1, 1, gp_Pnt(5, 5, 5))
-    bad = occ.check(document)
+    bad = check(document)
     assert not bad.valid
     assert {failure.face for failure in bad.failures} == {6}
     assert any(failure.kind in ("edge", "vertex") and failure.status.startswith("Invalid") for failure in bad.failures)
-    assert occ.check(document, faces=range(6)).valid
-    assert not occ.check(document, faces=[6]).valid
+    assert check(document, faces=range(6)).valid
+    assert not check(document, faces=[6]).valid

@@ -6,13 +6,15 @@ import numpy as np
 import pytest
 from mracad_cli.render import control_points
 
-from mracad import occ
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
 from mracad.errors import UsageError
 from mracad.model.displacement import Displacement, Offset
-from mracad.occ.apply import restore
+from mracad.occ.apply import apply, restore
+from mracad.occ.check import check
 from mracad.occ.geometry import nets, spline
+from mracad.occ.step import read_step, write_step
+from mracad.occ.view import view
 from tests.bspline.spaces import random_knots
 from tests.occ import shapes
 from tests.occ.test_edit import gaps, placed, solid
@@ -75,7 +77,7 @@ def raised(model, degrees=(4, 5), size=0.0):
 
 
 def seen(document, name):
-    return occ.view(document, convert=range(len(document.faces)) if name in SOLIDS else ())
+    return view(document, convert=range(len(document.faces)) if name in SOLIDS else ())
 
 
 def placed_points(model, face):
@@ -117,11 +119,11 @@ def test_an_elevated_surface_is_the_same_in_memory_and_in_the_file(name, tmp_pat
     document = beds(name)
     if name in SOLIDS:
         model = seen(document, name)
-        occ.apply(document, model, Displacement({s.index: Offset(np.zeros(s.net.poles.shape)) for s in model.surfaces}))
-    model = occ.view(document)
+        apply(document, model, Displacement({s.index: Offset(np.zeros(s.net.poles.shape)) for s in model.surfaces}))
+    model = view(document)
     change = raised(model)
-    occ.apply(document, model, change)
-    after = occ.view(document)
+    apply(document, model, change)
+    after = view(document)
     for old, new in zip(model.surfaces, after.surfaces, strict=True):
         fine = change.offsets[old.index].over(old.net)
         assert (new.net.u, new.net.v) == (fine.u, fine.v) and (fine.u.degree, fine.v.degree) == (4, 5)
@@ -132,11 +134,11 @@ def test_an_elevated_surface_is_the_same_in_memory_and_in_the_file(name, tmp_pat
         for a, b in zip(old.sides, new.sides, strict=True):
             assert a.face == b.face and (a.uv is None or np.array_equal(a.uv, b.uv))
     assert_same_shape(model, after)
-    assert occ.check(document).valid
-    occ.write_step(document, tmp_path / "out.step")
-    again = occ.read_step(tmp_path / "out.step")
-    assert_same_shape(after, occ.view(again))
-    assert occ.check(again).valid
+    assert check(document).valid
+    write_step(document, tmp_path / "out.step")
+    again = read_step(tmp_path / "out.step")
+    assert_same_shape(after, view(again))
+    assert check(again).valid
 
 
 @pytest.mark.parametrize("name", [*SHEETS, "cylinder"])
@@ -144,35 +146,35 @@ def test_an_elevated_surface_moves_and_is_restored(name, tmp_path):
     document = beds(name)
     model = seen(document, name)
     change = raised(model, size=0.01)
-    occ.apply(document, model, change)
+    apply(document, model, change)
     wanted = change.applied(model)
-    after = occ.view(document)
+    after = view(document)
     for old, new in zip(wanted.surfaces, after.surfaces, strict=True):
         assert np.array_equal(new.net.poles, old.net.poles)
-    assert occ.check(document).valid
-    occ.write_step(document, tmp_path / "out.step")
-    again = occ.read_step(tmp_path / "out.step")
-    assert_same_shape(after, occ.view(again))
-    assert occ.check(again).valid
+    assert check(document).valid
+    write_step(document, tmp_path / "out.step")
+    again = read_step(tmp_path / "out.step")
+    assert_same_shape(after, view(again))
+    assert check(again).valid
     restore(document, model, change)
-    for old, new in zip(model.surfaces, occ.view(document).surfaces, strict=True):
+    for old, new in zip(model.surfaces, view(document).surfaces, strict=True):
         assert (new.net.u, new.net.v) == (old.net.u, old.net.v)
         assert np.array_equal(new.net.poles, old.net.poles)
         assert old.net.weights is None or np.array_equal(new.net.weights, old.net.weights)
-    assert occ.check(document).valid
+    assert check(document).valid
 
 
 def test_instances_share_a_higher_degree(tmp_path):
     made = shapes.assembly(
         shapes.compound(shapes.face_on(spline(SHEETS["ruled"]))), placed(0, 0, 0, 0), placed(0.5, 60, 0, 0)
     )
-    occ.write_step(made, tmp_path / "in.step")
-    document = occ.read_step(tmp_path / "in.step")
-    model = occ.view(document)
+    write_step(made, tmp_path / "in.step")
+    document = read_step(tmp_path / "in.step")
+    model = view(document)
     change = raised(model, size=0.01)
-    occ.apply(document, model, change)
-    occ.write_step(document, tmp_path / "out.step")
-    again = occ.view(occ.read_step(tmp_path / "out.step"))
+    apply(document, model, change)
+    write_step(document, tmp_path / "out.step")
+    again = view(read_step(tmp_path / "out.step"))
     assert [face.instances for face in again.faces] == [2]
     np.testing.assert_allclose(
         again.surfaces[0].net.poles, change.applied(model).surfaces[0].net.poles, rtol=0, atol=1e-12 * SIZE
@@ -182,29 +184,29 @@ def test_instances_share_a_higher_degree(tmp_path):
 def test_an_edge_without_a_curve_in_space_keeps_its_range(tmp_path):
     tip = sheet(even(5, 2), even(4, 2))
     tip.poles[0] = [-3, 9, 0]
-    document = occ.read_step(shapes.save(shapes.face_on(spline(tip)), tmp_path / "in.step"))
-    model = occ.view(document)
+    document = read_step(shapes.save(shapes.face_on(spline(tip)), tmp_path / "in.step"))
+    model = view(document)
     assert any(edge.degenerate for edge in model.edges)
     change = raised(model)
-    for step in (occ.apply, restore):
+    for step in (apply, restore):
         step(document, model, change)
-        for old, new in zip(model.edges, occ.view(document).edges, strict=True):
+        for old, new in zip(model.edges, view(document).edges, strict=True):
             assert all(np.array_equal(a.uv, b.uv) for a, b in zip(old.sides, new.sides, strict=True))
-        assert occ.check(document).valid
+        assert check(document).valid
 
 
 def test_a_bezier_face_is_elevated_too():
     document = shapes.document(shapes.face_on(shapes.bezier(shapes.wavy_poles(3, 2))))
-    model = occ.view(document)
+    model = view(document)
     change = raised(model, size=0.1)
-    occ.apply(document, model, change)
-    (surface,) = occ.view(document).surfaces
+    apply(document, model, change)
+    (surface,) = view(document).surfaces
     assert np.array_equal(surface.net.poles, change.applied(model).surfaces[0].net.poles)
-    assert surface.origin == "bspline" and occ.check(document).valid
+    assert surface.origin == "bspline" and check(document).valid
 
 
 def test_offsets_keep_their_degrees_and_are_counted():
-    model = occ.view(beds("ruled"))
+    model = view(beds("ruled"))
     change = raised(model, size=0.5)
     assert change.scaled(0.5).offsets[0].degrees == (4, 5)
     net = model.surfaces[0].net
@@ -216,7 +218,7 @@ def test_offsets_keep_their_degrees_and_are_counted():
 
 def test_a_degree_beyond_the_kernel_is_refused_before_anything_moves():
     document = beds("ruled")
-    model = occ.view(document)
+    model = view(document)
     with pytest.raises(UsageError, match="degree 26"):
-        occ.apply(document, model, raised(model, (26, 3)))
-    assert np.array_equal(occ.view(document).surfaces[0].net.poles, model.surfaces[0].net.poles)
+        apply(document, model, raised(model, (26, 3)))
+    assert np.array_equal(view(document).surfaces[0].net.poles, model.surfaces[0].net.poles)

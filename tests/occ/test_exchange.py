@@ -12,9 +12,12 @@ from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox, BRepPrimAPI_MakeCylinder
 from OCP.gp import gp_Trsf, gp_Vec
 from OCP.TopLoc import TopLoc_Location
 
-from mracad import occ
 from mracad.errors import FileError, UsageError
+from mracad.occ.check import check
+from mracad.occ.files import write
 from mracad.occ.part21 import tidy
+from mracad.occ.step import read_step, write_step
+from mracad.occ.view import view
 from tests.occ import shapes
 
 POINT = re.compile(rb"CARTESIAN_POINT\s*\(\s*'[^']*'\s*,\s*\(([^)]*)\)")
@@ -40,25 +43,25 @@ def wavy(tmp_path):
 def test_numbers_return_bit_identical_in_every_unit(tmp_path, unit):
     surface = shapes.bspline(shapes.wavy_poles(9, 7))
     source = shapes.save(shapes.face_on(surface), tmp_path / "in.step", unit)
-    document = occ.read_step(source)
-    occ.write_step(document, tmp_path / "out.step")
+    document = read_step(source)
+    write_step(document, tmp_path / "out.step")
     if unit == "MM":
         assert points(source) <= points(tmp_path / "out.step")
-    again = occ.read_step(tmp_path / "out.step")
+    again = read_step(tmp_path / "out.step")
     assert again.unit == document.unit
-    poles = occ.view(again).surfaces[0].net.poles
-    assert np.array_equal(poles, occ.view(document).surfaces[0].net.poles)
+    poles = view(again).surfaces[0].net.poles
+    assert np.array_equal(poles, view(document).surfaces[0].net.poles)
     assert poles == pytest.approx(shapes.wavy_poles(9, 7), abs=1e-8)
 
 
 def test_input_unit_corrects_a_wrong_unit(wavy, tmp_path):
-    right, wrong = occ.read_step(wavy), occ.read_step(wavy, "in")
+    right, wrong = read_step(wavy), read_step(wavy, "in")
     assert wrong.unit == "in"
-    a, b = occ.view(right), occ.view(wrong)
+    a, b = view(right), view(wrong)
     assert b.surfaces[0].net.poles == pytest.approx(25.4 * a.surfaces[0].net.poles, rel=1e-15)
     assert b.diagonal == pytest.approx(25.4 * a.diagonal)
-    occ.write_step(wrong, tmp_path / "out.step")
-    again = occ.view(occ.read_step(tmp_path / "out.step"))
+    write_step(wrong, tmp_path / "out.step")
+    again = view(read_step(tmp_path / "out.step"))
     assert np.array_equal(again.surfaces[0].net.poles, b.surfaces[0].net.poles)
     assert again.diagonal == pytest.approx(b.diagonal)
 
@@ -67,12 +70,12 @@ def test_dimensions_keep_a_file_in_plain_millimetres(tmp_path):
     source = shapes.save(shapes.face_on(shapes.bspline(shapes.wavy_poles(9, 7))), tmp_path / "in.step", "INCH")
     source.write_bytes(source.read_bytes().replace(b"DATA;", b"DATA; /* DIMENSIONAL_SIZE */"))
     for override, factor in ((None, 1.0), ("in", 1.0), ("mm", 1 / 25.4)):
-        document = occ.read_step(source, override)
+        document = read_step(source, override)
         assert document.unit == "mm"
-        poles = occ.view(document).surfaces[0].net.poles
+        poles = view(document).surfaces[0].net.poles
         assert poles == pytest.approx(factor * shapes.wavy_poles(9, 7), abs=1e-9)
-        occ.write_step(document, tmp_path / "out.step")
-        assert occ.view(occ.read_step(tmp_path / "out.step")).surfaces[0].net.poles == pytest.approx(poles, abs=1e-12)
+        write_step(document, tmp_path / "out.step")
+        assert view(read_step(tmp_path / "out.step")).surfaces[0].net.poles == pytest.approx(poles, abs=1e-12)
 
 
 def test_files_that_mix_units_are_held_in_millimetres(wavy):
@@ -83,26 +86,26 @@ def test_files_that_mix_units_are_held_in_millimetres(wavy):
         b"REPRESENTATION_CONTEXT('',''));"
     )
     mixed = text.replace(b"ENDSEC;\nEND-ISO", other + b"ENDSEC;\nEND-ISO")
-    assert occ.read_step(io.BytesIO(mixed)).unit == "mm"
+    assert read_step(io.BytesIO(mixed)).unit == "mm"
     with pytest.raises(UsageError, match="mixes"):
-        occ.read_step(io.BytesIO(mixed), "in")
+        read_step(io.BytesIO(mixed), "in")
 
 
 def test_unknown_unit_is_a_usage_error(wavy):
     with pytest.raises(UsageError, match="parsec"):
-        occ.read_step(wavy, "parsec")
+        read_step(wavy, "parsec")
 
 
 def test_reads_a_stream_and_a_file_with_an_odd_name(wavy, tmp_path):
     odd = tmp_path / "naïve 部品 #1 (copy)'s.step"
     odd.write_bytes(wavy.read_bytes())
-    assert occ.read_step(odd).name == odd.name
-    assert len(occ.read_step(io.BytesIO(wavy.read_bytes())).faces) == 1
+    assert read_step(odd).name == odd.name
+    assert len(read_step(io.BytesIO(wavy.read_bytes())).faces) == 1
     stream = io.BytesIO()
-    occ.write_step(occ.read_step(odd), stream)
+    write_step(read_step(odd), stream)
     assert stream.getvalue().startswith(b"ISO-10303-21;")
-    occ.write_step(occ.read_step(odd), odd, options_text="C:\\temp 'ø'")
-    assert len(occ.read_step(odd).faces) == 1
+    write_step(read_step(odd), odd, options_text="C:\\temp 'ø'")
+    assert len(read_step(odd).faces) == 1
     head = odd.read_bytes().split(b"DATA;")[0]
     assert b"na\\X2\\00EF\\X0\\ve" in head and b"(copy)''s.step" in head and b"C:\\\\temp ''\\X2\\00F8\\X0\\''" in head
 
@@ -122,30 +125,30 @@ def test_bad_inputs_say_what_is_wrong(wavy, tmp_path):
         if content is not None:
             (tmp_path / name).write_bytes(content)
         with pytest.raises(FileError, match=reason) as error:
-            occ.read_step(tmp_path / name)
+            read_step(tmp_path / name)
         assert name in error.value.message and error.value.hint and "\n" not in str(error.value)
     with pytest.raises(FileError, match="folder"):
-        occ.read_step(tmp_path)
+        read_step(tmp_path)
 
 
 def test_unwritable_targets_leave_nothing_behind(wavy, tmp_path):
-    document = occ.read_step(wavy)
+    document = read_step(wavy)
     (tmp_path / "taken").mkdir()
     for target in (tmp_path / "nowhere" / "out.step", tmp_path / "taken"):
         with pytest.raises(FileError, match="cannot write"):
-            occ.write_step(document, target)
+            write_step(document, target)
     with pytest.raises(UsageError, match="AP999"):
-        occ.write_step(document, tmp_path / "out.step", schema="AP999")
+        write_step(document, tmp_path / "out.step", schema="AP999")
     assert sorted(p.name for p in tmp_path.iterdir()) == ["taken", "wavy.step"]
 
 
 def test_nothing_is_printed(wavy, tmp_path, capfd):
-    document = occ.read_step(wavy)
-    occ.check(document, distances=True)
-    occ.write_step(document, tmp_path / "out.step")
-    occ.write(document, tmp_path / "out.stl")
+    document = read_step(wavy)
+    check(document, distances=True)
+    write_step(document, tmp_path / "out.step")
+    write(document, tmp_path / "out.stl")
     with pytest.raises(FileError):
-        occ.read_step(shapes.save(shapes.compound(), tmp_path / "none.step"))
+        read_step(shapes.save(shapes.compound(), tmp_path / "none.step"))
     captured = capfd.readouterr()
     assert captured.out == "" and captured.err == ""
 
@@ -153,11 +156,11 @@ def test_nothing_is_printed(wavy, tmp_path, capfd):
 def test_same_bytes_every_time_and_in_every_process(tmp_path):
     box, bar = BRepPrimAPI_MakeBox(1, 2, 3).Shape(), BRepPrimAPI_MakeCylinder(1, 5).Shape()
     source = tmp_path / "in.step"
-    occ.write_step(shapes.assembly(shapes.compound(box, bar.Moved(far(9))), far(), far(0, 30), far(0, 0, 40)), source)
+    write_step(shapes.assembly(shapes.compound(box, bar.Moved(far(9))), far(), far(0, 30), far(0, 0, 40)), source)
     script = (
-        "import sys; from mracad import occ\n"
+        "import sys; from mracad.occ.step import read_step, write_step\n"
         "for target in sys.argv[2:]:\n"
-        "    occ.write_step(occ.read_step(sys.argv[1]), target, options_text='smooth --scale 5')\n"
+        "    write_step(read_step(sys.argv[1]), target, options_text='smooth --scale 5')\n"
     )
     for folder in ("one", "two"):
         (tmp_path / folder).mkdir()
@@ -166,14 +169,17 @@ def test_same_bytes_every_time_and_in_every_process(tmp_path):
     first, second = ((tmp_path / folder / "out.step").read_bytes() for folder in ("one", "two"))
     assert first == second
     for _ in range(30):  # the kernel's own counts grow by digits
-        occ.write_step(occ.read_step(source), tmp_path / "out.step", options_text="smooth --scale 5")
+        write_step(read_step(source), tmp_path / "out.step", options_text="smooth --scale 5")
         assert (tmp_path / "out.step").read_bytes() == first
     assert b"smooth --scale 5" in first and b"1970-01-01T00:00:00" in first
     assert str(tmp_path).encode() not in first and b"Open CASCADE STEP translator" not in first
 
 
 def test_coloured_parts_come_in_one_order_in_any_process(samples):
-    script = "import sys; from mracad import occ; occ.write_step(occ.read_step(sys.argv[1]), sys.stdout.buffer)"
+    script = (
+        "import sys; from mracad.occ.step import read_step, write_step\n"
+        "write_step(read_step(sys.argv[1]), sys.stdout.buffer)"
+    )
     command = [sys.executable, "-c", script, str(samples / "assembly.step")]
     running = [
         subprocess.Popen(command, stdout=subprocess.PIPE, env={**os.environ, "PYTHONHASHSEED": seed}) for seed in "0123"
@@ -195,21 +201,21 @@ def test_the_order_of_styles_does_not_depend_on_the_order_they_were_written_in()
 
 def test_header_time_follows_source_date_epoch(wavy, tmp_path, monkeypatch):
     monkeypatch.setenv("SOURCE_DATE_EPOCH", "1000000000")
-    occ.write_step(occ.read_step(wavy), tmp_path / "out.step")
+    write_step(read_step(wavy), tmp_path / "out.step")
     assert b"2001-09-09T01:46:40" in (tmp_path / "out.step").read_bytes()
     monkeypatch.setenv("SOURCE_DATE_EPOCH", "yesterday")
     with pytest.raises(UsageError, match="yesterday"):
-        occ.write_step(occ.read_step(wavy), tmp_path / "other.step")
+        write_step(read_step(wavy), tmp_path / "other.step")
     assert not (tmp_path / "other.step").exists()
 
 
 @pytest.mark.parametrize("schema, default", [("AP203", "AP214"), ("AP214", "AP214"), ("AP242", "AP242")])
 def test_schema_is_what_was_asked_or_fits_the_file(wavy, tmp_path, schema, default):
-    occ.write_step(occ.read_step(wavy), tmp_path / "out.step", schema=schema)
-    again = occ.read_step(tmp_path / "out.step")
+    write_step(read_step(wavy), tmp_path / "out.step", schema=schema)
+    again = read_step(tmp_path / "out.step")
     assert again.schema == schema
-    occ.write_step(again, tmp_path / "again.step")
-    assert occ.read_step(tmp_path / "again.step").schema == default
+    write_step(again, tmp_path / "again.step")
+    assert read_step(tmp_path / "again.step").schema == default
 
 
 def test_reals_are_valid_step_reals(tmp_path):
@@ -217,7 +223,7 @@ def test_reals_are_valid_step_reals(tmp_path):
     poles[0, 0] = [0.0, -3.0, 1e-7]
     poles[0, 1] = [1e22, -1.5e-120, 1e-5]
     document = shapes.document(shapes.face_on(shapes.bspline(poles)))
-    occ.write_step(document, tmp_path / "out.step")
+    write_step(document, tmp_path / "out.step")
     for match in POINT.finditer((tmp_path / "out.step").read_bytes()):
         for number in match[1].replace(b"\n", b"").replace(b" ", b"").split(b","):
             assert re.fullmatch(rb"-?\d+\.\d*(E[-+]?\d+)?", number), number
@@ -228,9 +234,9 @@ def test_reals_are_valid_step_reals(tmp_path):
 def test_names_and_colours_survive_and_are_seen(tmp_path):
     box, bar = BRepPrimAPI_MakeBox(1, 2, 3).Shape(), BRepPrimAPI_MakeCylinder(1, 5).Shape()
     made = shapes.document(box, bar, names={0: "Bügel 1.50", 1: "bar"}, colours={0: "#ff8000"})
-    occ.write_step(made, tmp_path / "one.step")
-    occ.write_step(occ.read_step(tmp_path / "one.step"), tmp_path / "two.step")
-    model = occ.view(occ.read_step(tmp_path / "two.step"))
+    write_step(made, tmp_path / "one.step")
+    write_step(read_step(tmp_path / "one.step"), tmp_path / "two.step")
+    model = view(read_step(tmp_path / "two.step"))
     assert model.products == ("Bügel 1.50", "bar")
     assert {face.colour for face in model.faces if face.product == "bar"} == {""}
     assert {face.colour for face in model.faces if face.product != "bar"} == {"#ff8000"}
@@ -239,8 +245,8 @@ def test_names_and_colours_survive_and_are_seen(tmp_path):
 def test_face_names_survive(wavy, tmp_path):
     named = tmp_path / "named.step"
     named.write_bytes(re.sub(rb"ADVANCED_FACE\(''", b"ADVANCED_FACE('top 2.50'", wavy.read_bytes()))
-    occ.write_step(occ.read_step(named), tmp_path / "out.step")
-    assert occ.view(occ.read_step(tmp_path / "out.step")).faces[0].name == "top 2.50"
+    write_step(read_step(named), tmp_path / "out.step")
+    assert view(read_step(tmp_path / "out.step")).faces[0].name == "top 2.50"
 
 
 def test_importing_mracad_loads_no_kernel():

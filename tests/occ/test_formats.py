@@ -9,11 +9,13 @@ import numpy as np
 import pytest
 import trimesh
 
-from mracad import occ
 from mracad.errors import FileError
 from mracad.formats import FORMATS
+from mracad.occ.check import check
+from mracad.occ.files import read, write
 from mracad.occ.load import Text
 from mracad.occ.measure import mass
+from mracad.occ.view import view
 
 EXACT = [name for name, format in FORMATS.items() if format.kind == "exact"]
 MESHES = [name for name, format in FORMATS.items() if format.kind == "mesh"]
@@ -21,21 +23,21 @@ MESHES = [name for name, format in FORMATS.items() if format.kind == "mesh"]
 
 def written(document, format, **options):
     stream = io.BytesIO()
-    assert occ.write(document, stream, format, **options).lost == ()
+    assert write(document, stream, format, **options).lost == ()
     return stream.getvalue()
 
 
 def again(document, format, input_unit=None):
-    return occ.read(Text(written(document, format), "again"), input_unit)
+    return read(Text(written(document, format), "again"), input_unit)
 
 
 @pytest.mark.parametrize("format", EXACT)
 @pytest.mark.parametrize("name", ["blade", "trimmed"])
 def test_exact_formats_keep_every_pole_knot_and_weight(samples, name, format):
-    document = occ.read(samples / f"{name}.step")
+    document = read(samples / f"{name}.step")
     found = again(document, format)
-    old, new = occ.view(document), occ.view(found)
-    assert found.unit == "mm" and occ.check(found).valid and occ.check(found).solids == 1
+    old, new = view(document), view(found)
+    assert found.unit == "mm" and check(found).valid and check(found).solids == 1
     assert [face.kind for face in new.faces] == [face.kind for face in old.faces]
     assert len(new.surfaces) == len(old.surfaces)
     for a, b in zip(old.surfaces, new.surfaces, strict=True):
@@ -47,32 +49,32 @@ def test_exact_formats_keep_every_pole_knot_and_weight(samples, name, format):
 
 @pytest.mark.parametrize("format", EXACT)
 def test_an_assembly_in_inches(samples, format):
-    document = occ.read(samples / "assembly.step")
+    document = read(samples / "assembly.step")
     found = again(document, format)
     old, new = mass(document), mass(found)
     assert found.unit == ("in" if format in ("step", "iges") else "mm")
     assert (new.volume, new.area) == pytest.approx((old.volume, old.area), rel=1e-9)
     assert new.centre == pytest.approx(old.centre, abs=1e-9)
-    assert occ.check(found).solids == (6 if format == "iges" else 3) and occ.check(found).valid
+    assert check(found).solids == (6 if format == "iges" else 3) and check(found).valid
     if format == "iges":  # which knows no instances
-        assert {face.colour for face in occ.view(found).faces} == {face.colour for face in occ.view(document).faces}
+        assert {face.colour for face in view(found).faces} == {face.colour for face in view(document).faces}
     else:
         assert [len(part.placements) for part in found.parts] == [len(part.placements) for part in document.parts]
 
 
 @pytest.mark.parametrize("format", EXACT)
 def test_the_unit_of_the_input_can_be_corrected(samples, format):
-    document = occ.read(samples / "blade.step")
+    document = read(samples / "blade.step")
     found = again(document, format, "in")
     assert found.unit == "in"
-    assert occ.view(found).surfaces[0].net.poles == pytest.approx(25.4 * occ.view(document).surfaces[0].net.poles)
+    assert view(found).surfaces[0].net.poles == pytest.approx(25.4 * view(document).surfaces[0].net.poles)
     assert again(found, "iges").unit == "in"
 
 
 @pytest.mark.parametrize("name", ["assembly", "trimmed", "bottle"])
 def test_meshes_are_closed_and_fill_the_volume(samples, name):
-    document = occ.read(samples / f"{name}.step")
-    model, whole = occ.view(document), mass(document)
+    document = read(samples / f"{name}.step")
+    model, whole = view(document), mass(document)
     for format in MESHES:
         scale = 1e-3 if format in ("gltf", "glb") else 1.0
         options = {"merge_primitives": True} if scale != 1.0 else {}
@@ -94,7 +96,7 @@ def test_colours_transparency_and_the_tree_reach_the_mesh(samples):
 
     from tests.occ import shapes
 
-    document = occ.read(samples / "assembly.step")
+    document = read(samples / "assembly.step")
     scene = trimesh.load_scene(io.BytesIO(written(document, "glb")), file_type="glb", merge_primitives=True)
     assert {"fixture", "base"} <= set(scene.graph.nodes)
     made = shapes.document(BRepPrimAPI_MakeBox(1, 2, 3).Shape())
@@ -103,14 +105,14 @@ def test_colours_transparency_and_the_tree_reach_the_mesh(samples):
     tool.SetColor(made.parts[0].label, colour, XCAFDoc_ColorType.XCAFDoc_ColorSurf)
     made = again(made, "step")
     assert b'"#ff800040"' in written(made, "glb") and b"BLEND" in written(made, "glb")
-    assert {face.colour for face in occ.view(made).faces} == {"#ff800040"}
+    assert {face.colour for face in view(made).faces} == {"#ff800040"}
 
 
 SCRIPT = """
-import sys; from mracad import occ
+import sys; from mracad.occ.files import read, write
 from mracad.formats import FORMATS
-document = occ.read(sys.argv[1])
-for format in FORMATS: occ.write(document, sys.stdout.buffer, format)
+document = read(sys.argv[1])
+for format in FORMATS: write(document, sys.stdout.buffer, format)
 """
 
 
@@ -129,7 +131,7 @@ def test_the_same_bytes_in_every_process(samples):
 
 def test_the_header_of_iges(samples, monkeypatch):
     monkeypatch.setenv("SOURCE_DATE_EPOCH", "86400")
-    data = written(occ.read(samples / "bottle.step"), "iges", options_text="smooth --scale 5mm")
+    data = written(read(samples / "bottle.step"), "iges", options_text="smooth --scale 5mm")
     assert data.startswith(b"smooth --scale 5mm ") and data.count(b"15H19700102.000000") == 2
     head = data.partition(b"D0000001")[0]
     assert b"Hmracad " in head and b"11Hbottle.step" in head and str(samples).encode() not in head
@@ -138,7 +140,7 @@ def test_the_header_of_iges(samples, monkeypatch):
 @pytest.mark.parametrize("format", EXACT)
 @pytest.mark.parametrize("damage", ["empty", "cut", "other"])
 def test_damaged_files(mracad, samples, tmp_path, format, damage):
-    data = written(occ.read(samples / "trimmed.step"), format)
+    data = written(read(samples / "trimmed.step"), format)
     if damage == "cut":
         data = data[: len(data) // 3]
     elif damage == "empty":

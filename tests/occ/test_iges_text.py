@@ -6,8 +6,9 @@ from collections import defaultdict
 import numpy as np
 import pytest
 
-from mracad import occ
+from mracad.occ.files import read, write
 from mracad.occ.load import Text
+from mracad.occ.view import view
 from tests.occ import shapes
 
 BEHIND = {b"126": 5, b"128": 4}  # limits, and for a curve its normal
@@ -38,10 +39,10 @@ def without_limits(text, kind, blank):
 def test_splines_without_limits_have_the_range_of_their_knots(kind, blank, bounds):
     face = shapes.face_on(shapes.bspline(shapes.wavy_poles(9, 7)), *bounds)
     stream = io.BytesIO()
-    occ.write(shapes.document(face), stream, "iges")
-    right = occ.view(occ.read(Text(stream.getvalue(), "right.igs")))
-    document = occ.read(Text(without_limits(stream.getvalue(), kind, blank), "x.igs"))
-    model = occ.view(document)
+    write(shapes.document(face), stream, "iges")
+    right = view(read(Text(stream.getvalue(), "right.igs")))
+    document = read(Text(without_limits(stream.getvalue(), kind, blank), "x.igs"))
+    model = view(document)
     assert np.array_equal(model.surfaces[0].net.poles, right.surfaces[0].net.poles)
     assert model.diagonal == right.diagonal and len(model.edges) == len(right.edges)
     assert "without limits" in document.warnings[0]

@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox, BRepPrimAPI_MakeSphere
 
-from mracad import occ
 from mracad.errors import FileError, UsageError
 from mracad.inspect import accept
 from mracad.occ import scene as scenes
-from mracad.occ.files import Lost
+from mracad.occ.files import Lost, write
+from mracad.occ.select import select_cq
+from mracad.occ.step import read_step
+from mracad.occ.view import view
 from tests.occ import shapes
 
 
@@ -35,8 +37,8 @@ def is_watertight(triangles):
 
 @pytest.mark.parametrize("unit", ["MM", "M"])
 def test_a_box_is_watertight_and_in_millimetres(tmp_path, unit):
-    document = occ.read_step(shapes.save(BRepPrimAPI_MakeBox(1, 2, 3).Shape(), tmp_path / "in.step", unit))
-    assert occ.write(document, tmp_path / "out.stl").lost == ()
+    document = read_step(shapes.save(BRepPrimAPI_MakeBox(1, 2, 3).Shape(), tmp_path / "in.step", unit))
+    assert write(document, tmp_path / "out.stl").lost == ()
     triangles = corners(tmp_path / "out.stl")
     assert is_watertight(triangles) and len(triangles) == 12
     assert triangles.reshape(-1, 3).max(axis=0) == pytest.approx([1, 2, 3], rel=1e-6)
@@ -46,14 +48,14 @@ def test_finer_settings_give_more_triangles_and_text_says_the_same(tmp_path):
     document = shapes.document(BRepPrimAPI_MakeSphere(5).Shape())
     sizes = []
     for chord, angle in ((0.5, 40), (0.05, 40), (0.05, 5), (None, None)):
-        occ.write(document, tmp_path / "out.stl", chord=chord, angle=angle)
+        write(document, tmp_path / "out.stl", chord=chord, angle=angle)
         sizes.append(len(corners(tmp_path / "out.stl")))
         assert is_watertight(corners(tmp_path / "out.stl"))
     assert sizes[0] < sizes[1] < sizes[2]
     first = (tmp_path / "out.stl").read_bytes()
-    occ.write(document, tmp_path / "out.stl")
+    write(document, tmp_path / "out.stl")
     assert (tmp_path / "out.stl").read_bytes() == first
-    occ.write(document, tmp_path / "text.stl", ascii=True)
+    write(document, tmp_path / "text.stl", ascii=True)
     text = (tmp_path / "text.stl").read_text()
     assert text.startswith("solid mracad\n") and text.count("facet normal") == sizes[3]
 
@@ -61,7 +63,7 @@ def test_finer_settings_give_more_triangles_and_text_says_the_same(tmp_path):
 def test_a_face_that_cannot_be_meshed_is_named(tmp_path):
     box = BRepPrimAPI_MakeBox(1, 2, 3).Shape()
     bare = shapes.document(box).faces[2].EmptyCopied()  # no boundary at all
-    assert occ.write(shapes.document(shapes.compound(box, bare)), tmp_path / "out.stl").lost == (
+    assert write(shapes.document(shapes.compound(box, bare)), tmp_path / "out.stl").lost == (
         Lost("faces", 7, 6, ("#7",)),
     )
 
@@ -82,7 +84,7 @@ def test_a_closed_body_whose_mesh_is_open_is_told(monkeypatch):
     faces = shapes.document(box).faces
     assert scenes.scene(shapes.document(shapes.compound(*faces)))[2] == ()
     stream = io.BytesIO()
-    found = accept.meshed(occ.write(shapes.document(box), stream, "stl").open, before=(2, 4))
+    found = accept.meshed(write(shapes.document(box), stream, "stl").open, before=(2, 4))
     assert (
         not found.valid
         and [f.faces for f in found.faults] == [(0, 1, 5)]
@@ -94,17 +96,17 @@ def test_bad_settings_and_targets(tmp_path):
     document = shapes.document(BRepPrimAPI_MakeSphere(5).Shape())
     for wrong in ({"chord": 0.0}, {"angle": -1.0}, {"chord": float("nan")}):
         with pytest.raises(UsageError, match="positive"):
-            occ.write(document, tmp_path / "out.stl", **wrong)
+            write(document, tmp_path / "out.stl", **wrong)
     with pytest.raises(FileError, match="cannot write"):
-        occ.write(document, tmp_path / "nowhere" / "out.stl")
+        write(document, tmp_path / "nowhere" / "out.stl")
     assert not list(tmp_path.iterdir())
 
 
 def test_cadquery_selectors():
     document = shapes.document(BRepPrimAPI_MakeBox(1, 2, 3).Shape())
-    boxes = [face.box for face in occ.view(document).faces]
-    (top,) = occ.select_cq(document, ">Z")
+    boxes = [face.box for face in view(document).faces]
+    (top,) = select_cq(document, ">Z")
     assert boxes[top][0, 2] == pytest.approx(3, abs=1e-6)
-    assert len(occ.select_cq(document, "|Z")) == 2
+    assert len(select_cq(document, "|Z")) == 2
     with pytest.raises(UsageError, match="selector"):
-        occ.select_cq(document, ">>nonsense<<")
+        select_cq(document, ">>nonsense<<")

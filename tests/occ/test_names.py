@@ -12,11 +12,11 @@ from OCP.TopExp import TopExp_Explorer
 from OCP.TopLoc import TopLoc_Location
 from OCP.XCAFDoc import XCAFDoc_DocumentTool
 
-from mracad import occ
 from mracad.errors import UsageError
 from mracad.occ.charset import detect
 from mracad.occ.contents import contents
 from mracad.occ.document import components, label_name, labels, name_label, named_labels
+from mracad.occ.files import read, write
 from mracad.occ.literals import decoded, encoded
 from mracad.occ.load import Text
 from tests.occ import shapes
@@ -51,7 +51,7 @@ def words_step():
 
 def written(document):
     stream = io.BytesIO()
-    occ.write(document, stream)
+    write(document, stream)
     return stream.getvalue()
 
 
@@ -74,24 +74,24 @@ def said(document):
 @pytest.mark.parametrize("encoding", TEXTS)
 def test_texts_in_any_character_set(encoding):
     raw = put(words_step(), TEXTS[encoding], encoding)
-    document = occ.read(Text(raw, "names.step"))
+    document = read(Text(raw, "names.step"))
     assert said(document) == TEXTS[encoding]
     assert bool(document.warnings) == (encoding != "utf-8")  # a guess is said to be one
     text = written(document)
     assert text.isascii()
-    again = occ.read(Text(text, "again.step"))
+    again = read(Text(text, "again.step"))
     assert said(again) == TEXTS[encoding] and not again.warnings
     assert written(again).split(b"DATA;")[1] == text.split(b"DATA;")[1]
 
 
 def test_the_character_set_can_be_said():
     raw = put(words_step(), TEXTS["latin-1"], "latin-1")
-    assert said(occ.read(Text(raw, "x.step"), encoding="cp1251"))[0] == "Gehäuse".encode("latin-1").decode("cp1251")
-    lossy = occ.read(Text(raw, "x.step"), encoding="utf-8")
+    assert said(read(Text(raw, "x.step"), encoding="cp1251"))[0] == "Gehäuse".encode("latin-1").decode("cp1251")
+    lossy = read(Text(raw, "x.step"), encoding="utf-8")
     assert said(lossy)[0] == "Geh\ufffduse" and "lost" in lossy.warnings[0]
     for wrong in ("bogus", "utf-16", "hex"):
         with pytest.raises(UsageError, match=wrong):
-            occ.read(Text(raw, "x.step"), encoding=wrong)
+            read(Text(raw, "x.step"), encoding=wrong)
 
 
 def test_directives_of_the_standard():
@@ -104,40 +104,40 @@ def test_directives_of_the_standard():
     }
     for raw, text in texts.items():
         assert decoded(raw.encode()) == text and decoded(encoded(text)) == text
-        document = occ.read(Text(words_step().replace(b"FACEWORD", raw.encode()), "x.step"))
+        document = read(Text(words_step().replace(b"FACEWORD", raw.encode()), "x.step"))
         assert list(document.parts[0].face_names.values()) == [text]
-        title = next(iter(occ.read(Text(words_step().replace(b"PARTNUMBER", raw.encode()), "x.step")).titles.values()))
+        title = next(iter(read(Text(words_step().replace(b"PARTNUMBER", raw.encode()), "x.step")).titles.values()))
         assert title.identifier == text or title.name == "ASMWORD"
 
 
 def test_a_name_broken_over_lines_stays_whole():
     name = "机" * 100
-    document = occ.read(Text(words_step().replace(b"FACEWORD", name.encode()), "x.step"))
+    document = read(Text(words_step().replace(b"FACEWORD", name.encode()), "x.step"))
     text = written(document)
-    assert list(occ.read(Text(text, "x.step")).parts[0].face_names.values()) == [name]
+    assert list(read(Text(text, "x.step")).parts[0].face_names.values()) == [name]
     assert text.isascii()
 
 
 def test_empty_names_stay_empty_and_identifiers_stay():
     text = words_step().replace(b"'PARTNUMBER','PARTWORD',''", b"'','','what it is'")
     text = re.sub(rb"(USAGE_OCCURRENCE\()'1'", rb"\1'NAUO7'", text)
-    document = occ.read(Text(text, "x.step"))
+    document = read(Text(text, "x.step"))
     assert contents(document).products == ("ASMWORD", "")
     again = written(document)
     assert b"PRODUCT('','','what it is'" in again and b"USAGE_OCCURRENCE('NAUO7','LEFTWORD'" in again
-    named = written(occ.read(Text(text.replace(b"'','','what", b"'P-1','','what"), "x.step")))
+    named = written(read(Text(text.replace(b"'','','what", b"'P-1','','what"), "x.step")))
     assert b"PRODUCT('P-1','','what it is'" in named
-    assert contents(occ.read(Text(named, "x.step"))).products == ("ASMWORD", "P-1")
+    assert contents(read(Text(named, "x.step"))).products == ("ASMWORD", "P-1")
 
 
 def test_names_of_an_iges_file():
     document = shapes.document(BRepPrimAPI_MakeBox(1, 2, 3).Shape(), names={0: "ABCDEFG"})
     stream = io.BytesIO()
-    assert occ.write(document, stream, "iges").lost == ()
+    assert write(document, stream, "iges").lost == ()
     raw = stream.getvalue().replace(b"7HABCDEFG", b"7HGeh\xe4use")
-    again = occ.read(Text(raw, "x.igs"))
+    again = read(Text(raw, "x.igs"))
     assert "Gehäuse" in set(map(label_name, named_labels(again))) and again.warnings
-    (lost,) = occ.write(again, io.BytesIO(), "iges").lost
+    (lost,) = write(again, io.BytesIO(), "iges").lost
     assert lost.what == "names" and "Gehäuse" in str(lost)
 
 

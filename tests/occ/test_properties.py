@@ -8,11 +8,13 @@ from OCP.gp import gp_Pnt
 from OCP.TDF import TDF_AttributeIterator
 from OCP.XCAFDoc import XCAFDoc_Area, XCAFDoc_Centroid, XCAFDoc_Volume
 
-from mracad import occ
 from mracad.model.displacement import Displacement, Offset
+from mracad.occ.apply import apply
 from mracad.occ.document import label_key, label_name, labels
+from mracad.occ.files import read, write
 from mracad.occ.load import Text
 from mracad.occ.measure import mass_of
+from mracad.occ.view import view
 from tests.conftest import CORPUS
 
 EXACT = 1e-6  # what areas and volumes are measured to
@@ -44,8 +46,8 @@ def state(document, factor=1.0):
 
 def again(document):
     stream = io.BytesIO()
-    occ.write(document, stream)
-    return occ.read(Text(stream.getvalue(), "again.step"))
+    write(document, stream)
+    return read(Text(stream.getvalue(), "again.step"))
 
 
 def holds(document):
@@ -58,13 +60,13 @@ def holds(document):
 
 
 def test_what_moved_is_measured_again_in_inches(samples):
-    document = occ.read(samples / "assembly.step")
+    document = read(samples / "assembly.step")
     state(document)
     before = stated(document)
-    model = occ.view(document)
+    model = view(document)
     pushed = np.zeros_like(model.surfaces[0].net.poles)
     pushed[10:-10, 6:-6, 2] = 0.5
-    occ.apply(document, model, Displacement({0: Offset(pushed)}))
+    apply(document, model, Displacement({0: Offset(pushed)}))
     found = again(document)
     holds(found)
     after = stated(found)
@@ -73,7 +75,7 @@ def test_what_moved_is_measured_again_in_inches(samples):
 
 
 def test_what_did_not_move_keeps_what_the_file_says(samples):
-    document = occ.read(samples / "bottle.step")
+    document = read(samples / "bottle.step")
     state(document, factor=2.0)
     (said,) = stated(document).values()
     (kept,) = stated(again(document)).values()

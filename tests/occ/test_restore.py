@@ -10,8 +10,9 @@ from mracad.edit.smooth import smooth
 from mracad.errors import EditError
 from mracad.job.document import run
 from mracad.model.displacement import Displacement, Offset
+from mracad.model.facts import Failure
 from mracad.occ.apply import apply, restore
-from mracad.occ.check import Failure, check
+from mracad.occ.check import check
 from mracad.occ.step import read_step
 from mracad.occ.view import view
 from mracad.spec.steps import Smooth

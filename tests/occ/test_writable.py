@@ -12,9 +12,12 @@ from OCP.TDataStd import TDataStd_Name
 from OCP.TopLoc import TopLoc_Location
 from OCP.XCAFDoc import XCAFDoc_ColorType, XCAFDoc_DocumentTool
 
-from mracad import occ
+from mracad.occ.check import check
+from mracad.occ.document import Document
+from mracad.occ.files import read, write
 from mracad.occ.load import Text
 from mracad.occ.measure import mass
+from mracad.occ.view import view
 from mracad.occ.writable import Cut
 from tests import zoo
 from tests.occ import shapes
@@ -24,18 +27,18 @@ GREEN = Quantity_Color(0.0, 1.0, 0.0, Quantity_TOC_sRGB)
 
 def written(document, format="step", lacking=False, **options):
     stream = io.BytesIO()
-    result = occ.write(document, stream, format, **options)
+    result = write(document, stream, format, **options)
     assert lacking or result.lost == ()
     return stream.getvalue(), result.cut
 
 
 def again(data):
-    return occ.read(Text(data, "again"))
+    return read(Text(data, "again"))
 
 
 def assert_same(old, new, cut):
     """Two documents hold the same bodies, but for faces that one of them has in parts."""
-    before, after = occ.check(old), occ.check(new)
+    before, after = check(old), check(new)
     assert after.valid and after.free_edges == before.free_edges
     assert after.solids == before.solids
     assert after.faces == before.faces + sum(each.parts - 1 for each in cut)
@@ -99,7 +102,7 @@ def test_closed_faces_are_read_back_whole(name, pytestconfig):
     if name not in FAST and not pytestconfig.getoption("--long"):
         pytest.skip("pytest --long writes all of them")
     document = shapes.document(CLOSED[name]())
-    before = occ.check(document)
+    before = check(document)
     if not before.valid or before.edge_tolerance > 1e-2 or mass(document).volume <= 0:
         pytest.skip("the kernel does not make it well")
     for format in ("step", "iges", "brep") if name in FAST else ("step", "iges"):
@@ -122,9 +125,9 @@ def test_what_is_said_of_a_face_goes_to_its_parts(schema):
     assert cut == (Cut(0, 2),)
     found = again(data)
     assert_same(document, found, cut)
-    named = sorted((face.name, face.colour) for face in occ.view(found).faces if face.name)
+    named = sorted((face.name, face.colour) for face in view(found).faces if face.name)
     assert named == [("skin", "#00ff00"), ("skin", "#00ff00"), ("wall", "#ff0000")]
-    assert occ.view(found).products == ("ball",)
+    assert view(found).products == ("ball",)
     layer = data.index(b"PRESENTATION_LAYER_ASSIGNMENT('trim'")
     assert data[layer : data.index(b";", layer)].count(b"#") == 3
 
@@ -145,9 +148,9 @@ def test_a_face_is_not_cut_where_it_comes_back_as_nurbs():
     assert [str(each) for each in cut] == ["#3 as NURBS"]
     found = again(data)
     assert_same(document, found, cut)
-    (dome,) = (face for face in occ.view(found).faces if face.name)
+    (dome,) = (face for face in view(found).faces if face.name)
     assert (dome.name, dome.colour, dome.kind) == ("dome", "#00ff00", "bspline")
-    assert occ.view(document).faces[2].kind == "revolution" and not document.conversions
+    assert view(document).faces[2].kind == "revolution" and not document.conversions
 
 
 def test_the_document_stays_what_it_was():
@@ -160,9 +163,9 @@ def test_the_document_stays_what_it_was():
     second, _ = written(document)
     assert second == first
     assert document.shape.IsEqual(whole)
-    fresh = occ.Document(document.xcaf, document.name)
+    fresh = Document(document.xcaf, document.name)
     assert all(a.IsEqual(b) for a, b in zip(old, fresh.faces, strict=True))
-    assert [face.name for face in occ.view(fresh).faces] == ["skin", "", "", "", ""]
+    assert [face.name for face in view(fresh).faces] == ["skin", "", "", "", ""]
 
 
 def test_a_part_that_stands_in_several_places():
@@ -180,7 +183,7 @@ def test_a_part_that_stands_in_several_places():
 @pytest.mark.parametrize("name", ["bottle", "trimmed", "blade", "assembly"])
 @pytest.mark.parametrize("format", ["step", "iges"])
 def test_other_files_are_what_they_were(samples, monkeypatch, name, format):
-    document = occ.read(samples / f"{name}.step")
+    document = read(samples / f"{name}.step")
     data, cut = written(document, format)
     assert cut == ()
     monkeypatch.setattr(f"mracad.occ.{format}.writable", nothing)
@@ -188,7 +191,7 @@ def test_other_files_are_what_they_were(samples, monkeypatch, name, format):
 
 
 def test_real_files_are_what_they_were(refined_file, monkeypatch):
-    document = occ.read(refined_file)
+    document = read(refined_file)
     data, cut = written(document, lacking=True)
     assert cut == ()
     monkeypatch.setattr("mracad.occ.step.writable", nothing)
@@ -197,7 +200,7 @@ def test_real_files_are_what_they_were(refined_file, monkeypatch):
 
 def test_reports_say_which_faces_are_in_parts(mracad, tmp_path):
     source = shapes.save(zoo.nurbs(zoo.cut("half_sphere", "hole")), tmp_path / "in.step")
-    occ.write(shapes.document(drilled_ball()), tmp_path / "in.brep")
+    write(shapes.document(drilled_ball()), tmp_path / "in.brep")
     done = mracad("convert", tmp_path / "in.brep", "-o", tmp_path / "out.step")
     assert (done.code, done.err) == (0, "") and ", #1 in 2 parts, " in done.out
     done = mracad("convert", tmp_path / "in.brep", "-o", tmp_path / "again.step", "-o", tmp_path / "out.stl", "--json")

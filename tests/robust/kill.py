@@ -11,7 +11,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from mracad import occ
+from mracad.occ.step import read_step, write_step
 
 SAMPLES = Path(__file__).parents[2] / "samples"
 END = b"END-ISO-10303-21;\n"
@@ -20,7 +20,7 @@ END = b"END-ISO-10303-21;\n"
 def kills(count: int, seed: int = 0) -> str:
     """What was found after some kill: the output missing or partial; ``""`` when it was whole every time."""
     rng = random.Random(seed)
-    document = occ.read_step(SAMPLES / "assembly.step")
+    document = read_step(SAMPLES / "assembly.step")
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder, "out.step")
         out.write_bytes(b"ISO-10303-21;\n" + END)
@@ -28,7 +28,7 @@ def kills(count: int, seed: int = 0) -> str:
             writer = os.fork()
             if not writer:
                 for turn in itertools.count():
-                    occ.write_step(document, out, options_text=f"turn {turn}")
+                    write_step(document, out, options_text=f"turn {turn}")
             time.sleep(rng.uniform(0.0, 0.4))
             os.kill(writer, signal.SIGKILL)
             os.waitpid(writer, 0)

@@ -21,9 +21,10 @@ from pathlib import Path
 
 from mracad_cli import __main__ as cli
 
-from mracad import occ
 from mracad.errors import MracadError
 from mracad.job import guard
+from mracad.occ.files import read, write
+from mracad.occ.view import view
 
 SAMPLES = Path(__file__).parents[2] / "samples"
 LIMIT = 20.0
@@ -124,7 +125,7 @@ def _source(name: str, format: str) -> bytes:
     if format == "step":
         return (SAMPLES / f"{name}.step").read_bytes()
     stream = io.BytesIO()
-    occ.write(occ.read(SAMPLES / f"{name}.step"), stream, format)
+    write(read(SAMPLES / f"{name}.step"), stream, format)
     return stream.getvalue()
 
 
@@ -177,7 +178,7 @@ def main(count: int, seed: int) -> int:
     """Check many, print what happened, and return 1 if anything is wrong."""
     codes: Counter[int] = Counter()
     bad = 0
-    occ.view(occ.read(SAMPLES / "assembly.step"))  # the children find the kernel loaded
+    view(read(SAMPLES / "assembly.step"))  # the children find the kernel loaded
     for format in OTHERS:
         for name in SOURCES:
             _source(name, format)

@@ -10,11 +10,13 @@ import time
 
 import pytest
 
-from mracad import note, occ, output
+from mracad import note, output
 from mracad.errors import Code, EditError, FileError, MracadError
 from mracad.inspect.verdict import Finding, Layer
 from mracad.job import guard
 from mracad.job.batch.manifest import Manifest
+from mracad.occ.check import check
+from mracad.occ.files import read
 from tests.robust import kill, mutate
 
 NUMBERS = (*range(10), 499)
@@ -86,9 +88,9 @@ def test_a_file_that_is_being_written_is_not_taken_for_one_that_was_left(tmp_pat
 
 def test_a_child_checks_models_after_its_parent_has(samples):
     """The threads that the kernel started in the parent are not in the child, which must not wait for them."""
-    document = occ.read(samples / "blade.step")
-    assert occ.check(document).valid
-    assert guard.run(lambda: occ.check(document).valid, bool, 60)
+    document = read(samples / "blade.step")
+    assert check(document).valid
+    assert guard.run(lambda: check(document).valid, bool, 60)
 
 
 def crash():

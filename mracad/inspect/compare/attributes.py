@@ -5,15 +5,12 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mracad.inspect.compare.subject import EQUAL, Group, Subject, layer, paired
 from mracad.inspect.verdict import Figure, Finding, Layer
-
-if TYPE_CHECKING:
-    from mracad.occ.contents import Contents, Place, Placed
+from mracad.model.facts import Carrier, Contents, Occurrence
 
 _Key = tuple[tuple[str, Figure], ...]  # the figures of what is counted
 
@@ -48,7 +45,7 @@ def assembly(ref: Subject, new: Subject) -> Layer:
     return layer("assembly", text, findings, {"ref": was, "new": now})
 
 
-def _numbered(contents: Contents) -> Iterator[tuple[Placed, int]]:
+def _numbered(contents: Contents) -> Iterator[tuple[Occurrence, int]]:
     """Everything placed, and how many of the same path and product came before it."""
     seen: Counter = Counter()
     for placed in contents.tree:
@@ -111,7 +108,7 @@ def _marked(name: str, ref: Subject, new: Subject, groups: Sequence[Group]) -> l
 
 
 def _key(name: str, mark: tuple, numbers: Mapping[int, int] | None) -> _Key:
-    place: Place = mark[0]
+    place: Carrier = mark[0]
     face = None if place.face < 0 else place.face if numbers is None else numbers.get(place.face)
     inside = place.inside or (place.face >= 0 and face is None)
     where = ("product", place.product), ("component", place.component), ("face", face), ("inside", inside)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import Counter, defaultdict
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,9 +13,7 @@ from mracad.inspect.seams import SMOOTH, SeamMeasure, summary
 from mracad.inspect.seams import seams as measured
 from mracad.inspect.verdict import Finding, Layer
 from mracad.model.brep import Model
-
-if TYPE_CHECKING:
-    from mracad.occ.measure import Mass
+from mracad.model.facts import Mass
 
 STEEPER = 0.01
 """Degrees by which the angle of a smooth seam must have grown to be no longer smooth: a reader lays curves anew."""

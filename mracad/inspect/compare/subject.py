@@ -4,17 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 import numpy as np
 
 from mracad.inspect.verdict import Finding, Layer
 from mracad.model.brep import Model
-
-if TYPE_CHECKING:
-    from mracad.occ.check import Validity
-    from mracad.occ.contents import Contents
-    from mracad.occ.measure import Mass
+from mracad.model.facts import Contents, Mass, Validity
 
 Array = np.ndarray
 Point = tuple[float, float, float]
@@ -24,7 +20,7 @@ EQUAL = 1e-9
 
 
 class Gauge(Protocol):
-    """Exact measures on one document; see :class:`mracad.occ.measure.Gauge`."""
+    """Exact measures on one document; see :class:`mracad.occ.measure.KernelGauge`."""
 
     def sample(self, index: int, lines: tuple[int, int]) -> Array: ...
 

@@ -20,7 +20,7 @@ from mracad.spec.steps import STEPS
 if TYPE_CHECKING:
     from mracad.job.document import Report
     from mracad.job.judge import Judged
-    from mracad.occ import Document
+    from mracad.occ.document import Document
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,8 @@ class Product:
 
 def warm() -> None:
     """Load what the steps need."""
-    for module in ("mracad.occ", *(struct.function.partition(":")[0] for struct in STEPS.values())):
+    kernel = (f"mracad.occ.{name}" for name in ("files", "view", "apply", "check"))
+    for module in (*kernel, *(struct.function.partition(":")[0] for struct in STEPS.values())):
         importlib.import_module(module)
 
 
@@ -116,7 +117,7 @@ def do(work: Work) -> Product:
 
 
 def _read(work: Work) -> Document:
-    from mracad.occ import read
+    from mracad.occ.files import read
     from mracad.occ.load import Text
 
     return read(Text(work.data, work.name), work.input_unit, work.encoding)

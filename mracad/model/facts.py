@@ -1,0 +1,291 @@
+"""What is found out about a document, in numbers and words: the kernel room makes it, and all others judge by it."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from mracad.model.brep import Model
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True)
+class Failure:
+    """One finding of the kernel's check.
+
+    Attributes
+    ----------
+    kind : str
+        ``"face"``, ``"wire"``, ``"edge"``, ``"vertex"``, ``"shell"`` or ``"solid"``.
+    status : str
+        The kernel's name for it, as ``"SelfIntersectingWire"``.
+    face : int or None
+        Index of the face in which it was found; None for shells and solids.
+    """
+
+    kind: str
+    status: str
+    face: int | None
+
+    def __str__(self) -> str:
+        return f"{self.status} in a {self.kind}" + (f" of #{self.face + 1}" if self.face is not None else "")
+
+
+@dataclass(frozen=True)
+class Validity:
+    """What the kernel says of a document; a part that is instanced counts once.
+
+    Attributes
+    ----------
+    valid : bool
+    failures : tuple of Failure
+    solids, shells, faces, open_shells : int
+        Of the whole document.
+    free_edges : int
+        Edges that one face uses once.
+    edge_tolerance, vertex_tolerance : float
+        The largest among the faces that were checked, mm.
+    curve_distance : float or None
+        Largest distance between an edge's 3D curve and its curve on a face that was checked, at equal parameters, mm.
+    """
+
+    valid: bool
+    failures: tuple[Failure, ...]
+    solids: int
+    shells: int
+    faces: int
+    open_shells: int
+    free_edges: int
+    edge_tolerance: float
+    vertex_tolerance: float
+    curve_distance: float | None = None
+
+
+@dataclass(frozen=True)
+class Occurrence:
+    """One part, assembly or instance where it stands in the whole.
+
+    Attributes
+    ----------
+    path : tuple of str
+        Names of the instances from the top down (of the product for a free shape).
+    product : str
+    frame : tuple of float
+        The upper three rows of its placement in the whole, row-major, mm.
+    """
+
+    path: tuple[str, ...]
+    product: str
+    frame: tuple[float, ...]
+
+
+@dataclass(frozen=True, order=True)
+class Carrier:
+    """What carries an attribute: a product, one of its components, or something inside it.
+
+    Attributes
+    ----------
+    product, component : str
+        ``component`` is ``""`` unless it is one.
+    face : int
+        Index of the face; -1 for everything else.
+    inside : bool
+        Whether it is another shape inside the product: a body or an edge.
+    """
+
+    product: str
+    component: str = ""
+    face: int = -1
+    inside: bool = False
+
+
+@dataclass(frozen=True)
+class Contents:
+    """What a document says beyond geometry.
+
+    Attributes
+    ----------
+    unit : str
+    products : tuple of str
+        Of every part and assembly.
+    usages : int
+        How often some product is used in an assembly definition.
+    tree : tuple of Occurrence
+    colours : tuple of (Carrier, str, str)
+        Where, of what, ``"#rrggbb"`` or ``"#rrggbbaa"``; sorted.
+    layers : tuple of (Carrier, str)
+        Where, and the layer; sorted.
+    materials : tuple of (Carrier, float)
+        Where, and the density as the kernel gives it; sorted.
+    annotations : dict of str to int
+        How many ``"dimensions"``, ``"tolerances"`` and ``"datums"`` there are.
+    """
+
+    unit: str
+    products: tuple[str, ...]
+    usages: int
+    tree: tuple[Occurrence, ...]
+    colours: tuple[tuple[Carrier, str, str], ...]
+    layers: tuple[tuple[Carrier, str], ...]
+    materials: tuple[tuple[Carrier, float], ...]
+    annotations: dict[str, int]
+
+
+@dataclass(frozen=True)
+class Mass:
+    """Size of something: all placed instances of a document, or one face in its part's frame.
+
+    Attributes
+    ----------
+    volume : float
+        Of the solids, mm³; 0 for a face.
+    area : float
+        Of the faces, mm².
+    centre : (float, float, float)
+        Of the solids or, where there are none, of the faces, mm.
+    """
+
+    volume: float
+    area: float
+    centre: tuple[float, float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Triangles:
+    """A mesh of all parts, each once and in its own frame, mm.
+
+    Attributes
+    ----------
+    points : ndarray (n, 3)
+        Corners that coincide within rounding are one point of their part.
+    corners : ndarray of int (m, 3)
+        Point numbers, anticlockwise seen from outside.
+    faces, parts : ndarray of int (m,)
+        Which face and which part each triangle belongs to.
+    missing : tuple of int
+        Faces that the kernel could not mesh.
+    """
+
+    points: Array
+    corners: Array
+    faces: Array
+    parts: Array
+    missing: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Stated:
+    """A STEP file as parsed.
+
+    Attributes
+    ----------
+    entities : int
+    faces : int
+        Of all shells, each once.
+    uses : tuple of (int, int, bool)
+        Every use of an edge: a number for the edge, the position of the face among all, and whether the face's
+        boundary runs along the edge.
+    centres : tuple of (float, float, float)
+        Of the vertices of each face, in the file's unit.
+    senses : tuple of (bool or None)
+        Whether each face looks as its surface does; None where that is not stated.
+    broken : tuple of str
+        Entities that could not be understood, at most a hundred: their place in the file and the reason.
+    """
+
+    entities: int
+    faces: int
+    uses: tuple[tuple[int, int, bool], ...]
+    centres: tuple[tuple[float, float, float], ...]
+    senses: tuple[bool | None, ...]
+    broken: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Counts:
+    """How many there are, all instances counted."""
+
+    solids: int
+    shells: int
+    faces: int
+    free_edges: int
+
+
+@dataclass(frozen=True, eq=False)
+class Line:
+    """An edge at a few places.
+
+    Attributes
+    ----------
+    faces : tuple of int
+        Those that use it, once for each use.
+    points : ndarray (1 + n, k, 6)
+        Points of its own curve and of each face along it, in the part's frame, mm; and the unit normals of the
+        surfaces there (for the curve zero).
+    tolerance : float
+        mm.
+    """
+
+    faces: tuple[int, ...]
+    points: Array
+    tolerance: float
+
+
+class Probe(Protocol):
+    """Measures that are taken only where something differs; see :class:`mracad.occ.facts.KernelProbe`."""
+
+    def validity(self) -> Validity: ...
+
+    def along(self, edges: Collection[int]) -> Model: ...
+
+    def area(self, face: int, exact: bool) -> float: ...
+
+    def volume(self) -> float: ...
+
+    def box(self) -> Array: ...
+
+
+@dataclass(frozen=True, eq=False)
+class Facts:
+    """What is known of a document, in memory or as read back.
+
+    Attributes
+    ----------
+    diagonal : float
+        mm.
+    counts : Counts
+    spots : ndarray (p, 9)
+        Where each placed face is: corners of its box, middle of its vertices, mm.
+    owners : ndarray of int (p,)
+        The face that each of them is.
+    closing : frozenset of int
+        Faces on surfaces that close, without a closing edge: the others do not tell which side of them is meant.
+    vertices : ndarray (f,)
+        The largest tolerance among the vertices of each face, mm.
+    edges : tuple of Line
+        All that are not degenerate or, where they are, have no faces.
+    probe : Probe
+    """
+
+    diagonal: float
+    counts: Counts
+    spots: Array
+    owners: Array
+    closing: frozenset[int]
+    vertices: Array
+    edges: tuple[Line, ...]
+    probe: Probe
+
+    @property
+    def count(self) -> int:
+        """The number of faces, instances counted once."""
+        return len(self.vertices)
+
+    @property
+    def tolerance(self) -> float:
+        """The largest, mm."""
+        return max([*(edge.tolerance for edge in self.edges), float(self.vertices.max(initial=0.0))])
