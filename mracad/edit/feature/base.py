@@ -29,7 +29,7 @@ NORMALS = 6
 """Steps to the foot of a point on the plate."""
 
 SPREAD = 48
-"""Samples of a sheet in each direction around a feature."""
+"""Samples of a patch in each direction around a feature."""
 
 
 class Surroundings:

@@ -22,7 +22,7 @@ from mracad.constraint.trimmed import TrimmedSeam
 from mracad.constraint.wishes import Wishes
 from mracad.edit.feature.crossing import Crossing, crossing, reached, refined
 from mracad.edit.feature.exact import Shifts, shifted
-from mracad.edit.feature.fine import MISSED, Fit
+from mracad.edit.feature.fit import MISSED, Fit
 from mracad.edit.feature.ground import Ground
 from mracad.edit.feature.ideal import Copies
 from mracad.edit.feature.joined import Softness, Wanted, held
@@ -160,9 +160,9 @@ def _task(copies: Copies, wishes: Wishes, removed: Mapping[int, Array]) -> _Task
     ground = copies.ground
     shifts = shifted(copies)
     fit = Fit(copies, ~shifts.matched)
-    sheets = [sheet for i, sheet in ground.sheets.items() if i in removed or copies.on(sheet).any()]
-    nets = {sheet.index: ground.model.surfaces[sheet.index].net.over(*fit.knots(sheet)) for sheet in sheets}
-    under = {face.index for sheet in sheets for face in sheet.faces}
+    patches = [patch for i, patch in ground.patches.items() if i in removed or copies.on(patch).any()]
+    nets = {patch.index: ground.model.surfaces[patch.index].net.over(*fit.knots(patch)) for patch in patches}
+    under = {face.index for patch in patches for face in patch.faces}
     joined = _told(ground, under, _sewn(joints(ground.model, under, wishes)))
     reach = float(copies.reach.max())
     tolerances = TIGHT * GAP, TIGHT * TURNED, TIGHT * BENT / reach
@@ -197,12 +197,12 @@ def _crossings(task: _Task) -> list[Crossing]:
 
 def _wanted(task: _Task, index: int, net: Net) -> tuple[Array, Array]:
     """Offsets over a net of a surface, ``(nu, nv, 3)``: of all that is wanted, and of the copies alone."""
-    sheet, own = task.copies.ground.sheets[index], task.model.surfaces[index].net
+    patch, own = task.copies.ground.patches[index], task.model.surfaces[index].net
     laid = task.removed.get(index, np.zeros(own.poles.shape)) + task.shifts.offsets.get(index, 0.0)
     every = over(own, net, laid)
     alone = every - (over(own, net, task.removed[index]) if index in task.removed else 0.0)
-    if task.fit.on(sheet).any():
-        laid = task.fit.poles(sheet, (net.u, net.v)) @ sheet.turn
+    if task.fit.on(patch).any():
+        laid = task.fit.poles(patch, (net.u, net.v)) @ patch.turn
         every, alone = every + laid, alone + laid
     return every, alone
 
@@ -215,7 +215,7 @@ def _attempt(task: _Task, crossings: Sequence[Crossing], halvings: Mapping[int, 
     for i, net in nets.items():
         every, alone[i] = _wanted(task, i, net)
         on_it = [task.model.faces[f] for f in task.model.surfaces[i].faces]
-        faces = task.copies.ground.sheets[i].faces
+        faces = task.copies.ground.patches[i].faces
         free = separate(net, on_it, [face.index for face in faces], task.joints.orders, moving).free
         wanted[i] = Wanted(net, every, free, faces[0])
     return _Attempt(nets, held(wanted, crossings, task.softness), alone)

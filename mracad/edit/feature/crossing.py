@@ -12,7 +12,7 @@ from mracad.constraint.border import Border
 from mracad.constraint.seam import Seam
 from mracad.constraint.trace import Trace, along, crossings
 from mracad.constraint.trimmed import TrimmedSeam
-from mracad.edit.feature.fine import grown
+from mracad.edit.feature.fit import grown
 from mracad.edit.feature.ideal import Copies
 from mracad.seam.conditions import SAME, doubled, matched
 
@@ -65,11 +65,11 @@ def trace(side: Border | Trace) -> Trace:
 def reached(copies: Copies, seam: Seam | TrimmedSeam, removed: Mapping[int, Array]) -> bool:
     """Whether copies, or what is removed (offsets by surface over its own net), displace a seam."""
     for side in (seam.a, seam.b):
-        sheet, uv = copies.ground.sheets[side.surface], side.places(_EVENLY)
-        points, _, _, normals = sheet.evaluate(uv)
-        moved = [copies.ideal(sheet, points, normals)[0]]
+        patch, uv = copies.ground.patches[side.surface], side.places(_EVENLY)
+        points, _, _, normals = patch.evaluate(uv)
+        moved = [copies.ideal(patch, points, normals)[0]]
         if side.surface in removed:
-            moved.append(np.asarray(Net(*sheet.knots, removed[side.surface], sheet.net.weights).evaluate(uv)))
+            moved.append(np.asarray(Net(*patch.knots, removed[side.surface], patch.net.weights).evaluate(uv)))
         if max(np.linalg.norm(each, axis=1).max() for each in moved) > MOVED * copies.height:
             return True
     return False

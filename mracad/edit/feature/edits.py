@@ -17,10 +17,10 @@ from mracad.constraint.wishes import Wishes
 from mracad.edit.feature.copies import Laid, laid
 from mracad.edit.feature.detail import Feature, load
 from mracad.edit.feature.extract import above_surroundings, between_levels
-from mracad.edit.feature.fine import NARROWEST
+from mracad.edit.feature.fit import NARROWEST
 from mracad.edit.feature.ground import Ground, axes
 from mracad.edit.feature.ideal import copies
-from mracad.edit.feature.locate import Place, face_number, place, sheet_of, standing, window
+from mracad.edit.feature.locate import Place, face_number, patch_of, place, standing, window
 from mracad.edit.feature.pattern import along, grid, listed, polar, scattered
 from mracad.edit.feature.transfer import at_scale, laid_on
 from mracad.edit.result import Edit, FaceOutcome, Reason, spared
@@ -94,7 +94,7 @@ def transfer(
     """
     scope = scope or scope_of(model, options)
     chosen = _movable(model, scope)
-    ground = Ground(model, chosen)
+    ground = Ground.of(model, chosen)
     every = {f.index for f in source.faces if f.surface is not None}
     if _is_window(options.from_):
         feature = extract(source, options, every, options.from_)
@@ -103,8 +103,8 @@ def transfer(
         return _edit(model, done, scope)
     if options.band is None:
         raise UsageError("band: the detail of a face needs one", "give --band 0mm:20mm")
-    one = sheet_of(Ground(source, every), face_number(source, options.from_, "from", FACE), "from")
-    two = sheet_of(ground, face_number(model, options.to, "to", FACE), "to")
+    one = patch_of(Ground.of(source, every), face_number(source, options.from_, "from", FACE), "from")
+    two = patch_of(ground, face_number(model, options.to, "to", FACE), "to")
     width = None if options.taper is None else length(options.taper, model.diagonal, "taper")
     return _edit(model, laid_on(model, two, one, band_of(options.band, source.diagonal), options, width), scope)
 
@@ -126,17 +126,17 @@ def extract(model: Model, options: Featured, chosen: Collection[int], text: str 
         return load(text)
     if not chosen:
         raise EditError(f"{model.name}: there is no NURBS face to edit", "select faces with --faces")
-    ground = Ground(model, chosen)
+    ground = Ground.of(model, chosen)
     taper = None if options.taper is None else length(options.taper, model.diagonal, "taper")
     area = window(ground, text, taper)
     label = f"feature {text}"
     if options.base == "surroundings":
         return above_surroundings(ground, area, area.width, options.keep, label, text)
     low, high = band_of(options.band or "", model.diagonal)
-    coarse = {i: at_scale(model.surfaces[i].net, high) for i in ground.sheets}
-    fine = {i: at_scale(model.surfaces[i].net, low) if low else model.surfaces[i].net.poles for i in ground.sheets}
-    bands = {i: fine[i] - coarse[i] for i in ground.sheets}
-    return between_levels(Ground(model, chosen, coarse), bands, area, area.width, options.keep, label, text)
+    coarse = {i: at_scale(model.surfaces[i].net, high) for i in ground.patches}
+    fine = {i: at_scale(model.surfaces[i].net, low) if low else model.surfaces[i].net.poles for i in ground.patches}
+    bands = {i: fine[i] - coarse[i] for i in ground.patches}
+    return between_levels(Ground.of(model, chosen, coarse), bands, area, area.width, options.keep, label, text)
 
 
 def _movable(model: Model, scope: Scope) -> set[int]:
@@ -146,9 +146,9 @@ def _movable(model: Model, scope: Scope) -> set[int]:
 def _cleared(model: Model, chosen: Collection[int], feature: Feature) -> Ground:
     """The ground without the feature."""
     if feature.origin is None:
-        return Ground(model, chosen)
+        return Ground.of(model, chosen)
     poles = {i: model.surfaces[i].net.poles - offset for i, offset in feature.origin.offsets.items()}
-    return Ground(model, chosen, poles)
+    return Ground.of(model, chosen, poles)
 
 
 def _places(ground: Ground, feature: Feature, options: Repeat) -> list[Place]:

@@ -10,7 +10,7 @@ import numpy as np
 from mracad.bspline.knots import KnotVector
 from mracad.edit.feature.detail import Origin
 from mracad.edit.feature.ideal import Copies
-from mracad.edit.feature.sheet import Sheet
+from mracad.edit.feature.patch import Patch
 
 Array = np.ndarray
 _Box = tuple[tuple[int, int], tuple[int, int]]
@@ -43,42 +43,42 @@ def shifted(copies: Copies) -> Shifts:
     source = _source(copies)
     if source is None:
         return result
-    origin, sheet, delta = source
+    origin, patch, delta = source
     rows, columns = (np.flatnonzero(delta.any(axis=(1 - axis, 2))) for axis in (0, 1))
     box = (int(rows[0]), int(rows[-1]) + 1), (int(columns[0]), int(columns[-1]) + 1)
     own = delta[slice(*box[0]), slice(*box[1])]
     plain = (copies.sizes == 1) & (np.abs(np.sin(copies.turns)) < 1e-12) & (np.cos(copies.turns) > 0)
     for i in np.flatnonzero(plain & (copies.touched.sum(axis=1) == 1)):
-        target = copies.ground.sheets.get(int(copies.feet.surface[i]))
-        steps = _steps(sheet, target, box, copies.feet.uv[i] - origin.feet.uv[0]) if target else None
+        target = copies.ground.patches.get(int(copies.feet.surface[i]))
+        steps = _steps(patch, target, box, copies.feet.uv[i] - origin.feet.uv[0]) if target else None
         if steps is None or target is None:
             continue
-        turn = _congruent(sheet, target, box, steps, CONGRUENT * copies.height)
+        turn = _congruent(patch, target, box, steps, CONGRUENT * copies.height)
         if turn is None or np.abs(turn - copies.charts.axes[i].T @ origin.axes).max() > TURNED:
             continue
         sums = result.offsets.setdefault(target.index, np.zeros(target.net.poles.shape))
-        sums[_there(target, box, steps)] += own @ (target.turn.T @ turn @ sheet.turn).T * copies.heights[i]
+        sums[_there(target, box, steps)] += own @ (target.turn.T @ turn @ patch.turn).T * copies.heights[i]
         result.matched[i] = True
     return result
 
 
-def _source(copies: Copies) -> tuple[Origin, Sheet, Array] | None:
-    """Where the feature was found and its offsets, where it lies on one sheet and copies of it may be exact."""
+def _source(copies: Copies) -> tuple[Origin, Patch, Array] | None:
+    """Where the feature was found and its offsets, where it lies on one patch and copies of it may be exact."""
     origin = copies.feature.origin
     if origin is None or copies.overlap != "add" or copies.mirror or len(origin.offsets) != 1:
         return None
     ((index, delta),) = origin.offsets.items()
-    if int(origin.feet.surface[0]) != index or index not in copies.ground.sheets:
+    if int(origin.feet.surface[0]) != index or index not in copies.ground.patches:
         return None
-    return origin, copies.ground.sheets[index], delta
+    return origin, copies.ground.patches[index], delta
 
 
-def _there(target: Sheet, box: _Box, steps: tuple[int, int]) -> tuple[Array, ...]:
+def _there(target: Patch, box: _Box, steps: tuple[int, int]) -> tuple[Array, ...]:
     """Control points of the target that answer to those of a box of the source."""
     return np.ix_(*((np.arange(a, b) + k) % kv.count for (a, b), k, kv in zip(box, steps, target.knots, strict=True)))
 
 
-def _congruent(source: Sheet, target: Sheet, box: _Box, steps: tuple[int, int], limit: float) -> Array | None:
+def _congruent(source: Patch, target: Patch, box: _Box, steps: tuple[int, int], limit: float) -> Array | None:
     """The rotation that takes the source's net to the target's, where they are congruent to a distance, mm."""
     here, there = np.ix_(*(np.arange(a, b) for a, b in box)), _there(target, box, steps)
     one, two = source.net.poles[here].reshape(-1, 3), target.net.poles[there].reshape(-1, 3)
@@ -96,7 +96,7 @@ def _congruent(source: Sheet, target: Sheet, box: _Box, steps: tuple[int, int], 
     return None if np.abs(a @ turn.T - b).max() > limit else turn
 
 
-def _steps(source: Sheet, target: Sheet, box: _Box, way: Array) -> tuple[int, int] | None:
+def _steps(source: Patch, target: Patch, box: _Box, way: Array) -> tuple[int, int] | None:
     """By how many control points a target's knots are those of the source moved by ``way``; None where they are not."""
     u, v = (_moved(source.knots[axis], target.knots[axis], box[axis], float(way[axis])) for axis in (0, 1))
     return None if u is None or v is None else (u, v)

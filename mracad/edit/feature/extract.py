@@ -16,7 +16,7 @@ from mracad.edit.feature.chart import Charts
 from mracad.edit.feature.detail import LOST, Feature, Origin, taper
 from mracad.edit.feature.ground import STEEP, Ground
 from mracad.edit.feature.locate import Window
-from mracad.edit.feature.sheet import Sheet
+from mracad.edit.feature.patch import Patch
 from mracad.errors import EditError
 
 Array = np.ndarray
@@ -44,9 +44,9 @@ def above_surroundings(ground: Ground, window: Window, width: float, keep: str, 
     chart = around.chart
     offsets: dict[int, Array] = {}
     windows: dict[int, Array] = {}
-    for index, sheet in ground.sheets.items():
-        net = sheet.net
-        points, normals = _grid(sheet)
+    for index, patch in ground.patches.items():
+        net = patch.net
+        points, normals = _grid(patch)
         local = (points - chart.origin[0]) @ chart.axes[0].T
         hit = np.flatnonzero(
             (np.linalg.norm(local[:, :2], axis=1) <= 1.1 * reach)
@@ -56,13 +56,13 @@ def above_surroundings(ground: Ground, window: Window, width: float, keep: str, 
         if not len(hit):
             continue
         feet = around.feet(local[hit])
-        shares = window.share(sheet, hit, chart.coordinates(feet, np.zeros(len(hit), int)), width)
+        shares = window.share(patch, hit, chart.coordinates(feet, np.zeros(len(hit), int)), width)
         weight = taper(shares)
         hit, weight, feet = hit[shares < 1], weight[shares < 1], feet[shares < 1]
         if not len(hit):
             continue
         values = np.zeros((len(points), 3))
-        values[hit] = (local[hit] - feet) @ chart.axes[0] @ sheet.turn
+        values[hit] = (local[hit] - feet) @ chart.axes[0] @ patch.turn
         values = values.reshape(*net.poles.shape)
         weights = np.ones(net.poles.shape[:2]) if net.weights is None else net.weights
         if net.weights is not None:
@@ -73,9 +73,7 @@ def above_surroundings(ground: Ground, window: Window, width: float, keep: str, 
         w = flat.reshape(net.poles.shape[:2])
         offsets[index] = interpolated(net.u, net.v, values) / weights[..., None] * w[..., None]
         windows[index] = w
-    cleared = {i: ground.model.surfaces[i].net.poles - offset for i, offset in offsets.items()}
-    ground = Ground(ground.model, ground.chosen, cleared)
-    return _made(ground, chart, window, reach, offsets, windows, keep, label, named)
+    return _made(ground.without(offsets), chart, window, reach, offsets, windows, keep, label, named)
 
 
 def between_levels(
@@ -86,17 +84,17 @@ def between_levels(
     feet = window.feet
     found, _ = ground.charts(feet, feet.along, np.array([1.05 * reach]))
     offsets, windows = {}, {}
-    for index, sheet in ground.sheets.items():
-        points, normals = _grid(sheet)
+    for index, patch in ground.patches.items():
+        points, normals = _grid(patch)
         apart = np.linalg.norm(points - feet.points[0], axis=1)
         hit = np.flatnonzero((apart <= 1.02 * reach) & (normals @ feet.normals[0] > STEEP))
         if not len(hit):
             continue
         zero = np.zeros(len(hit), int)
-        shares = window.share(sheet, hit, found.coordinates(found.local(points[hit], zero), zero), width)
+        shares = window.share(patch, hit, found.coordinates(found.local(points[hit], zero), zero), width)
         flat = np.zeros(len(points))
         flat[hit] = taper(shares)
-        w = flat.reshape(sheet.net.poles.shape[:2])
+        w = flat.reshape(patch.net.poles.shape[:2])
         if w.any():
             windows[index], offsets[index] = w, bands[index] * w[..., None]
     return _made(ground, found, window, reach, offsets, windows, keep, label, named)
@@ -120,18 +118,18 @@ def _made(
     if largest <= 1e-7:
         raise EditError(f"{label}: nothing stands out there", "name a window over a feature; see mracad feature list")
     model = ground.model
-    orders = seams(model, {face.index for i in offsets for face in ground.sheets[i].faces}, Wishes(keep)).orders
+    orders = seams(model, {face.index for i in offsets for face in ground.patches[i].faces}, Wishes(keep)).orders
     for index in list(offsets):
-        sheet = ground.sheets[index]
+        patch = ground.patches[index]
         surface = model.surfaces[index]
         faces = [model.faces[i] for i in surface.faces]
         edges = [model.edges[trim.edge] for face in faces for trim in face.trims if model.edges]
         moving = {e.index for e in edges if len(e.sides) == 2 and {side.face for side in e.sides} <= ground.chosen}
-        free = separate(surface.net, faces, [f.index for f in sheet.faces], orders, moving).free
+        free = separate(surface.net, faces, [f.index for f in patch.faces], orders, moving).free
         lost = float(np.linalg.norm(offsets[index][~free], axis=-1).max(initial=0.0))
         if lost > LOST * largest:
             raise EditError(
-                f"{label}: {lost:.3g} mm of the feature lie on control points of #{sheet.faces[0].index + 1} that "
+                f"{label}: {lost:.3g} mm of the feature lie on control points of #{patch.faces[0].index + 1} that "
                 "an edge or a hole holds",
                 "use a smaller window or --keep g0",
             )
@@ -147,7 +145,7 @@ def _spacing(ground: Ground, windows: Mapping[int, Array], reach: float) -> floa
     steps = []
     for index, w in windows.items():
         for axis in (0, 1):
-            apart = np.linalg.norm(np.diff(ground.sheets[index].net.poles, axis=axis), axis=-1)
+            apart = np.linalg.norm(np.diff(ground.patches[index].net.poles, axis=axis), axis=-1)
             own = apart[(w[1:] if axis == 0 else w[:, 1:]) > 0]
             steps += [float(np.median(own))] if len(own) else []
     return max(min(steps, default=reach), 1e-3 * reach)
@@ -171,10 +169,10 @@ def _table(
     ab = chart.places(xy[disc], zero)
     frames = chart.jets(ab, zero)[1]
     for index, offset in offsets.items():
-        sheet = ground.sheets[index]
-        uv, found = _under(sheet, chart, ab)
-        channels = np.concatenate([offset @ sheet.turn.T, windows[index][..., None]], axis=-1)
-        values = np.asarray(Net(sheet.net.u, sheet.net.v, channels, sheet.net.weights).evaluate(uv[found]))
+        patch = ground.patches[index]
+        uv, found = _under(patch, chart, ab)
+        channels = np.concatenate([offset @ patch.turn.T, windows[index][..., None]], axis=-1)
+        values = np.asarray(Net(patch.net.u, patch.net.v, channels, patch.net.weights).evaluate(uv[found]))
         new = found.copy()
         new[found] = table[disc[found], 3] == 0
         values = values[new[found]]
@@ -183,39 +181,39 @@ def _table(
     return table.reshape(cells + 1, cells + 1, 4)
 
 
-def _under(sheet: Sheet, chart: Charts, ab: Array) -> tuple[Array, Array]:
-    """Parameters of the points of a sheet over places of a chart, and which of them exist."""
+def _under(patch: Patch, chart: Charts, ab: Array) -> tuple[Array, Array]:
+    """Parameters of the points of a patch over places of a chart, and which of them exist."""
     from scipy.spatial import cKDTree
 
     origin, (x, y, n) = chart.origin[0], chart.axes[0]
-    us, vs = (np.unique(np.concatenate([k.breaks, (k.breaks[1:] + k.breaks[:-1]) / 2])) for k in sheet.knots)
+    us, vs = (np.unique(np.concatenate([k.breaks, (k.breaks[1:] + k.breaks[:-1]) / 2])) for k in patch.knots)
     uv = np.stack(np.meshgrid(us, vs, indexing="ij"), axis=-1).reshape(-1, 2)
-    spots = (np.asarray(sheet.net.grid(us, vs)).reshape(-1, 3) - origin) @ chart.axes[0].T
+    spots = (np.asarray(patch.net.grid(us, vs)).reshape(-1, 3) - origin) @ chart.axes[0].T
     near = (np.linalg.norm(spots[:, :2], axis=1) <= 1.5 * chart.reach[0]) & (np.abs(spots[:, 2]) < 2 * chart.reach[0])
     if not near.any():
         near = np.ones(len(spots), bool)
     uv = uv[near][cKDTree(spots[near, :2]).query(ab)[1]]
-    low, high = sheet.domain
+    low, high = patch.domain
     size = high - low
     for _ in range(8):
-        s, su, sv = sheet.net.evaluate(uv, 1)
+        s, su, sv = patch.net.evaluate(uv, 1)
         r = np.stack([(s - origin) @ x - ab[:, 0], (s - origin) @ y - ab[:, 1]], axis=1)
         a, b, c, d = su @ x, sv @ x, su @ y, sv @ y
         det = a * d - b * c
         det = np.where(np.abs(det) > 1e-300, det, 1e-300)
         step = np.stack([d * r[:, 0] - b * r[:, 1], a * r[:, 1] - c * r[:, 0]], axis=1) / det[:, None]
         uv = uv - np.clip(step, -0.1 * size, 0.1 * size)
-        if not sheet.periodic.all():
-            uv = np.where(sheet.periodic, uv, np.clip(uv, low - 0.01 * size, high + 0.01 * size))
+        if not patch.periodic.all():
+            uv = np.where(patch.periodic, uv, np.clip(uv, low - 0.01 * size, high + 0.01 * size))
         if np.abs(step).max(initial=0.0) < 1e-13 * size.max():
             break
-    inside = ((uv >= low - 1e-9 * size) & (uv <= high + 1e-9 * size)) | sheet.periodic
+    inside = ((uv >= low - 1e-9 * size) & (uv <= high + 1e-9 * size)) | patch.periodic
     tight = np.linalg.norm(r, axis=1) < 1e-6 * chart.reach[0]
     return uv, inside.all(axis=1) & tight & ((s - origin) @ n > -2 * chart.reach[0])
 
 
-def _grid(sheet: Sheet) -> tuple[Array, Array]:
-    """Greville points of a sheet and outward normals there, ``(nu nv, 3)``."""
-    net = sheet.net
-    points, normals = sheet.lattice(net.u.greville(), net.v.greville())
+def _grid(patch: Patch) -> tuple[Array, Array]:
+    """Greville points of a patch and outward normals there, ``(nu nv, 3)``."""
+    net = patch.net
+    points, normals = patch.lattice(net.u.greville(), net.v.greville())
     return points.reshape(-1, 3), normals.reshape(-1, 3)

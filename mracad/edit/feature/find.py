@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mracad.bspline.surface import Net
-from mracad.edit.feature.sheet import Sheet
+from mracad.edit.feature.patch import Patch
 from mracad.model.brep import Model
 from mracad.wavelet.ladder import arc_lengths, ladder_for_scale
 from mracad.wavelet.project import projection
@@ -73,20 +73,20 @@ def found(model: Model, faces: Collection[int]) -> list[Found]:
     for surface in model.surfaces:
         own = [i for i in surface.faces if i in faces]
         if own:
-            result += _on(Sheet(model, surface.index, own))
+            result += _on(Patch.of(model, surface.index, own))
     return sorted(result, key=lambda f: -f.height)
 
 
-def _on(sheet: Sheet) -> list[Found]:
+def _on(patch: Patch) -> list[Found]:
     """Features of one surface."""
     from scipy.ndimage import label
 
-    net = sheet.net
+    net = patch.net
     lengths = [arc_lengths(net, axis) for axis in (0, 1)]
     us, vs = net.u.greville(), net.v.greville()
-    points, normals = sheet.lattice(us, vs)
+    points, normals = patch.lattice(us, vs)
     uv = np.stack(np.meshgrid(us, vs, indexing="ij"), axis=-1).reshape(-1, 2)
-    seen = sheet.covers(uv).reshape(points.shape[:2])
+    seen = patch.covers(uv).reshape(points.shape[:2])
     if seen.sum() < 64:
         return []
     _, su, sv = net.grid(us, vs, 1)
@@ -108,7 +108,7 @@ def _on(sheet: Sheet) -> list[Found]:
             middle = (points[own] * weight[:, None]).sum(axis=0) / weight.sum()
             place = points[own][np.linalg.norm(points[own] - middle, axis=1).argmin()]
             across = 2 * float(np.linalg.norm(points[own] - place, axis=1).max())
-            face = next((f.index for f in sheet.faces), 0)
+            face = next((f.index for f in patch.faces), 0)
             new = Found(face, tuple(float(x) for x in place), across, float(size[peak]), (scale / 2, scale))  # type: ignore[arg-type]
             kept = _merged(kept, new)
         scale *= 2

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from mracad.edit.feature.chart import Charts, charts
-from mracad.edit.feature.sheet import Sheet, inside
+from mracad.edit.feature.patch import Patch
 from mracad.model.brep import Model
 
 Array = np.ndarray
@@ -19,6 +19,9 @@ GRID = 11
 
 STEEP = 0.2
 """Least cosine between normals of what belongs to one place: beyond it is the other side of a wall."""
+
+SIDEWAYS = 1e-3
+"""Share of a distance by which a point may lie beside the normal at its foot: beyond, the ground has ended."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,31 +45,52 @@ class Feet:
     along: Array
     apart: Array
 
+    def part(self, some: slice) -> Feet:
+        """Some of them."""
+        return Feet(*(getattr(self, name)[some] for name in self.__dataclass_fields__))
 
+    def beside(self, points: Array) -> Array:
+        """How far points lie beside the normals at their feet, mm."""
+        way = points - self.points
+        return np.asarray(np.linalg.norm(way - (way * self.normals).sum(axis=1, keepdims=True) * self.normals, axis=1))
+
+
+@dataclass(frozen=True, eq=False)
 class Ground:
     """Faces of a model.
 
-    Parameters
+    Attributes
     ----------
     model : Model
-    faces : collection of int
+    chosen : frozenset of int
         NURBS faces.
-    poles : mapping of int to ndarray
-        By surface, control points in place of the model's.
+    patches : dict of int to Patch
+        Their surfaces.
     """
 
-    def __init__(self, model: Model, faces: Collection[int], poles: Mapping[int, Array] | None = None) -> None:
-        self.model, self.chosen = model, frozenset(faces)
+    model: Model
+    chosen: frozenset[int]
+    patches: dict[int, Patch]
+
+    @classmethod
+    def of(cls, model: Model, faces: Collection[int], poles: Mapping[int, Array] | None = None) -> Ground:
+        """Faces of a model, with control points by surface in place of the model's."""
         surfaces = sorted({s for i in faces if (s := model.faces[i].surface) is not None})
-        self.sheets = {i: Sheet(model, i, faces, (poles or {}).get(i)) for i in surfaces}
+        return cls(model, frozenset(faces), {i: Patch.of(model, i, faces, (poles or {}).get(i)) for i in surfaces})
+
+    def without(self, offsets: Mapping[int, Array]) -> Ground:
+        """The ground with offsets, by surface over the model's own nets, taken off."""
+        return Ground.of(
+            self.model, self.chosen, {i: self.model.surfaces[i].net.poles - each for i, each in offsets.items()}
+        )
 
     @cached_property
     def _stands(self) -> list[tuple[int, Array]]:
         """For surfaces that stand in several places, the motions from the others to the first."""
         found: list[tuple[int, Array]] = []
-        for index, sheet in self.sheets.items():
-            for face in sheet.faces:
-                way = sheet.frame @ np.linalg.inv(face.frame)
+        for index, patch in self.patches.items():
+            for face in patch.faces:
+                way = patch.frame @ np.linalg.inv(face.frame)
                 known = [np.eye(4), *(other for surface, other in found if surface == index)]
                 if not any(np.allclose(way, other, rtol=0, atol=1e-12) for other in known):
                     found.append((index, way))
@@ -91,37 +115,35 @@ class Ground:
 
         best = np.full(len(points), np.inf)
         surface, uv = np.zeros(len(points), int), np.zeros((len(points), 2))
-        for index, sheet in self.sheets.items():
-            seeds, spots = sheet.seeds
+        for index, patch in self.patches.items():
+            seeds, spots = patch.seeds
             if not len(seeds):
                 continue
-            near, which = cKDTree(spots).query(points, k=min(3, len(seeds)))
-            near, which = near.reshape(len(points), -1), which.reshape(len(points), -1)
+            which = cKDTree(spots).query(points, k=min(3, len(seeds)))[1].reshape(len(points), -1)
             for k in range(which.shape[1]):
-                at, apart = sheet.nearest(points, seeds[which[:, k]])
-                better = (apart < best - 1e-12) & sheet.covers(at)
+                at, apart = patch.nearest(points, seeds[which[:, k]])
+                better = (apart < best - 1e-12) & patch.covers(at)
                 best[better], surface[better], uv[better] = apart[better], index, at[better]
         return self.standing(surface, uv, best)
 
     def standing(self, surface: Array, uv: Array, apart: Array) -> Feet:
         """Feet given by parameters."""
         points, normals, along = (np.zeros((len(uv), 3)) for _ in range(3))
-        for index, sheet in self.sheets.items():
+        for index, patch in self.patches.items():
             own = surface == index
             if own.any():
-                s, su, _, n = sheet.evaluate(uv[own])
-                points[own], normals[own] = s, n
+                points[own], su, _, normals[own] = patch.evaluate(uv[own])
                 along[own] = su / np.maximum(np.linalg.norm(su, axis=1, keepdims=True), 1e-300)
         return Feet(surface, uv, points, normals, along, apart)
 
     def faces(self, surface: Array, uv: Array) -> Array:
         """The face of the ground that each place of a surface lies in, or -1."""
         found = np.full(len(uv), -1)
-        for index, sheet in self.sheets.items():
-            for face in sheet.faces:
+        for index, patch in self.patches.items():
+            for face in patch.faces:
                 own = np.flatnonzero((surface == index) & (found < 0))
                 if len(own):
-                    found[own[inside(face, sheet, uv[own])]] = face.index
+                    found[own[patch.inside(face, uv[own])]] = face.index
         return found
 
     def samples(self, feet: Feet, reach: Array, count: int = GRID) -> tuple[Array, Array, Array]:
@@ -131,39 +153,32 @@ class Ground:
         -------
         points : ndarray (m, q, 3)
         near : ndarray of bool (m, q)
-        touched : ndarray of bool (m, sheets)
+        touched : ndarray of bool (m, patches)
         """
         from scipy.spatial import cKDTree
 
-        centre = feet.points
         points, near = [], []
-        touched = np.zeros((len(centre), len(self.sheets)), bool)
-        for number, (index, sheet) in enumerate(self.sheets.items()):
-            start = feet.uv.copy()
-            here = feet.surface == index
-            if len(sheet.seeds[0]):
-                far, which = cKDTree(sheet.seeds[1]).query(centre)
-                other = ~here & (far <= 1.5 * reach + self._spread(sheet))
-                start[other] = sheet.nearest(centre[other], sheet.seeds[0][which[other]])[0]
+        touched = np.zeros((len(reach), len(self.patches)), bool)
+        for number, (index, patch) in enumerate(self.patches.items()):
+            start, here = feet.uv.copy(), feet.surface == index
+            seeds, spots = patch.seeds
+            if len(seeds):
+                spread = float(np.linalg.norm(np.ptp(spots, axis=0)) / 8)
+                far, which = cKDTree(spots).query(feet.points)
+                other = ~here & (far <= 1.5 * reach + spread)
+                start[other] = patch.nearest(feet.points[other], seeds[which[other]])[0]
                 here |= other
             if not here.any():
                 continue
-            found, normals, ok = sheet.around(start[here], centre[here], reach[here], count)
+            found, normals, ok = patch.around(start[here], feet.points[here], reach[here], count)
             ok &= (normals * feet.normals[here][:, None]).sum(axis=2) > STEEP
             touched[here, number] = ok.any(axis=1)
-            if not ok.any():
-                continue
-            every, counts = np.zeros((len(centre), *found.shape[1:])), np.zeros((len(centre), found.shape[1]), bool)
-            every[here], counts[here] = found, ok
-            points.append(every)
-            near.append(counts)
+            if ok.any():
+                every, counts = np.zeros((len(here), *found.shape[1:])), np.zeros((len(here), found.shape[1]), bool)
+                every[here], counts[here] = found, ok
+                points.append(every)
+                near.append(counts)
         return np.concatenate(points, axis=1), np.concatenate(near, axis=1), touched
-
-    @staticmethod
-    def _spread(sheet: Sheet) -> float:
-        """Distance between neighbouring seeds, at most about."""
-        spots = sheet.seeds[1]
-        return float(np.linalg.norm(np.ptp(spots, axis=0)) / 8)
 
     def charts(self, feet: Feet, directions: Array, reach: Array) -> tuple[Charts, Array]:
         """Charts around feet with x along given directions, and which surfaces each of them reaches."""

@@ -7,7 +7,7 @@ coordinates (turned, mirrored, scaled), in the frame carried there from the copy
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -16,7 +16,7 @@ from mracad.edit.feature.chart import Charts
 from mracad.edit.feature.detail import Feature
 from mracad.edit.feature.ground import STEEP, Feet, Ground
 from mracad.edit.feature.locate import Place
-from mracad.edit.feature.sheet import Sheet
+from mracad.edit.feature.patch import Patch
 
 Array = np.ndarray
 
@@ -40,8 +40,8 @@ class Copies:
     mirror : bool
     charts : Charts
         Of the ground around each.
-    touched : ndarray of bool (copies, sheets)
-        Which sheets of the ground each reaches.
+    touched : ndarray of bool (copies, patches)
+        Which patches of the ground each reaches.
     """
 
     ground: Ground
@@ -75,19 +75,19 @@ class Copies:
         """Largest displacement of the least of them, mm."""
         return float(self.feature.height * np.abs(self.heights).min())
 
-    def on(self, sheet: Sheet) -> Array:
-        """Which copies ``(copies,)`` reach a sheet."""
-        return np.asarray(self.touched[:, list(self.ground.sheets).index(sheet.index)])
+    def on(self, patch: Patch) -> Array:
+        """Which copies ``(copies,)`` reach a patch."""
+        return np.asarray(self.touched[:, list(self.ground.patches).index(patch.index)])
 
-    def ideal(self, sheet: Sheet, points: Array, normals: Array, some: Array | None = None) -> tuple[Array, Array]:
-        """The displacement ``(q, 3)`` at points of a sheet, in the part's frame, and how many copies reach each.
+    def ideal(self, patch: Patch, points: Array, normals: Array, some: Array | None = None) -> tuple[Array, Array]:
+        """The displacement ``(q, 3)`` at points of a patch, in the part's frame, and how many copies reach each.
 
         Only copies in ``some`` (a mask) count; all by default.
         """
         from scipy.spatial import cKDTree
 
         total, count = np.zeros((len(points), 3)), np.zeros(len(points), int)
-        chosen = np.flatnonzero(self.on(sheet) & (True if some is None else some))
+        chosen = np.flatnonzero(self.on(patch) & (True if some is None else some))
         if not len(points) or not len(chosen):
             return total, count
         tree = cKDTree(points)
@@ -135,12 +135,8 @@ def copies(ground: Ground, feature: Feature, places: Sequence[Place], feet: Feet
     given = np.array([feet.along[i] if p.direction is None else p.direction for i, p in enumerate(places)])
     reach = feature.reach * np.array([place.size for place in places])
     blocks = [slice(k, k + BATCH) for k in range(0, len(places), BATCH)]
-    parts = [ground.charts(_part(feet, b), given[b], 1.05 * reach[b]) for b in blocks]
+    parts = [ground.charts(feet.part(b), given[b], 1.05 * reach[b]) for b in blocks]
     names = ("origin", "axes", "reach", "graph", "log", "exp")
     charts = Charts(*(np.concatenate([getattr(c, name) for c, _ in parts]) for name in names))
     touched = np.concatenate([t for _, t in parts])
     return Copies(ground, feature, places, feet, overlap, mirror, charts, touched)
-
-
-def _part(feet: Feet, some: slice) -> Feet:
-    return replace(feet, **{name: getattr(feet, name)[some] for name in feet.__dataclass_fields__})

@@ -18,7 +18,7 @@ from mracad.constraint.frozen import jet_support, meeting
 from mracad.constraint.seam import Seam
 from mracad.constraint.trimmed import TrimmedSeam
 from mracad.edit.feature.crossing import Crossing, Stretch, exact_parts, met, trace
-from mracad.edit.feature.fine import grown
+from mracad.edit.feature.fit import grown
 from mracad.model.brep import Face
 from mracad.model.cells import quadrature
 from mracad.model.region import supported

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from mracad.bspline.surface import Net
-from mracad.edit.feature.ground import Feet, Ground
-from mracad.edit.feature.sheet import Sheet, inside
+from mracad.edit.feature.ground import SIDEWAYS, Feet, Ground
+from mracad.edit.feature.patch import Patch
 from mracad.errors import EditError, FileError, UsageError
 from mracad.model.brep import Model
 
@@ -89,10 +89,10 @@ def place(ground: Ground, text: str, label: str) -> Place:
         name, _, rest = text.partition("@")
         face = face_number(ground.model, name, label, PLACE)
         uv = np.array(numbers(rest, label, PLACE, (2,)))
-        sheet = sheet_of(ground, face, label)
-        if not _within(sheet, uv) or not inside(ground.model.faces[face], sheet, uv[None])[0]:
-            raise EditError(f"{label} is off the face: {_domain(sheet)}", "give parameters inside the face")
-        return Place(label, np.asarray(sheet.net.evaluate(uv[None]))[0], face, uv)
+        patch = patch_of(ground, face, label)
+        if not patch.within(uv) or not patch.inside(ground.model.faces[face], uv[None])[0]:
+            raise EditError(f"{label} is off the face: {_domain(patch)}", "give parameters inside the face")
+        return Place(label, np.asarray(patch.net.evaluate(uv[None]))[0], face, uv)
     point = np.array(numbers(text.removeprefix("near:"), label, PLACE, (3,)))
     return Place(label, ground.brought(point[None])[0])
 
@@ -136,15 +136,15 @@ def table(path: str) -> list[tuple[str, list[float]]]:
     return rows
 
 
-def sheet_of(ground: Ground, face: int, label: str) -> Sheet:
-    """The sheet of a face; raises EditError where the face does not belong to the ground."""
+def patch_of(ground: Ground, face: int, label: str) -> Patch:
+    """The patch of a face; raises EditError where the face does not belong to the ground."""
     surface = ground.model.faces[face].surface
     if face not in ground.chosen or surface is None:
         kind = ground.model.faces[face].kind
         raise EditError(
             f"{label}: #{face + 1} ({kind}) is not among the faces to edit", f"select it with --faces '#{face + 1}'"
         )
-    return ground.sheets[surface]
+    return ground.patches[surface]
 
 
 def standing(ground: Ground, places: Sequence[Place], far: float) -> Feet:
@@ -156,11 +156,9 @@ def standing(ground: Ground, places: Sequence[Place], far: float) -> Feet:
         if p.face is not None and p.uv is not None:
             surface[i], uv[i], apart[i] = ground.model.faces[p.face].surface, p.uv, 0.0
     feet = ground.standing(surface, uv, apart)
-    way = points - feet.points
-    sideways = np.linalg.norm(way - (way * feet.normals).sum(axis=1, keepdims=True) * feet.normals, axis=1)
     on = np.isfinite(apart) & (ground.faces(surface, uv) >= 0)
     given = np.array([p.face is not None for p in places], bool)
-    bad = ~on | ~(given | ((apart <= far) & (sideways <= 1e-3 * far)))
+    bad = ~on | ~(given | ((apart <= far) & (feet.beside(points) <= SIDEWAYS * far)))
     if bad.any():
         i = int(np.flatnonzero(bad)[0])
         off = f"{apart[i]:.3g} mm off" if on[i] else "off"
@@ -171,13 +169,8 @@ def standing(ground: Ground, places: Sequence[Place], far: float) -> Feet:
     return feet
 
 
-def _within(sheet: Sheet, uv: Array) -> bool:
-    low, high = sheet.domain
-    return bool((((uv >= low) & (uv <= high)) | sheet.periodic).all())
-
-
-def _domain(sheet: Sheet) -> str:
-    u, v = sheet.knots
+def _domain(patch: Patch) -> str:
+    u, v = patch.knots
     return f"u goes from {u.domain[0]:g} to {u.domain[1]:g}, v from {v.domain[0]:g} to {v.domain[1]:g}"
 
 
@@ -194,7 +187,7 @@ class Window:
         Of a disc, mm; half the diagonal of a rectangle.
     box : ndarray (2, 2) or None
         Least and largest parameters of a rectangle.
-    sheet : Sheet or None
+    patch : Patch or None
         Its surface.
     width : float
         Of the taper, mm.
@@ -205,20 +198,20 @@ class Window:
     radius: float
     width: float
     box: Array | None = None
-    sheet: Sheet | None = None
+    patch: Patch | None = None
 
     def reach(self, width: float) -> float:
         """How far the window reaches with a taper, mm."""
         return self.radius + width
 
-    def share(self, sheet: Sheet, points: Array, xy: Array, width: float) -> Array:
-        """How far into the taper Greville points (flat indices) of a sheet lie: below 0 inside, 1 and more beyond."""
+    def share(self, patch: Patch, points: Array, xy: Array, width: float) -> Array:
+        """How far into the taper Greville points (flat indices) of a patch lie: below 0 inside, 1 and more beyond."""
         if self.box is None:
             beyond = np.linalg.norm(xy, axis=1) - self.radius
-        elif sheet is not self.sheet:
+        elif patch is not self.patch:
             return np.full(len(points), np.inf)
         else:
-            beyond = _beyond(sheet.net, self.box)[points]
+            beyond = _beyond(patch.net, self.box)[points]
         return np.asarray(beyond / width if width else np.where(beyond > 0, np.inf, 0.0))
 
 
@@ -260,21 +253,21 @@ def window(ground: Ground, text: str, taper: float | None) -> Window:
     if not box:
         raise UsageError(f"{label}: this is not a window", WINDOW)
     face = face_number(ground.model, box[1], label, WINDOW)
-    sheet = sheet_of(ground, face, label)
+    patch = patch_of(ground, face, label)
     (u0, u1, v0, v1) = (float(x) for x in box.groups()[1:])
     corners = np.array([[u0, v0], [u1, v1]])
     if not (u0 < u1 and v0 < v1):
         raise UsageError(f"{label}: the window is empty", WINDOW)
-    if not all(_within(sheet, corner) for corner in corners):
-        raise EditError(f"{label}: the window is outside the face: {_domain(sheet)}", "give parameters inside the face")
+    if not patch.within(corners).all():
+        raise EditError(f"{label}: the window is outside the face: {_domain(patch)}", "give parameters inside the face")
     middle = corners.mean(axis=0)
-    if not inside(ground.model.faces[face], sheet, middle[None])[0]:
+    if not patch.inside(ground.model.faces[face], middle[None])[0]:
         raise EditError(f"{label}: the middle of the window is outside the face", "move it onto the face")
     surface = ground.model.faces[face].surface
     feet = ground.standing(np.array([surface]), middle[None], np.zeros(1))
     edge = np.array([[u0, v0], [u1, v0], [u1, v1], [u0, v1]])
-    points = np.asarray(sheet.net.evaluate(edge))
+    points = np.asarray(patch.net.evaluate(edge))
     sides = np.linalg.norm(points - np.roll(points, 1, axis=0), axis=1)
     radius = float(np.linalg.norm(points - feet.points[0], axis=1).max())
     width = float(sides.min()) / 4 if taper is None else taper
-    return Window(feet, feet.points[0], radius, width, corners, sheet)
+    return Window(feet, feet.points[0], radius, width, corners, patch)

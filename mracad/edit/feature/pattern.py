@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from mracad.edit.feature.ground import Feet, Ground, axes
+from mracad.edit.feature.ground import SIDEWAYS, Feet, Ground, axes
 from mracad.edit.feature.locate import MOST_PLACES, Place, numbers, place, table, whole
 from mracad.errors import EditError, UsageError
 from mracad.model.brep import Model
@@ -79,9 +79,7 @@ def _walked(ground: Ground, points: Array, frames: Array, axis: int, distance: f
     for _ in range(STRIDES):
         ahead = points + distance / STRIDES * frames[:, axis]
         feet = ground.feet(ahead)
-        way = ahead - feet.points
-        sideways = np.linalg.norm(way - (way * feet.normals).sum(axis=1, keepdims=True) * feet.normals, axis=1)
-        on &= sideways <= 1e-3 * abs(distance)
+        on &= feet.beside(ahead) <= SIDEWAYS * abs(distance)
         points = np.where(on[:, None], feet.points, ahead)
         frames = np.where(on[:, None, None], axes(feet.normals, frames[:, 0]), frames)
     return points, frames
@@ -124,7 +122,7 @@ def along(ground: Ground, text: str) -> list[Place]:
         raise EditError(f"along: edge#{number} bounds no face to edit", "select one of its faces with --faces")
     points, tangents = _even(edge.points, edge.tangents, count)
     face = model.faces[side.face]
-    way = ground.sheets[face.surface].frame @ np.linalg.inv(face.frame)  # type: ignore[index]  # it is a NURBS face
+    way = ground.patches[face.surface].frame @ np.linalg.inv(face.frame)  # type: ignore[index]  # it is a NURBS face
     points, tangents = points @ way[:3, :3].T + way[:3, 3], tangents @ way[:3, :3].T
     inward = _inward(model, ground, edge.index, points, tangents) if offset else np.zeros_like(points)
     return [

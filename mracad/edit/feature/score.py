@@ -9,9 +9,9 @@ import numpy as np
 
 from mracad.bspline.surface import Net
 from mracad.edit.feature.detail import LOST
-from mracad.edit.feature.fine import between
+from mracad.edit.feature.fit import between
 from mracad.edit.feature.ideal import Copies
-from mracad.edit.feature.sheet import Sheet
+from mracad.edit.feature.patch import Patch
 from mracad.errors import EditError
 
 Array = np.ndarray
@@ -53,7 +53,7 @@ class Copy:
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """What copies became on a sheet.
+    """What copies became on a patch.
 
     Attributes
     ----------
@@ -104,9 +104,9 @@ def compared(copies: Copies, outcomes: Mapping[int, Outcome], exact: Array) -> l
     """
     tally = _Tally(len(copies.places))
     for i, outcome in outcomes.items():
-        sheet = copies.ground.sheets[i]
-        if copies.on(sheet).any():
-            for copy, *found in _missed(copies, sheet, outcome):
+        patch = copies.ground.patches[i]
+        if copies.on(patch).any():
+            for copy, *found in _missed(copies, patch, outcome):
                 tally.add(copy, *found)
     rms = tally.rms
     return [
@@ -124,23 +124,23 @@ def compared(copies: Copies, outcomes: Mapping[int, Outcome], exact: Array) -> l
     ]
 
 
-def _missed(copies: Copies, sheet: Sheet, outcome: Outcome) -> Iterator[tuple[int, Array, Array, Array, Array]]:
-    """For copies on a sheet: distances from the ideal, what constraints took, what control points cannot hold, and
+def _missed(copies: Copies, patch: Patch, outcome: Outcome) -> Iterator[tuple[int, Array, Array, Array, Array]]:
+    """For copies on a patch: distances from the ideal, what constraints took, what control points cannot hold, and
     faces, at points of it."""
     from scipy.spatial import cKDTree
 
-    net, some = outcome.net, copies.on(sheet)
-    both = np.concatenate([outcome.done @ sheet.turn.T, outcome.alone @ sheet.turn.T], axis=-1)
+    net, some = outcome.net, copies.on(patch)
+    both = np.concatenate([outcome.done @ patch.turn.T, outcome.alone @ patch.turn.T], axis=-1)
     pair = Net(net.u, net.v, both, net.weights)
-    for uv, _ in between(copies, sheet, (net.u, net.v), some):
-        uv = uv[sheet.covers(uv, net)]
+    for uv, _ in between(copies, patch, (net.u, net.v), some):
+        uv = uv[patch.covers(uv, net)]
         if not len(uv):
             continue
-        points, _, _, normals = sheet.evaluate(uv)
-        wanted, _ = copies.ideal(sheet, points, normals)
-        on = np.full(len(uv), sheet.faces[0].index)
-        if len(sheet.faces) > 1:
-            on = copies.ground.faces(np.full(len(uv), sheet.index), uv)
+        points, _, _, normals = patch.evaluate(uv)
+        wanted, _ = copies.ideal(patch, points, normals)
+        on = np.full(len(uv), patch.faces[0].index)
+        if len(patch.faces) > 1:
+            on = copies.ground.faces(np.full(len(uv), patch.index), uv)
         values = np.asarray(pair.evaluate(uv))
         missed = np.linalg.norm(values[:, :3] - wanted, axis=1)
         gone = np.linalg.norm(values[:, :3] - values[:, 3:], axis=1)

@@ -19,9 +19,9 @@ from mracad.constraint.seam import seams
 from mracad.constraint.wishes import Wishes
 from mracad.edit.feature.copies import Laid, offset, over
 from mracad.edit.feature.detail import taper
-from mracad.edit.feature.fine import MISSED, NARROWEST, Knots, divided, split, through, weights_over
+from mracad.edit.feature.fit import MISSED, NARROWEST, Knots, divided, split, through, weights_over
+from mracad.edit.feature.patch import Patch
 from mracad.edit.feature.score import Copy
-from mracad.edit.feature.sheet import Sheet
 from mracad.errors import EditError
 from mracad.model.brep import Model
 from mracad.spec.steps import Transfer
@@ -43,24 +43,24 @@ def at_scale(net: Net, scale: float) -> Array:
 
 
 class Character:
-    """The detail of a sheet in a band (mm), and the lengths along it.
+    """The detail of a patch in a band (mm), and the lengths along it.
 
     Attributes
     ----------
     coarse : Net
-        The sheet without what is finer than the band's largest wavelength.
+        The patch without what is finer than the band's largest wavelength.
     detail : Net
         Offsets: the band.
     """
 
-    def __init__(self, sheet: Sheet, band: tuple[float, float]) -> None:
-        self.sheet, net = sheet, sheet.net
+    def __init__(self, patch: Patch, band: tuple[float, float]) -> None:
+        self.patch, net = patch, patch.net
         poles = at_scale(net, band[1])
         fine = at_scale(net, band[0]) if band[0] else net.poles
         self.coarse = Net(net.u, net.v, poles, net.weights)
         self.detail = Net(net.u, net.v, fine - poles, net.weights)
-        uv = [trim.curve.poles for face in sheet.faces for trim in face.trims]
-        low, high = sheet.domain
+        uv = [trim.curve.poles for face in patch.faces for trim in face.trims]
+        low, high = patch.domain
         if uv:
             every = np.concatenate(uv)
             low, high = (np.clip(x, low, high) for x in (every.min(axis=0), every.max(axis=0)))
@@ -68,7 +68,7 @@ class Character:
 
     def _lengths(self, axis: int, low: Array, high: Array) -> tuple[Array, Array]:
         """Parameters from one end of the face to the other, and arc lengths there, in one direction."""
-        kv = self.sheet.knots[axis]
+        kv = self.patch.knots[axis]
         inner = kv.breaks[(kv.breaks > low[axis]) & (kv.breaks < high[axis])]
         ends = np.concatenate([[low[axis]], inner, [high[axis]]])
         steps = -(-STEPS // (len(ends) - 1)) * (len(ends) - 1)
@@ -93,7 +93,7 @@ class Character:
     def frames(self, uv: Array) -> Array:
         """Frames ``(q, 3, 3)``: rows S_u, N × S_u, N of the coarse surface."""
         _, su, sv = self.coarse.evaluate(uv, 1)
-        normal = self.sheet.signs(uv)[:, None] * np.cross(su, sv)
+        normal = self.patch.signs(uv)[:, None] * np.cross(su, sv)
         x, n = (d / np.maximum(np.linalg.norm(d, axis=1, keepdims=True), 1e-300) for d in (su, normal))
         return np.stack([x, np.cross(n, x), n], axis=1)
 
@@ -104,7 +104,7 @@ class Character:
 
 @dataclass(frozen=True, eq=False)
 class Carried:
-    """The detail of one sheet at the places of another."""
+    """The detail of one patch at the places of another."""
 
     own: Character
     other: Character
@@ -127,15 +127,15 @@ class Carried:
 
 
 def laid_on(
-    model: Model, target: Sheet, source: Sheet, band: tuple[float, float], options: Transfer, width: float | None
+    model: Model, target: Patch, source: Patch, band: tuple[float, float], options: Transfer, width: float | None
 ) -> Laid:
-    """The detail of one sheet on another, as offsets.
+    """The detail of one patch on another, as offsets.
 
     Parameters
     ----------
     model : Model
         The target's.
-    target, source : Sheet
+    target, source : Patch
     band : (float, float)
         Wavelengths, mm.
     options : Transfer
@@ -166,7 +166,7 @@ def laid_on(
     return Laid({target.index: offset(net, fine, wanted * window[..., None] @ target.turn)}, (copy,))
 
 
-def _compared(target: Sheet, ideal: Carried, knots: Knots, poles: Array, gone: Array) -> Copy:
+def _compared(target: Patch, ideal: Carried, knots: Knots, poles: Array, gone: Array) -> Copy:
     """What became of the detail, of which control points ``gone`` are taken away."""
     uv = _middles(*knots)
     uv = uv[target.covers(uv)]
@@ -186,19 +186,19 @@ def _compared(target: Sheet, ideal: Carried, knots: Knots, poles: Array, gone: A
     )
 
 
-def _spacing(sheet: Sheet) -> float:
-    """Median width of the spans of a sheet in the denser direction, mm."""
-    lengths = (arc_lengths(sheet.net, axis) for axis in (0, 1))
+def _spacing(patch: Patch) -> float:
+    """Median width of the spans of a patch in the denser direction, mm."""
+    lengths = (arc_lengths(patch.net, axis) for axis in (0, 1))
     return min(float(np.median(each[each > 0])) for each in lengths)
 
 
-def _poles(target: Sheet, ideal: Carried, knots: Knots) -> Array:
+def _poles(target: Patch, ideal: Carried, knots: Knots) -> Array:
     """Control points over knots of the target that hold the ideal, in the part's frame."""
     at = np.stack(np.meshgrid(*(k.greville() for k in knots), indexing="ij"), axis=-1).reshape(-1, 2)
     return through(target, knots, ideal(at).reshape(knots[0].count, knots[1].count, 3))
 
 
-def _more(target: Sheet, ideal: Carried, knots: Knots, limit: float, least: float) -> list[Array]:
+def _more(target: Patch, ideal: Carried, knots: Knots, limit: float, least: float) -> list[Array]:
     """Knots that divide the spans in which the target misses the ideal by more than a limit."""
     uv = _middles(*knots)
     uv = uv[target.covers(uv)]

@@ -15,7 +15,7 @@ from mracad.bspline.fit import interpolated
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
 from mracad.edit.feature.ideal import Copies
-from mracad.edit.feature.sheet import Sheet
+from mracad.edit.feature.patch import Patch
 from mracad.errors import EditError
 from mracad.wavelet.ladder import arc_lengths
 
@@ -53,7 +53,7 @@ _ACROSS = 160
 
 
 class Fit:
-    """Control points that hold copies on sheets; the last ones of each sheet are remembered.
+    """Control points that hold copies on patches; the last ones of each patch are remembered.
 
     Parameters
     ----------
@@ -66,51 +66,51 @@ class Fit:
         self.copies, self.some = copies, some
         self._known: dict[int, tuple[Knots, Array]] = {}
 
-    def on(self, sheet: Sheet) -> Array:
-        """Which copies are to be held by a sheet."""
-        return self.copies.on(sheet) & self.some
+    def on(self, patch: Patch) -> Array:
+        """Which copies are to be held by a patch."""
+        return self.copies.on(patch) & self.some
 
-    def poles(self, sheet: Sheet, knots: Knots) -> Array:
+    def poles(self, patch: Patch, knots: Knots) -> Array:
         """Control points over some knots whose surface takes the ideal displacement, in the part's frame."""
-        known = self._known.get(sheet.index)
+        known = self._known.get(patch.index)
         if known is None or known[0] != knots:
-            known = self._known[sheet.index] = knots, self._made(sheet, knots)
+            known = self._known[patch.index] = knots, self._made(patch, knots)
         return known[1]
 
-    def _made(self, sheet: Sheet, knots: Knots) -> Array:
+    def _made(self, patch: Patch, knots: Knots) -> Array:
         us, vs = (kv.greville() for kv in knots)
-        points, normals = sheet.lattice(us, vs)
-        values, count = self.copies.ideal(sheet, points.reshape(-1, 3), normals.reshape(-1, 3), self.some)
-        poles = through(sheet, knots, values.reshape(points.shape))
+        points, normals = patch.lattice(us, vs)
+        values, count = self.copies.ideal(patch, points.reshape(-1, 3), normals.reshape(-1, 3), self.some)
+        poles = through(patch, knots, values.reshape(points.shape))
         near = grown(count.reshape(points.shape[:2]) > 0, knots)
         return np.where(near[..., None], poles, 0.0)
 
-    def knots(self, sheet: Sheet) -> Knots:
-        """Knots of the sheet's surface that hold the copies: its own, and such as divide spans too wide for them."""
-        some = self.on(sheet)
+    def knots(self, patch: Patch) -> Knots:
+        """Knots of the patch's surface that hold the copies: its own, and such as divide spans too wide for them."""
+        some = self.on(patch)
         if not some.any():
-            return sheet.knots
-        u, v = (kv.elevated(SMOOTH) if kv.degree == 1 else kv for kv in sheet.knots)
-        widest = [float(arc_lengths(sheet.net, axis).max()) for axis in (0, 1)]
+            return patch.knots
+        u, v = (kv.elevated(SMOOTH) if kv.degree == 1 else kv for kv in patch.knots)
+        widest = [float(arc_lengths(patch.net, axis).max()) for axis in (0, 1)]
         if all(UNEVEN * x <= SPARE * self._least(kv) for x, kv in zip(widest, (u, v), strict=True)):
             return u, v
-        first = _first(self.copies, sheet, some, max(widest))
+        first = _first(self.copies, patch, some, max(widest))
         knots = u.refined(first[0]), v.refined(first[1])
-        return divided(knots, lambda knots: self._more(sheet, knots, some))
+        return divided(knots, lambda knots: self._more(patch, knots, some))
 
-    def _more(self, sheet: Sheet, knots: Knots, some: Array) -> list[Array]:
+    def _more(self, patch: Patch, knots: Knots, some: Array) -> list[Array]:
         """Knots that divide the spans in which the interpolant misses the ideal."""
         if knots[0].count * knots[1].count > MOST:
             raise EditError(
-                f"the copies need {knots[0].count} × {knots[1].count} control points on #{sheet.faces[0].index + 1}",
+                f"the copies need {knots[0].count} × {knots[1].count} control points on #{patch.faces[0].index + 1}",
                 "use larger or fewer copies",
             )
-        delta = Net(*knots, self.poles(sheet, knots), weights_over(sheet, knots))
+        delta = Net(*knots, self.poles(patch, knots), weights_over(patch, knots))
         more = []
-        for axis, (uv, span) in enumerate(between(self.copies, sheet, knots, some)):
+        for axis, (uv, span) in enumerate(between(self.copies, patch, knots, some)):
             kv = knots[axis]
-            points, *tangents, normals = sheet.evaluate(uv)
-            wanted, _ = self.copies.ideal(sheet, points, normals, self.some)
+            points, *tangents, normals = patch.evaluate(uv)
+            wanted, _ = self.copies.ideal(patch, points, normals, self.some)
             missed = np.linalg.norm(np.asarray(delta.evaluate(uv)) - wanted, axis=1)
             limit = MISSED * self.copies.height
             more.append(split(kv, span, missed / limit, np.linalg.norm(tangents[axis], axis=1), self._least(kv)))
@@ -165,9 +165,9 @@ def evenly(kv: KnotVector, pieces: Array) -> Array:
     return np.concatenate(found) if found else np.empty(0)
 
 
-def through(sheet: Sheet, knots: Knots, values: Array) -> Array:
-    """Control points ``(nu, nv, 3)`` over knots of a sheet that take values at the Greville points."""
-    weights = weights_over(sheet, knots)
+def through(patch: Patch, knots: Knots, values: Array) -> Array:
+    """Control points ``(nu, nv, 3)`` over knots of a patch that take values at the Greville points."""
+    weights = weights_over(patch, knots)
     if weights is None:
         return interpolated(*knots, values)
     us, vs = (kv.greville() for kv in knots)
@@ -175,9 +175,9 @@ def through(sheet: Sheet, knots: Knots, values: Array) -> Array:
     return np.asarray(interpolated(*knots, values) / weights[..., None])
 
 
-def weights_over(sheet: Sheet, knots: Knots) -> Array | None:
-    """The weights of a sheet over finer knots."""
-    return sheet.net.weights if sheet.net.weights is None else sheet.net.over(*knots).weights
+def weights_over(patch: Patch, knots: Knots) -> Array | None:
+    """The weights of a patch over finer knots."""
+    return patch.net.weights if patch.net.weights is None else patch.net.over(*knots).weights
 
 
 def grown(near: Array, knots: Knots, steps: int = 1) -> Array:
@@ -192,16 +192,16 @@ def grown(near: Array, knots: Knots, steps: int = 1) -> Array:
     return near
 
 
-def _first(copies: Copies, sheet: Sheet, some: Array, longest: float) -> tuple[Array, Array]:
+def _first(copies: Copies, patch: Patch, some: Array, longest: float) -> tuple[Array, Array]:
     """Knots that make spans under copies no longer than a share of their reach."""
     if 2 * longest <= float(copies.reach[some].min()) / FIRST:
         return np.empty(0), np.empty(0)
-    at = [np.unique(np.r_[k.breaks, np.linspace(*k.domain, _ACROSS)]) for k in sheet.knots]
-    points = np.asarray(sheet.net.grid(at[0], at[1]))
+    at = [np.unique(np.r_[k.breaks, np.linspace(*k.domain, _ACROSS)]) for k in patch.knots]
+    points = np.asarray(patch.net.grid(at[0], at[1]))
     room = _room(copies, points, some)
     u, v = (
         _needed(kv, x, points.swapaxes(0, axis), room.swapaxes(0, axis))
-        for axis, (kv, x) in enumerate(zip(sheet.knots, at, strict=True))
+        for axis, (kv, x) in enumerate(zip(patch.knots, at, strict=True))
     )
     return u, v
 
@@ -232,13 +232,13 @@ def _needed(kv: KnotVector, at: Array, points: Array, room: Array) -> Array:
     return evenly(kv, np.maximum(np.ceil(pieces - 1e-6), 1).astype(int))
 
 
-def between(copies: Copies, sheet: Sheet, knots: Knots, some: Array) -> list[tuple[Array, Array]]:
+def between(copies: Copies, patch: Patch, knots: Knots, some: Array) -> list[tuple[Array, Array]]:
     """For each direction: places under copies half-way between Greville points in it, on them in the other, and the
     spans they are in."""
     from scipy.spatial import cKDTree
 
     at = [k.greville() for k in knots]
-    tree = cKDTree(np.asarray(sheet.net.grid(at[0], at[1])).reshape(-1, 3))
+    tree = cKDTree(np.asarray(patch.net.grid(at[0], at[1])).reshape(-1, 3))
     rng = np.random.default_rng(0)
     which = np.flatnonzero(some)
     hits = tree.query_ball_point(copies.charts.origin[which], copies.reach[which])

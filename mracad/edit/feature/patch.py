@@ -1,0 +1,226 @@
+"""One surface of the ground that features lie on."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mracad.bspline.knots import KnotVector
+from mracad.bspline.surface import Net
+from mracad.model.brep import Face, Model
+from mracad.model.outline import FLAT, outline
+from mracad.model.region import face_region
+
+Array = np.ndarray
+
+SEEDS = 90
+"""Places in each direction from which a point is projected, at most."""
+
+STEPS = 12
+"""Newton steps of a projection."""
+
+
+@dataclass(frozen=True, eq=False)
+class Patch:
+    """One surface of the ground.
+
+    Attributes
+    ----------
+    index : int
+        In ``Model.surfaces``.
+    net : Net
+        In the part's frame.
+    faces : tuple of Face
+        Those of its faces that belong to the ground.
+    """
+
+    index: int
+    net: Net
+    faces: tuple[Face, ...]
+
+    @classmethod
+    def of(cls, model: Model, surface: int, faces: Collection[int], poles: Array | None = None) -> Patch:
+        """A surface with some of its faces, and with other control points (in its own frame) if there are any."""
+        own = model.surfaces[surface].net
+        on_it = tuple(model.faces[i] for i in model.surfaces[surface].faces if i in faces)
+        frame = on_it[0].frame
+        poles = (own.poles if poles is None else poles) @ frame[:3, :3].T + frame[:3, 3]
+        return cls(surface, Net(own.u, own.v, poles, own.weights), on_it)
+
+    @property
+    def frame(self) -> Array:
+        """From the surface's frame to the part's, as the first face has it; see :meth:`Ground.brought`."""
+        return self.faces[0].frame
+
+    @property
+    def turn(self) -> Array:
+        """The rotation of the frame."""
+        return self.frame[:3, :3]
+
+    @property
+    def knots(self) -> tuple[KnotVector, KnotVector]:
+        return self.net.u, self.net.v
+
+    @cached_property
+    def domain(self) -> tuple[Array, Array]:
+        """Least and largest parameters."""
+        low, high = np.array([k.domain for k in self.knots]).T
+        return low, high
+
+    @cached_property
+    def periodic(self) -> Array:
+        return np.array([k.periodic for k in self.knots])
+
+    def within(self, uv: Array) -> Array:
+        """Whether parameters ``(q, 2)`` lie in the domain."""
+        low, high = self.domain
+        return np.asarray((((uv >= low) & (uv <= high)) | self.periodic).all(axis=-1))
+
+    def covers(self, uv: Array, net: Net | None = None) -> Array:
+        """Whether parameters ``(q, 2)`` lie in cells, those of a finer net if there is one, that the faces touch."""
+        net = net or self.net
+        u, v = (
+            np.clip(np.searchsorted(k.breaks, k.wrap(uv[:, i]), side="right") - 1, 0, k.spans - 1)
+            for i, k in enumerate((net.u, net.v))
+        )
+        return np.asarray(self.within(uv) & touched(net, self.faces)[u, v])
+
+    def signs(self, uv: Array) -> Array:
+        """1.0 where S_u × S_v points outward on the face at, or nearest to, parameters ``(q, 2)``, else -1.0."""
+        signs = np.array([-1.0 if face.reversed else 1.0 for face in self.faces])
+        if (signs == signs[0]).all():
+            return np.full(len(uv), signs[0])
+        return signs[np.argmin([self._off(face, uv) for face in self.faces], axis=0)]
+
+    def evaluate(self, uv: Array) -> tuple[Array, Array, Array, Array]:
+        """Points, derivatives and unit normals (outward) at parameters ``(q, 2)``."""
+        s, su, sv = self.net.evaluate(uv, 1)
+        return s, su, sv, _unit(self.signs(uv)[:, None] * np.cross(su, sv))
+
+    def lattice(self, us: Array, vs: Array) -> tuple[Array, Array]:
+        """Points and unit normals (outward) at all pairs of parameters, ``(m, n, 3)``."""
+        points, su, sv = self.net.grid(us, vs, 1)
+        return points, _unit(self.signs(pairs(us, vs)).reshape(*points.shape[:2], 1) * np.cross(su, sv))
+
+    @cached_property
+    def seeds(self) -> tuple[Array, Array]:
+        """Parameters spread over the faces, and their points."""
+        lists = []
+        for k in self.knots:
+            count = int(np.clip(3 * k.spans, 16, SEEDS))
+            lists.append(np.interp(np.linspace(0, k.spans, count), np.arange(k.spans + 1), k.breaks))
+        uv = pairs(*lists)
+        uv = uv[self.covers(uv)]
+        return uv, np.asarray(self.net.evaluate(uv))
+
+    def nearest(self, points: Array, uv: Array) -> tuple[Array, Array]:
+        """Feet of points, by Gauss and Newton from ``uv``, and their distances."""
+        low, high = self.domain
+        size = high - low
+        low, high = np.where(self.periodic, -np.inf, low), np.where(self.periodic, np.inf, high)
+        uv = np.clip(uv, low, high)
+        apart = np.linalg.norm(np.asarray(self.net.evaluate(uv)) - points, axis=1)
+        share = np.ones(len(uv))
+        for _ in range(STEPS):
+            s, su, sv, suu, suv, svv = self.net.evaluate(uv, 2)
+            r = s - points
+            p, q = (r * su).sum(1), (r * sv).sum(1)
+            e, f, g = (su * su).sum(1), (su * sv).sum(1), (sv * sv).sum(1)
+            ee, ff, gg = e + (r * suu).sum(1), f + (r * suv).sum(1), g + (r * svv).sum(1)
+            bent = (ee > 0) & (gg > 0) & (ee * gg - ff * ff > 1e-6 * e * g)
+            e, f, g = np.where(bent, ee, e), np.where(bent, ff, f), np.where(bent, gg, g)
+            held = [((uv[:, i] <= low[i]) & (x > 0)) | ((uv[:, i] >= high[i]) & (x < 0)) for i, x in enumerate((p, q))]
+            p, q, f = np.where(held[0], 0, p), np.where(held[1], 0, q), np.where(held[0] | held[1], 0, f)
+            det = np.maximum(e * g - f * f, 1e-14 * e * g + 1e-300)
+            step = np.stack([f * q - g * p, f * p - e * q], axis=1) / det[:, None]
+            tried = np.clip(uv + share[:, None] * step, low, high)
+            there = np.linalg.norm(np.asarray(self.net.evaluate(tried)) - points, axis=1)
+            good = there <= apart * (1 + 1e-15)
+            uv, apart = np.where(good[:, None], tried, uv), np.where(good, there, apart)
+            share = np.where(good, 1.0, share / 4)
+            if (np.abs(step) <= 1e-13 * size).all():
+                break
+        return uv, apart
+
+    def around(self, uv: Array, centre: Array, reach: Array, count: int) -> tuple[Array, Array, Array]:
+        """Samples around places, ``count`` in each direction.
+
+        Returns
+        -------
+        points, normals : ndarray (m, q, 3)
+        near : ndarray of bool (m, q)
+            Which of them lie on the faces and within the reach.
+        """
+        s, su, sv, _ = self.evaluate(uv)
+        share = np.linspace(0.0, 1.0, count)
+        lines = []
+        for axis, tangent in enumerate((su, sv)):
+            first, last = (uv[:, axis] + sign * self._room(uv, s, tangent, reach, axis, sign) for sign in (-1.0, 1.0))
+            lines.append(first[:, None] + (last - first)[:, None] * share)
+        grid = np.stack(np.broadcast_arrays(lines[0][:, :, None], lines[1][:, None, :]), axis=-1).reshape(-1, 2)
+        points, _, _, normals = self.evaluate(grid)
+        shape = (len(uv), count * count)
+        points, normals = points.reshape(*shape, 3), normals.reshape(*shape, 3)
+        near = self.covers(grid).reshape(shape)
+        near &= np.linalg.norm(points - centre[:, None], axis=2) <= 1.1 * reach[:, None]
+        return points, normals, near
+
+    def _room(self, uv: Array, points: Array, tangent: Array, reach: Array, axis: int, sign: float) -> Array:
+        """How far to go in one direction to get a little beyond the reach, as far as the domain goes."""
+        low, high = self.domain
+        room = np.full(len(uv), 0.5 * (high - low)[axis])
+        if not self.periodic[axis]:
+            room = np.maximum(sign * (np.where(sign > 0, high[axis], low[axis]) - uv[:, axis]), 0.0)
+        step = np.minimum(reach / np.maximum(np.linalg.norm(tangent, axis=1), 1e-300), room)
+        for _ in range(6):
+            at = uv.copy()
+            at[:, axis] += sign * step
+            far = np.linalg.norm(np.asarray(self.net.evaluate(at)) - points, axis=1)
+            step = np.minimum(step * np.clip(reach / np.maximum(far, 1e-300), 0.4, 2.5), room)
+        return np.asarray(np.minimum(1.2 * step, room))
+
+    def inside(self, face: Face, uv: Array) -> Array:
+        """Whether parameters ``(q, 2)`` lie within a face or on its boundary, as far as its outline tells."""
+        return np.asarray(self._off(face, uv) <= FLAT)
+
+    def _off(self, face: Face, uv: Array) -> Array:
+        """How far parameters ``(q, 2)`` lie outside a face, in shares of the domain; 0 within."""
+        chords = outline(face, self.net).chords if face.trims else np.empty((0, 2, 2))
+        if not len(chords):
+            return np.zeros(len(uv))
+        low, high = self.domain
+        size = high - low
+        p, q = ((chords[:, end] - low) / size for end in (0, 1))
+        way = q - p
+        length = np.maximum((way**2).sum(axis=1), 1e-300)
+        slope = np.where(way[:, 1] == 0, np.inf, way[:, 1])
+        off = np.full(len(uv), np.inf)
+        turns = [(-1, 0, 1) if periodic else (0,) for periodic in self.periodic]
+        for turn in pairs(*turns):
+            for block in np.array_split(np.arange(len(uv)), max(len(uv) * len(p) >> 20, 1)):
+                at = ((uv[block] - low) / size + turn)[:, None]
+                t = np.clip(((at - p) * way).sum(axis=2) / length, 0, 1)
+                apart = np.linalg.norm(p + t[..., None] * way - at, axis=2).min(axis=1)
+                cross = (p[:, 1] > at[..., 1]) != (q[:, 1] > at[..., 1])
+                x = p[:, 0] + (at[..., 1] - p[:, 1]) * way[:, 0] / slope
+                within = (cross & (x > at[..., 0])).sum(axis=1) % 2 == 1
+                off[block] = np.minimum(off[block], np.where(within, 0.0, apart))
+        return off
+
+
+def pairs(us: ArrayLike, vs: ArrayLike) -> Array:
+    """All pairs of parameters ``(m n, 2)``, those of v fastest."""
+    return np.stack(np.meshgrid(us, vs, indexing="ij"), axis=-1).reshape(-1, 2)
+
+
+def touched(net: Net, faces: Iterable[Face]) -> Array:
+    """Knot cells of a net that faces touch, a mask."""
+    return np.asarray(np.logical_or.reduce([face_region(net, face).inside for face in faces]))
+
+
+def _unit(vectors: Array) -> Array:
+    return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-300))
