@@ -1,7 +1,8 @@
-"""Splines that take given values at the Greville points."""
+"""Splines that take given values at the Greville points, and knots divided until they do between them, too."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from functools import lru_cache
 
 import numpy as np
@@ -9,11 +10,77 @@ import numpy as np
 from mracad.bspline.basis import basis
 from mracad.bspline.knots import Array, KnotVector
 from mracad.bspline.solve import BandSolver, folded
+from mracad.bspline.surface import Net
+
+Knots = tuple[KnotVector, KnotVector]
+"""In u and v."""
+
+SPARE = 1.5
+"""Spans are not divided that are at most so many times as wide as they need be."""
+
+ROUNDS, PIECES = 5, 6
+"""Times that spans are divided, and into how many pieces at most each time."""
 
 
 def interpolated(u: KnotVector, v: KnotVector, values: Array) -> Array:
     """Poles ``(nu, nv, k)`` of the polynomial surface with ``values`` at the Greville points of both knot vectors."""
     return np.asarray(_solver(v).solve(_solver(u).solve(values, 0), 1))
+
+
+def through(net: Net, values: Array) -> Array:
+    """Control points ``(nu, nv, k)`` over the knots, and with the weights, of a net that take values at its Greville
+    points."""
+    if net.weights is None:
+        return interpolated(net.u, net.v, values)
+    weights = net.weights[..., None]
+    values = values * np.asarray(Net(net.u, net.v, weights).grid(net.u.greville(), net.v.greville()))
+    return np.asarray(interpolated(net.u, net.v, values) / weights)
+
+
+def divided(
+    knots: tuple[KnotVector, KnotVector], more: Callable[..., Sequence[Array]]
+) -> tuple[KnotVector, KnotVector]:
+    """Knots with those that ``more`` asks for, a few times over."""
+    for _ in range(ROUNDS):
+        extra = more(knots)
+        if not any(map(len, extra)):
+            break
+        knots = knots[0].refined(extra[0]), knots[1].refined(extra[1])
+    return knots
+
+
+def split(kv: KnotVector, span: Array, missed: Array, speed: Array, least: float) -> Array:
+    """Knots that divide spans until they miss nothing, none narrower than need be.
+
+    Parameters
+    ----------
+    kv : KnotVector
+    span : ndarray (q,) of int
+        Of points in them.
+    missed : ndarray (q,)
+        By how much the points are off, as a multiple of what they may be.
+    speed : ndarray (q,)
+        Length by parameter there.
+    least : float
+        Width that is narrow enough, mm.
+    """
+    worst, fastest = np.zeros(kv.spans), np.zeros(kv.spans)
+    np.maximum.at(worst, span, missed)
+    np.maximum.at(fastest, span, speed)
+    width = fastest * np.diff(kv.breaks)
+    most = np.where(width > SPARE * least, np.ceil(width / least), 1.0)
+    pieces = np.clip(np.ceil(worst ** (1 / (kv.degree + 1))), 1, PIECES)
+    return evenly(kv, np.minimum(pieces, most).astype(int))
+
+
+def evenly(kv: KnotVector, pieces: Array) -> Array:
+    """Knots that divide each span into equal pieces."""
+    found = [
+        low + (high - low) * np.arange(1, k) / k
+        for low, high, k in zip(kv.breaks[:-1], kv.breaks[1:], pieces, strict=True)
+        if k > 1
+    ]
+    return np.concatenate(found) if found else np.empty(0)
 
 
 @lru_cache(maxsize=64)

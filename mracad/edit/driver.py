@@ -131,12 +131,7 @@ class Moved:
 
     def displacement(self) -> Offset:
         """The displacement over the surface as it is."""
-        own, degrees = self.sheet.origin, (self.net.u.degree, self.net.v.degree)
-        inserted = [
-            fine.beyond(kv.elevated(degree))
-            for fine, kv, degree in zip((self.net.u, self.net.v), (own.u, own.v), degrees, strict=True)
-        ]
-        return Offset(self.offset, inserted[0], inserted[1], degrees)
+        return Offset.of(self.sheet.origin, self.net, self.offset)
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,6 +21,7 @@ from mracad.edit.pose import Pose, Scene, pose
 from mracad.edit.target import Sheet, stiffness
 from mracad.edit.trial import Watch, displaced
 from mracad.model.brep import Model
+from mracad.model.displacement import lifted
 from mracad.seam.interface import Joints
 
 Array = np.ndarray
@@ -137,9 +138,8 @@ def _whole(sheet: Sheet, net: Net, offset: Array, free: int) -> Moved:
 
 def _both(first: Moved, then: Moved, sheet: Sheet) -> Moved:
     """One displacement after another."""
-    u, v = then.net.u, then.net.v
-    lifted = Net(first.net.u, first.net.v, first.offset, first.net.weights).over(u, v)
-    whole = _whole(sheet, sheet.origin.over(u, v), lifted.poles + then.offset, then.free)
+    net = sheet.origin.over(then.net.u, then.net.v)
+    whole = _whole(sheet, net, lifted(first.net, then.net, first.offset) + then.offset, then.free)
     return replace(
         whole, amount=then.amount or 1.0, limits=then.limits, gain=then.gain, wanted=then.wanted, rough=then.rough
     )

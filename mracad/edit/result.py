@@ -8,7 +8,7 @@ from enum import Enum
 from typing import Literal
 
 from mracad.constraint.seam import Treatment
-from mracad.edit.feature.copies import Copy
+from mracad.edit.feature.score import Copy
 from mracad.inspect.roughness import Roughness
 from mracad.model.brep import Face
 from mracad.model.displacement import Displacement

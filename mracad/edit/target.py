@@ -17,8 +17,8 @@ from mracad.seam.interface import Joints
 from mracad.seam.ladders import Creases
 from mracad.seam.metric import SMOOTHER, creases, seen, smoothed
 from mracad.seam.solve import Problem, Space
-from mracad.wavelet.ladder import arc_lengths, ladder_for_scale
-from mracad.wavelet.project import projection
+from mracad.wavelet.ladder import arc_lengths
+from mracad.wavelet.project import at_scale
 
 Array = np.ndarray
 
@@ -126,21 +126,11 @@ def _sheet(index: int, origin: Net, every: tuple[Face, ...], faces: tuple[Face, 
     metric = smoothed(net, points, SMOOTHER**4 * stiffness(wavelength))
     form = forms(net, metric, points, sharp)
     reach = seen(net, form)
-    trend, wide = _trend(net, sharp, TREND * wavelength), wish.spread * wavelength
+    trend, wide = at_scale(net, TREND * wavelength, sharp), wish.spread * wavelength
     sheet = Sheet(index, origin, net, every, faces, metric, sharp, wavelength, wide, trend)
     alone = Problem({index: Space(net, form, reach, reach, sheet.trend.poles)})
     change = wish.target(alone, {index: sheet}, Joints())
     return replace(sheet, detail=float(np.linalg.norm(change[alone.seen], axis=1).max(initial=0.0)))
-
-
-def _trend(net: Net, sharp: Creases, scale: float) -> Net:
-    """The projection of a net on the splines of a scale that keep its creases."""
-    poles = net.poles
-    for axis, knots in enumerate((net.u, net.v)):
-        coarse = ladder_for_scale(knots, arc_lengths(net, axis), scale, keep=sharp[axis])
-        if coarse != knots:
-            poles = projection(coarse, knots).apply(poles, axis=axis)
-    return Net(net.u, net.v, poles, net.weights)
 
 
 def eased(net: Net, share: Array, width: float) -> Array:

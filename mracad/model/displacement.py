@@ -32,6 +32,16 @@ class Offset:
     v_knots: Array = field(default_factory=lambda: np.empty(0))
     degrees: tuple[int, int] = (0, 0)
 
+    @classmethod
+    def of(cls, own: Net, fine: Net, poles: Array) -> Offset:
+        """Offsets of the control points of a finer net of a surface."""
+        degrees = (fine.u.degree, fine.v.degree)
+        u, v = (
+            kv.beyond(old.elevated(degree))
+            for kv, old, degree in zip((fine.u, fine.v), (own.u, own.v), degrees, strict=True)
+        )
+        return cls(poles, u, v, degrees)
+
     def over(self, net: Net) -> Net:
         """The net of the undisplaced surface whose control points the offset moves; ``net`` itself where it does."""
         u, v = (kv.elevated(degree) for kv, degree in zip((net.u, net.v), self.degrees, strict=True))
@@ -58,3 +68,8 @@ class Displacement:
                 index, Net(net.u, net.v, net.poles + offset.poles, net.weights), old.faces, old.origin
             )
         return model.with_surfaces(surfaces)
+
+
+def lifted(own: Net, fine: Net, offset: Array) -> Array:
+    """Offsets of the control points of a net as those of a finer one of the same surface."""
+    return offset if fine is own else Net(own.u, own.v, offset, own.weights).over(fine.u, fine.v).poles

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Set as AbstractSet
 from functools import cached_property, lru_cache
 from itertools import pairwise
 
@@ -13,7 +14,9 @@ from mracad.bspline.knots import Array, KnotVector
 from mracad.bspline.refine import refinement
 from mracad.bspline.rows import Rows
 from mracad.bspline.solve import BandSolver, folded
+from mracad.bspline.surface import Net
 from mracad.errors import UsageError
+from mracad.wavelet.ladder import arc_lengths, ladder_for_scale
 
 _SMALL = 256  # poles up to which the dense operator is as quick, and spares loading LAPACK's banded solvers
 _TAME = 1e3
@@ -163,6 +166,23 @@ def projection(coarse: KnotVector, fine: KnotVector, weights: Array | None = Non
     """
     key = None if weights is None else tuple(checked_weights(fine, weights).tolist())
     return _cached(coarse, fine, key)
+
+
+def at_scale(net: Net, scale: float, keep: tuple[AbstractSet[float], AbstractSet[float]] = (frozenset(),) * 2) -> Net:
+    """A net over its own knots without what is finer than a scale (mm); breaks in u and v to keep stay as they are."""
+    poles = net.poles
+    for axis, knots in enumerate((net.u, net.v)):
+        coarse = ladder_for_scale(knots, arc_lengths(net, axis), scale, keep=keep[axis])
+        if coarse != knots:
+            poles = projection(coarse, knots).apply(poles, axis=axis)
+    return Net(net.u, net.v, poles, net.weights)
+
+
+def band(net: Net, low: float, high: float) -> tuple[Net, Net]:
+    """A net without what is finer than a scale, and what of that a lower scale leaves as offsets; scales in mm."""
+    coarse = at_scale(net, high)
+    fine = at_scale(net, low) if low else net
+    return coarse, Net(net.u, net.v, fine.poles - coarse.poles, net.weights)
 
 
 @lru_cache(maxsize=128)

@@ -9,6 +9,7 @@ decomposition gives that frame.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
 from itertools import pairwise
@@ -85,6 +86,11 @@ class Charts:
     graph: Array
     log: Array
     exp: Array
+
+    @classmethod
+    def joined(cls, parts: Sequence[Charts]) -> Charts:
+        """Charts of several lists in one."""
+        return cls(*(np.concatenate([getattr(c, name) for c in parts]) for name in cls.__dataclass_fields__))
 
     def local(self, points: Array, which: Array) -> Array:
         """a, b and height (mm) of points ``(q, 3)``, each in one of the charts."""

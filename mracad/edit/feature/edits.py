@@ -14,15 +14,15 @@ import numpy as np
 
 from mracad.constraint.seam import Treatment
 from mracad.constraint.wishes import Wishes
-from mracad.edit.feature.copies import Laid, laid
 from mracad.edit.feature.detail import Feature, load
 from mracad.edit.feature.extract import above_surroundings, between_levels
 from mracad.edit.feature.fit import NARROWEST
 from mracad.edit.feature.ground import Ground, axes
 from mracad.edit.feature.ideal import copies
+from mracad.edit.feature.lay import Laid, laid
 from mracad.edit.feature.locate import Place, face_number, patch_of, place, standing, window
 from mracad.edit.feature.pattern import along, grid, listed, polar, scattered
-from mracad.edit.feature.transfer import at_scale, laid_on
+from mracad.edit.feature.transfer import laid_on
 from mracad.edit.result import Edit, FaceOutcome, Reason, spared
 from mracad.errors import EditError, UsageError
 from mracad.model.brep import Face, Model
@@ -31,6 +31,7 @@ from mracad.spec.quantity import band_of, length
 from mracad.spec.select import Scope
 from mracad.spec.select import scope as scope_of
 from mracad.spec.steps import Featured, Move, Repeat, Single, Transfer
+from mracad.wavelet.project import band
 
 Array = np.ndarray
 
@@ -133,10 +134,10 @@ def extract(model: Model, options: Featured, chosen: Collection[int], text: str 
     if options.base == "surroundings":
         return above_surroundings(ground, area, area.width, options.keep, label, text)
     low, high = band_of(options.band or "", model.diagonal)
-    coarse = {i: at_scale(model.surfaces[i].net, high) for i in ground.patches}
-    fine = {i: at_scale(model.surfaces[i].net, low) if low else model.surfaces[i].net.poles for i in ground.patches}
-    bands = {i: fine[i] - coarse[i] for i in ground.patches}
-    return between_levels(Ground.of(model, chosen, coarse), bands, area, area.width, options.keep, label, text)
+    parts = {i: band(model.surfaces[i].net, low, high) for i in ground.patches}
+    bands = {i: fine.poles for i, (_, fine) in parts.items()}
+    clear = Ground.of(model, chosen, {i: coarse.poles for i, (coarse, _) in parts.items()})
+    return between_levels(clear, bands, area, area.width, options.keep, label, text)
 
 
 def _movable(model: Model, scope: Scope) -> set[int]:
@@ -147,8 +148,7 @@ def _cleared(model: Model, chosen: Collection[int], feature: Feature) -> Ground:
     """The ground without the feature."""
     if feature.origin is None:
         return Ground.of(model, chosen)
-    poles = {i: model.surfaces[i].net.poles - offset for i, offset in feature.origin.offsets.items()}
-    return Ground.of(model, chosen, poles)
+    return Ground.of(model, chosen).without(feature.origin.offsets)
 
 
 def _places(ground: Ground, feature: Feature, options: Repeat) -> list[Place]:

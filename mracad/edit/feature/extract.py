@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from mracad.bspline.fit import interpolated
+from mracad.bspline.fit import through
 from mracad.bspline.surface import Net
 from mracad.constraint.frozen import separate
 from mracad.constraint.seam import seams
@@ -63,15 +63,10 @@ def above_surroundings(ground: Ground, window: Window, width: float, keep: str, 
             continue
         values = np.zeros((len(points), 3))
         values[hit] = (local[hit] - feet) @ chart.axes[0] @ patch.turn
-        values = values.reshape(*net.poles.shape)
-        weights = np.ones(net.poles.shape[:2]) if net.weights is None else net.weights
-        if net.weights is not None:
-            first = Net(net.u, net.v, net.weights[..., None]).grid(net.u.greville(), net.v.greville())
-            values = values * np.asarray(first)
         flat = np.zeros(len(points))
         flat[hit] = weight
         w = flat.reshape(net.poles.shape[:2])
-        offsets[index] = interpolated(net.u, net.v, values) / weights[..., None] * w[..., None]
+        offsets[index] = through(net, values.reshape(*net.poles.shape)) * w[..., None]
         windows[index] = w
     return _made(ground.without(offsets), chart, window, reach, offsets, windows, keep, label, named)
 

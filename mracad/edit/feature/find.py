@@ -15,8 +15,8 @@ import numpy as np
 from mracad.bspline.surface import Net
 from mracad.edit.feature.patch import Patch
 from mracad.model.brep import Model
-from mracad.wavelet.ladder import arc_lengths, ladder_for_scale
-from mracad.wavelet.project import projection
+from mracad.wavelet.ladder import arc_lengths
+from mracad.wavelet.project import at_scale
 
 Array = np.ndarray
 
@@ -94,7 +94,8 @@ def _on(patch: Patch) -> list[Found]:
     scale = 4 * min(float(np.median(x)) for x in lengths)
     kept: list[Found] = []
     while scale < max(float(x.sum()) for x in lengths) / 2:
-        height = (np.asarray(_detail(net, lengths, scale).grid(us, vs)) * normals).sum(axis=-1)
+        finer = Net(net.u, net.v, net.poles - at_scale(net, scale).poles, net.weights)
+        height = (np.asarray(finer.grid(us, vs)) * normals).sum(axis=-1)
         size = np.where(seen, np.abs(height), 0.0)
         usual = max(USUAL * float(np.median(size[seen])), LEAST)
         regions, count = label(size > usual, np.ones((3, 3)))
@@ -118,14 +119,6 @@ def _on(patch: Patch) -> list[Found]:
 def _lobe(f: Found, g: Found) -> bool:
     """Whether ``f`` is but a side lobe of ``g``."""
     return f.height < LOBE * g.height and bool(np.linalg.norm(np.subtract(f.place, g.place)) < FAR * g.scales[1])
-
-
-def _detail(net: Net, lengths: list[Array], scale: float) -> Net:
-    """What of a surface is finer than a scale, as offsets."""
-    poles = net.poles
-    for axis, kv in enumerate((net.u, net.v)):
-        poles = projection(ladder_for_scale(kv, lengths[axis], scale), kv).apply(poles, axis=axis)
-    return Net(net.u, net.v, net.poles - poles, net.weights)
 
 
 def _merged(kept: list[Found], new: Found) -> list[Found]:

@@ -7,7 +7,7 @@ coordinates (turned, mirrored, scaled), in the frame carried there from the copy
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -22,6 +22,32 @@ Array = np.ndarray
 
 BATCH = 48
 """Copies worked on at a time."""
+
+
+@dataclass(frozen=True, eq=False)
+class Way:
+    """How detail is turned (radians), scaled along the face and along the normal, and mirrored: once, or point by
+    point ``(q,)``."""
+
+    turn: Array | float
+    size: Array | float
+    height: Array | float
+    mirror: bool
+
+    def back(self, xy: Array) -> Array:
+        """Places ``(q, 2)`` of the detail that come to places where it is laid."""
+        (x, y), cos, sin = xy.T / self.size, np.cos(self.turn), np.sin(self.turn)
+        return np.stack([cos * x + sin * y, self._flip * (cos * y - sin * x)], axis=1)
+
+    def on(self, local: Array) -> Array:
+        """Displacements ``(q, 3)`` of the detail as they are where it is laid, along x, y and the normal."""
+        t, s, cos, sin = local[:, 0], self._flip * local[:, 1], np.cos(self.turn), np.sin(self.turn)
+        along = self.size * (cos * t - sin * s), self.size * (sin * t + cos * s)
+        return np.stack([*along, self.height * local[:, 2]], axis=1)
+
+    @property
+    def _flip(self) -> float:
+        return -1.0 if self.mirror else 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,19 +105,23 @@ class Copies:
         """Which copies ``(copies,)`` reach a patch."""
         return np.asarray(self.touched[:, list(self.ground.patches).index(patch.index)])
 
-    def ideal(self, patch: Patch, points: Array, normals: Array, some: Array | None = None) -> tuple[Array, Array]:
-        """The displacement ``(q, 3)`` at points of a patch, in the part's frame, and how many copies reach each.
+    def only(self, some: Array) -> Copies:
+        """Those of a mask, the others reaching nothing."""
+        return replace(self, touched=self.touched & some[:, None])
 
-        Only copies in ``some`` (a mask) count; all by default.
-        """
+    def at(self, patch: Patch, uv: Array) -> Array:
+        """The displacement ``(q, 3)`` at parameters of a patch, in the part's frame."""
+        points, _, _, normals = patch.evaluate(uv)
+        return self.ideal(patch, points, normals)[0]
+
+    def ideal(self, patch: Patch, points: Array, normals: Array) -> tuple[Array, Array]:
+        """The displacement ``(q, 3)`` at points of a patch, in the part's frame, and how many copies reach each."""
         from scipy.spatial import cKDTree
 
         total, count = np.zeros((len(points), 3)), np.zeros(len(points), int)
-        chosen = np.flatnonzero(self.on(patch) & (True if some is None else some))
-        if not len(points) or not len(chosen):
-            return total, count
+        chosen = np.flatnonzero(self.on(patch))
         tree = cKDTree(points)
-        for k in range(0, len(chosen), BATCH):
+        for k in range(0, len(chosen) if len(points) else 0, BATCH):
             batch = chosen[k : k + BATCH]
             lists = tree.query_ball_point(self.charts.origin[batch], 1.02 * self.reach[batch], return_sorted=True)
             which = np.repeat(batch, [len(x) for x in lists])
@@ -105,38 +135,28 @@ class Copies:
                 continue
             for copy in batch:
                 own = which == copy
-                self._over(total, index[own], delta[own], window[own])
+                total[index[own]] = self._over(total[index[own]], delta[own], window[own])
         return total, count
 
-    def _over(self, total: Array, at: Array, delta: Array, window: Array) -> None:
-        """Lay one copy over what is there already."""
+    def _over(self, below: Array, delta: Array, window: Array) -> Array:
+        """One copy laid over what is there already."""
         if self.overlap == "max":
-            larger = (delta**2).sum(axis=1) > (total[at] ** 2).sum(axis=1)
-            total[at] = np.where(larger[:, None], delta, total[at])
-        else:
-            total[at] = (1 - window[:, None]) * total[at] + delta
+            return np.where(((delta**2).sum(axis=1) > (below**2).sum(axis=1))[:, None], delta, below)
+        return np.asarray((1 - window[:, None]) * below + delta)
 
     def _each(self, points: Array, which: Array) -> tuple[Array, Array]:
         """Displacement and window of one copy each at points."""
         xy, frames = self.charts.jets(self.charts.local(points, which), which)
-        xy = xy / self.sizes[which][:, None]
-        cos, sin = np.cos(self.turns[which]), np.sin(self.turns[which])
-        x, y = cos * xy[:, 0] + sin * xy[:, 1], cos * xy[:, 1] - sin * xy[:, 0]
-        flip = -1.0 if self.mirror else 1.0
-        found = self.feature.lookup(np.stack([x, flip * y], axis=1))
-        t, s = found[:, 0], flip * found[:, 1]
-        size, height = self.sizes[which], self.heights[which]
-        moved = np.stack([size * (cos * t - sin * s), size * (sin * t + cos * s), height * found[:, 2]], axis=1)
-        return np.einsum("qij,qi->qj", frames, moved), np.clip(found[:, 3], 0.0, 1.0)
+        way = Way(self.turns[which], self.sizes[which], self.heights[which], self.mirror)
+        found = self.feature.lookup(way.back(xy))
+        return np.einsum("qij,qi->qj", frames, way.on(found)), np.clip(found[:, 3], 0.0, 1.0)
 
 
 def copies(ground: Ground, feature: Feature, places: Sequence[Place], feet: Feet, overlap: str, mirror: bool) -> Copies:
     """Copies of a feature at places; parameters as the attributes of :class:`Copies`."""
     given = np.array([feet.along[i] if p.direction is None else p.direction for i, p in enumerate(places)])
-    reach = feature.reach * np.array([place.size for place in places])
+    reach = 1.05 * (feature.reach * np.array([place.size for place in places]))
     blocks = [slice(k, k + BATCH) for k in range(0, len(places), BATCH)]
-    parts = [ground.charts(feet.part(b), given[b], 1.05 * reach[b]) for b in blocks]
-    names = ("origin", "axes", "reach", "graph", "log", "exp")
-    charts = Charts(*(np.concatenate([getattr(c, name) for c, _ in parts]) for name in names))
-    touched = np.concatenate([t for _, t in parts])
-    return Copies(ground, feature, places, feet, overlap, mirror, charts, touched)
+    parts = [ground.charts(feet.part(b), given[b], reach[b]) for b in blocks]
+    charts = Charts.joined([c for c, _ in parts])
+    return Copies(ground, feature, places, feet, overlap, mirror, charts, np.concatenate([t for _, t in parts]))

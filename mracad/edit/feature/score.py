@@ -11,6 +11,7 @@ from mracad.bspline.surface import Net
 from mracad.edit.feature.detail import LOST
 from mracad.edit.feature.fit import between
 from mracad.edit.feature.ideal import Copies
+from mracad.edit.feature.locate import Place
 from mracad.edit.feature.patch import Patch
 from mracad.errors import EditError
 
@@ -53,7 +54,7 @@ class Copy:
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """What copies became on a patch.
+    """What copies became on a surface.
 
     Attributes
     ----------
@@ -70,25 +71,15 @@ class Outcome:
     alone: Array
 
 
-class _Tally:
-    """Distances from the ideal, by copy."""
+@dataclass(frozen=True, eq=False)
+class Figures:
+    """Points of a copy on a patch: distances (mm) from the ideal, what constraints took, what control points cannot
+    hold, and faces, ``(q,)`` each."""
 
-    def __init__(self, count: int) -> None:
-        self.worst, self.lost, self.short, self.squares, self.samples = (np.zeros(count) for _ in range(5))
-        self.faces: list[set[int]] = [set() for _ in range(count)]
-
-    def add(self, copy: int, missed: Array, lost: Array, short: Array, faces: Array) -> None:
-        """Count points of a copy."""
-        self.worst[copy] = max(self.worst[copy], missed.max())
-        self.lost[copy] = max(self.lost[copy], lost.max())
-        self.short[copy] = max(self.short[copy], short.max())
-        self.squares[copy] += (missed**2).sum()
-        self.samples[copy] += len(missed)
-        self.faces[copy].update(faces.tolist())
-
-    @property
-    def rms(self) -> Array:
-        return np.sqrt(self.squares / np.maximum(self.samples, 1))
+    missed: Array
+    lost: Array
+    short: Array
+    faces: Array
 
 
 def compared(copies: Copies, outcomes: Mapping[int, Outcome], exact: Array) -> list[Copy]:
@@ -102,37 +93,35 @@ def compared(copies: Copies, outcomes: Mapping[int, Outcome], exact: Array) -> l
     exact : ndarray of bool (copies,)
         Which are exact shifts.
     """
-    tally = _Tally(len(copies.places))
+    found: list[list[Figures]] = [[] for _ in copies.places]
     for i, outcome in outcomes.items():
-        patch = copies.ground.patches[i]
-        if copies.on(patch).any():
-            for copy, *found in _missed(copies, patch, outcome):
-                tally.add(copy, *found)
-    rms = tally.rms
-    return [
-        Copy(
-            place.label,
-            tuple(float(x) for x in copies.feet.points[k]),  # type: ignore[arg-type]
-            tuple(sorted(tally.faces[k] - {-1})),
-            float(tally.worst[k]),
-            float(rms[k]),
-            float(tally.lost[k]),
-            float(tally.short[k]),
-            bool(exact[k]),
-        )
-        for k, place in enumerate(copies.places)
-    ]
+        if copies.on(copies.ground.patches[i]).any():
+            for k, figures in _figures(copies, copies.ground.patches[i], outcome):
+                found[k].append(figures)
+    points = copies.feet.points
+    return [copied(place.label, points[k], found[k], bool(exact[k])) for k, place in enumerate(copies.places)]
 
 
-def _missed(copies: Copies, patch: Patch, outcome: Outcome) -> Iterator[tuple[int, Array, Array, Array, Array]]:
-    """For copies on a patch: distances from the ideal, what constraints took, what control points cannot hold, and
-    faces, at points of it."""
+def copied(place: str, at: Array, found: Sequence[Figures], exact: bool = False) -> Copy:
+    """What became of a copy, from its points on all patches."""
+    faces = {int(face) for each in found for face in np.unique(each.faces)} - {-1}
+    worst, lost, short = (
+        max((float(getattr(each, name).max()) for each in found), default=0.0) for name in ("missed", "lost", "short")
+    )
+    squares, count = sum(float((each.missed**2).sum()) for each in found), sum(len(each.missed) for each in found)
+    rms = float(np.sqrt(squares / max(count, 1)))
+    x, y, z = at.tolist()
+    return Copy(place, (x, y, z), tuple(sorted(faces)), worst, rms, lost, short, exact)
+
+
+def _figures(copies: Copies, patch: Patch, outcome: Outcome) -> Iterator[tuple[int, Figures]]:
+    """The figures of copies on a patch."""
     from scipy.spatial import cKDTree
 
-    net, some = outcome.net, copies.on(patch)
+    net = outcome.net
     both = np.concatenate([outcome.done @ patch.turn.T, outcome.alone @ patch.turn.T], axis=-1)
-    pair = Net(net.u, net.v, both, net.weights)
-    for uv, _ in between(copies, patch, (net.u, net.v), some):
+    chosen = np.flatnonzero(copies.on(patch))
+    for uv, _ in between(copies, patch, (net.u, net.v)):
         uv = uv[patch.covers(uv, net)]
         if not len(uv):
             continue
@@ -141,43 +130,41 @@ def _missed(copies: Copies, patch: Patch, outcome: Outcome) -> Iterator[tuple[in
         on = np.full(len(uv), patch.faces[0].index)
         if len(patch.faces) > 1:
             on = copies.ground.faces(np.full(len(uv), patch.index), uv)
-        values = np.asarray(pair.evaluate(uv))
-        missed = np.linalg.norm(values[:, :3] - wanted, axis=1)
-        gone = np.linalg.norm(values[:, :3] - values[:, 3:], axis=1)
-        short = np.linalg.norm(values[:, 3:] - wanted, axis=1)
-        chosen = np.flatnonzero(some)
+        values = np.asarray(Net(net.u, net.v, both, net.weights).evaluate(uv))
+        done, alone = values[:, :3], values[:, 3:]
+        missed, lost, short = (np.linalg.norm(x, axis=1) for x in (done - wanted, done - alone, alone - wanted))
         hits = cKDTree(points).query_ball_point(copies.charts.origin[chosen], copies.reach[chosen])
         for k, hit in zip(chosen.tolist(), hits, strict=True):
             if hit:
-                yield k, missed[hit], gone[hit], short[hit], on[hit]
+                yield k, Figures(missed[hit], lost[hit], short[hit], on[hit])
 
 
-def refuse_short(copies: Copies, found: Sequence[Copy]) -> None:
-    """Raise EditError for a copy of which the ground cannot hold enough."""
-    for copy, share in _above(copies, found, "short", SHORT):
-        raise EditError(
-            f"{copy.place}: the faces there cannot hold the copy: it would be off by {100 * share:.0f} % of its "
-            f"height ({_numbers(copy)})",
-            "make it smaller with --size, or choose another place",
-        )
+def refuse(copies: Copies, found: Sequence[Copy], clip: bool) -> None:
+    """Raise EditError for a copy of which the ground cannot hold enough, or points that stay take too much.
 
-
-def refuse_clipped(copies: Copies, found: Sequence[Copy]) -> None:
-    """Raise EditError for a copy that points which stay take too much of."""
-    for copy, share in _above(copies, found, "lost", LOST):
-        raise EditError(
-            f"{copy.place}: edges or holes that do not move take {100 * min(share, 1):.0f} % of the height of "
-            f"the copy there ({_numbers(copy)})",
-            "move it away from them, make it smaller with --size, or let them take it with --clip",
-        )
-
-
-def _above(copies: Copies, found: Sequence[Copy], figure: str, most: float) -> Iterator[tuple[Copy, float]]:
-    """Copies of which a figure is more than a share of their height, and that share."""
+    ``clip`` lets them take it.
+    """
     for copy, place in zip(found, copies.places, strict=True):
-        share = getattr(copy, figure) / (copies.feature.height * abs(place.height))
-        if share > most:
-            yield copy, share
+        share = _share(copies, place, copy.short)
+        if share > SHORT:
+            raise EditError(
+                f"{copy.place}: the faces there cannot hold the copy: it would be off by {100 * share:.0f} % of its "
+                f"height ({_numbers(copy)})",
+                "make it smaller with --size, or choose another place",
+            )
+    for copy, place in zip(found, copies.places, strict=True):
+        share = _share(copies, place, copy.lost)
+        if share > LOST and not clip:
+            raise EditError(
+                f"{copy.place}: edges or holes that do not move take {100 * min(share, 1):.0f} % of the height of "
+                f"the copy there ({_numbers(copy)})",
+                "move it away from them, make it smaller with --size, or let them take it with --clip",
+            )
+
+
+def _share(copies: Copies, place: Place, figure: float) -> float:
+    """A length as a share of the height of a copy."""
+    return figure / (copies.feature.height * abs(place.height))
 
 
 def _numbers(copy: Copy) -> str:

@@ -8,25 +8,28 @@ rectangles; where the target is larger, the source is mirrored at its borders.  
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from mracad.bspline.fit import Knots, divided, through
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
 from mracad.constraint.frozen import separate
 from mracad.constraint.seam import seams
 from mracad.constraint.wishes import Wishes
-from mracad.edit.feature.copies import Laid, offset, over
 from mracad.edit.feature.detail import taper
-from mracad.edit.feature.fit import MISSED, NARROWEST, Knots, divided, split, through, weights_over
-from mracad.edit.feature.patch import Patch
-from mracad.edit.feature.score import Copy
+from mracad.edit.feature.fit import MISSED, NARROWEST, missing, offsets_over, spans
+from mracad.edit.feature.ideal import Way
+from mracad.edit.feature.lay import Laid
+from mracad.edit.feature.patch import Patch, pairs
+from mracad.edit.feature.score import Copy, Figures, copied
 from mracad.errors import EditError
 from mracad.model.brep import Model
 from mracad.spec.steps import Transfer
-from mracad.wavelet.ladder import arc_lengths, ladder_for_scale
-from mracad.wavelet.project import projection
+from mracad.model.displacement import Offset, lifted
+from mracad.wavelet.ladder import arc_lengths
+from mracad.wavelet.project import band as band_of
 
 Array = np.ndarray
 
@@ -34,49 +37,34 @@ STEPS, LINES = 4000, 9
 """Steps along (at least one a span), and lines across, from which arc lengths are measured."""
 
 
-def at_scale(net: Net, scale: float) -> Array:
-    """Control points of a net, over its own knots, without what is finer than a scale (mm)."""
-    poles = net.poles
-    for axis, knots in enumerate((net.u, net.v)):
-        poles = projection(ladder_for_scale(knots, arc_lengths(net, axis), scale), knots).apply(poles, axis=axis)
-    return poles
-
-
+@dataclass(frozen=True, eq=False)
 class Character:
-    """The detail of a patch in a band (mm), and the lengths along it.
+    """The detail of a surface in a band (mm), and the lengths along it.
 
     Attributes
     ----------
-    coarse : Net
-        The patch without what is finer than the band's largest wavelength.
+    coarse : Patch
+        The surface without what is finer than the band's largest wavelength.
     detail : Net
         Offsets: the band.
+    tables : pair of (ndarray, ndarray)
+        Parameters from one end of its faces to the other, and arc lengths there, in u and v.
     """
 
-    def __init__(self, patch: Patch, band: tuple[float, float]) -> None:
-        self.patch, net = patch, patch.net
-        poles = at_scale(net, band[1])
-        fine = at_scale(net, band[0]) if band[0] else net.poles
-        self.coarse = Net(net.u, net.v, poles, net.weights)
-        self.detail = Net(net.u, net.v, fine - poles, net.weights)
+    coarse: Patch
+    detail: Net
+    tables: Sequence[tuple[Array, Array]]
+
+    @classmethod
+    def of(cls, patch: Patch, band: tuple[float, float]) -> Character:
+        """The detail of a patch in a band."""
+        coarse, detail = band_of(patch.net, *band)
+        ends = patch.domain
         uv = [trim.curve.poles for face in patch.faces for trim in face.trims]
-        low, high = patch.domain
         if uv:
             every = np.concatenate(uv)
-            low, high = (np.clip(x, low, high) for x in (every.min(axis=0), every.max(axis=0)))
-        self.tables = [self._lengths(axis, low, high) for axis in (0, 1)]
-
-    def _lengths(self, axis: int, low: Array, high: Array) -> tuple[Array, Array]:
-        """Parameters from one end of the face to the other, and arc lengths there, in one direction."""
-        kv = self.patch.knots[axis]
-        inner = kv.breaks[(kv.breaks > low[axis]) & (kv.breaks < high[axis])]
-        ends = np.concatenate([[low[axis]], inner, [high[axis]]])
-        steps = -(-STEPS // (len(ends) - 1)) * (len(ends) - 1)
-        at = np.interp(np.linspace(0, len(ends) - 1, steps + 1), np.arange(len(ends)), ends)
-        across = np.linspace(low[1 - axis], high[1 - axis], LINES)
-        points = np.asarray(self.coarse.grid(at, across) if axis == 0 else self.coarse.grid(across, at))
-        chords = np.linalg.norm(np.diff(points, axis=axis), axis=-1).mean(axis=1 - axis)
-        return at, np.append(0.0, np.cumsum(chords))
+            ends = np.clip(every.min(axis=0), *ends), np.clip(every.max(axis=0), *ends)
+        return cls(replace(patch, net=coarse), detail, [_lengths(coarse, axis, *ends) for axis in (0, 1)])
 
     def lengths(self, uv: Array) -> Array:
         """Arc lengths ``(q, 2)`` of parameters."""
@@ -92,9 +80,8 @@ class Character:
 
     def frames(self, uv: Array) -> Array:
         """Frames ``(q, 3, 3)``: rows S_u, N × S_u, N of the coarse surface."""
-        _, su, sv = self.coarse.evaluate(uv, 1)
-        normal = self.patch.signs(uv)[:, None] * np.cross(su, sv)
-        x, n = (d / np.maximum(np.linalg.norm(d, axis=1, keepdims=True), 1e-300) for d in (su, normal))
+        _, su, _, n = self.coarse.evaluate(uv)
+        x = su / np.maximum(np.linalg.norm(su, axis=1, keepdims=True), 1e-300)
         return np.stack([x, np.cross(n, x), n], axis=1)
 
     def local(self, uv: Array) -> Array:
@@ -102,28 +89,32 @@ class Character:
         return np.einsum("qij,qj->qi", self.frames(uv), np.asarray(self.detail.evaluate(uv)))
 
 
+def _lengths(net: Net, axis: int, low: Array, high: Array) -> tuple[Array, Array]:
+    """Parameters from one end to the other, and arc lengths there, in one direction."""
+    breaks = (net.u, net.v)[axis].breaks
+    ends = np.concatenate([[low[axis]], breaks[(breaks > low[axis]) & (breaks < high[axis])], [high[axis]]])
+    steps = -(-STEPS // (len(ends) - 1)) * (len(ends) - 1)
+    at = np.interp(np.linspace(0, len(ends) - 1, steps + 1), np.arange(len(ends)), ends)
+    across = np.linspace(low[1 - axis], high[1 - axis], LINES)
+    points = np.asarray(net.grid(at, across) if axis == 0 else net.grid(across, at))
+    chords = np.linalg.norm(np.diff(points, axis=axis), axis=-1).mean(axis=1 - axis)
+    return at, np.append(0.0, np.cumsum(chords))
+
+
 @dataclass(frozen=True, eq=False)
 class Carried:
-    """The detail of one patch at the places of another."""
+    """The detail of one surface at the places of another, so much of it."""
 
     own: Character
     other: Character
-    options: Transfer
+    way: Way
+    share: float
 
     def __call__(self, uv: Array) -> Array:
         """The displacement ``(q, 3)`` at parameters of the target, in the part's frame."""
-        options = self.options
-        _, comes = options.share()
-        turn, flip = np.radians(options.rotate), -1.0 if options.mirror else 1.0
-        x, y = self.own.lengths(uv).T / options.size
-        places = np.stack([np.cos(turn) * x + np.sin(turn) * y, flip * (np.cos(turn) * y - np.sin(turn) * x)], axis=1)
-        t, s, n = self.other.local(self.other.parameters(places)).T
-        s = flip * s
-        moved = [
-            options.size * (np.cos(turn) * t - np.sin(turn) * s),
-            options.size * (np.sin(turn) * t + np.cos(turn) * s),
-        ]
-        return comes * np.einsum("qij,qi->qj", self.own.frames(uv), np.stack([*moved, options.height * n], axis=1))
+        there = self.other.parameters(self.way.back(self.own.lengths(uv)))
+        moved = self.way.on(self.other.local(there))
+        return self.share * np.einsum("qij,qi->qj", self.own.frames(uv), moved)
 
 
 def laid_on(
@@ -142,48 +133,44 @@ def laid_on(
     width : float or None
         Over which the detail fades towards points that stay, mm; half of the largest wavelength by default.
     """
-    own, other = Character(target, band), Character(source, band)
+    own, other = Character.of(target, band), Character.of(source, band)
     stays, comes = options.share()
-    ideal = Carried(own, other, options)
+    ideal = Carried(own, other, Way(np.radians(options.rotate), options.size, options.height, options.mirror), comes)
     height = float(np.linalg.norm(other.detail.poles, axis=-1).max()) * abs(options.height)
     if height * comes <= 1e-7 and stays == 1.0:
         raise EditError(f"from: {options.from_} has no detail in the band", "give another --band")
     least = _spacing(source) * options.size
     if least < NARROWEST:
         raise EditError(f"size: {options.size:g} would need knots closer than {NARROWEST:g} mm", "give a larger --size")
-    knots = divided(target.knots, lambda knots: _more(target, ideal, knots, MISSED * height, least))
-    poles = _poles(target, ideal, knots)
-    net = model.surfaces[target.index].net
+
+    def more(knots: Knots) -> Sequence[Array]:
+        uv = _middles(target, *knots)
+        sites = [(uv, spans(kv, uv[:, axis])) for axis, kv in enumerate(knots)]
+        delta = offsets_over(target, knots, _poles(target, ideal, knots))
+        return missing(target, delta, sites, ideal, MISSED * height, (least, least))
+
+    knots = divided(target.knots, more)
+    poles, net = _poles(target, ideal, knots), model.surfaces[target.index].net
     fine = net.over(*knots)
-    faces = [model.faces[i] for i in model.surfaces[target.index].faces]
-    own_faces = {face.index for face in target.faces}
-    free = separate(fine, faces, own_faces, seams(model, own_faces, Wishes(options.keep)).orders).free
+    faces, movable = [model.faces[i] for i in model.surfaces[target.index].faces], {face.index for face in target.faces}
+    free = separate(fine, faces, movable, seams(model, movable, Wishes(options.keep)).orders).free
     if not free.any():
         raise EditError(f"to: {options.to} has no free control point", "use --keep g0")
     window = _window(fine, free, band[1] / 2 if width is None else width)
-    wanted = poles + over(net, fine, (stays - 1.0) * own.detail.poles)
-    copy = _compared(target, ideal, knots, poles, wanted * (window - 1.0)[..., None])
-    return Laid({target.index: offset(net, fine, wanted * window[..., None] @ target.turn)}, (copy,))
+    wanted = poles + lifted(net, fine, (stays - 1.0) * own.detail.poles)
+    gone = wanted * (window - 1.0)[..., None]
+    copy = _compared(target, ideal, offsets_over(target, knots, poles), offsets_over(target, knots, gone))
+    copy = replace(copy, place=f"{options.from_} on {options.to}")
+    return Laid({target.index: Offset.of(net, fine, wanted * window[..., None] @ target.turn)}, (copy,))
 
 
-def _compared(target: Patch, ideal: Carried, knots: Knots, poles: Array, gone: Array) -> Copy:
-    """What became of the detail, of which control points ``gone`` are taken away."""
-    uv = _middles(*knots)
-    uv = uv[target.covers(uv)]
-    weights = weights_over(target, knots)
-    missed = np.linalg.norm(np.asarray(Net(*knots, poles, weights).evaluate(uv)) - ideal(uv), axis=1)
-    lost = np.linalg.norm(np.asarray(Net(*knots, gone, weights).evaluate(uv)), axis=1)
+def _compared(target: Patch, ideal: Carried, delta: Net, gone: Net) -> Copy:
+    """What became of the detail, of which something is taken away."""
+    uv = _middles(target, delta.u, delta.v)
+    missed = np.linalg.norm(np.asarray(delta.evaluate(uv)) - ideal(uv), axis=1)
+    lost = np.linalg.norm(np.asarray(gone.evaluate(uv)), axis=1)
     middle = np.asarray(target.net.evaluate(uv[len(uv) // 2][None]))[0]
-    return Copy(
-        f"{ideal.options.from_} on {ideal.options.to}",
-        tuple(float(x) for x in middle),  # type: ignore[arg-type]
-        tuple(f.index for f in target.faces),
-        float(missed.max()),
-        float(np.sqrt((missed**2).mean())),
-        float(lost.max()),
-        float(missed.max()),
-        False,
-    )
+    return copied("", middle, [Figures(missed, lost, missed, np.array([f.index for f in target.faces]))])
 
 
 def _spacing(patch: Patch) -> float:
@@ -194,38 +181,21 @@ def _spacing(patch: Patch) -> float:
 
 def _poles(target: Patch, ideal: Carried, knots: Knots) -> Array:
     """Control points over knots of the target that hold the ideal, in the part's frame."""
-    at = np.stack(np.meshgrid(*(k.greville() for k in knots), indexing="ij"), axis=-1).reshape(-1, 2)
-    return through(target, knots, ideal(at).reshape(knots[0].count, knots[1].count, 3))
+    values = ideal(pairs(*(k.greville() for k in knots)))
+    return through(target.net.over(*knots), values.reshape(knots[0].count, knots[1].count, 3))
 
 
-def _more(target: Patch, ideal: Carried, knots: Knots, limit: float, least: float) -> list[Array]:
-    """Knots that divide the spans in which the target misses the ideal by more than a limit."""
-    uv = _middles(*knots)
-    uv = uv[target.covers(uv)]
-    net = Net(*knots, _poles(target, ideal, knots), weights_over(target, knots))
-    missed = np.linalg.norm(np.asarray(net.evaluate(uv)) - ideal(uv), axis=1)
-    _, *tangents, _ = target.evaluate(uv)
-    more = []
-    for axis, kv in enumerate(knots):
-        span = np.clip(np.searchsorted(kv.breaks, uv[:, axis], side="right") - 1, 0, kv.spans - 1)
-        more.append(split(kv, span, missed / limit, np.linalg.norm(tangents[axis], axis=1), least))
-    return more
-
-
-def _middles(u: KnotVector, v: KnotVector) -> Array:
-    """Parameters half-way between neighbouring Greville points of both directions."""
-    lists: Sequence[Array] = [np.sort(k.greville()) for k in (u, v)]
-    return np.stack(np.meshgrid(*((x[1:] + x[:-1]) / 2 for x in lists), indexing="ij"), axis=-1).reshape(-1, 2)
+def _middles(target: Patch, u: KnotVector, v: KnotVector) -> Array:
+    """Parameters on a patch half-way between neighbouring Greville points of both directions."""
+    uv = pairs(*((x[1:] + x[:-1]) / 2 for x in (np.sort(k.greville()) for k in (u, v))))
+    return uv[target.covers(uv)]
 
 
 def _window(net: Net, free: Array, width: float) -> Array:
     """Weights of control points: 0 where they stay, up to 1 at ``width`` (mm) from there."""
     from scipy.spatial import cKDTree
 
-    points = np.asarray(net.grid(net.u.greville(), net.v.greville())).reshape(-1, 3)
-    flat = free.ravel()
-    if flat.all():
-        return np.ones(free.shape)
+    points, flat = np.asarray(net.grid(net.u.greville(), net.v.greville())).reshape(-1, 3), free.ravel()
     apart = np.zeros(len(points))
-    apart[flat] = cKDTree(points[~flat]).query(points[flat])[0]
+    apart[flat] = cKDTree(points[~flat]).query(points[flat])[0] if not flat.all() else np.inf
     return np.where(flat, 1.0 - taper(apart / width), 0.0).reshape(free.shape)

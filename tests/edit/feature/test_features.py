@@ -13,7 +13,7 @@ from OCP.gp import gp_Ax2, gp_Dir, gp_Pnt
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
 from mracad.edit.feature.edits import extract, repeat
-from mracad.edit.feature.score import Copy, refuse_short
+from mracad.edit.feature.score import Copy, refuse
 from mracad.errors import Code, EditError
 from mracad.inspect.seams import seams
 from mracad.occ.step import read_step, write_step
@@ -459,9 +459,9 @@ def test_copies_that_are_off_by_a_fifth_of_their_height_are_named():
     def copy(name, short):
         return Copy(name, (0.0, 0.0, 0.0), (4,), 9.0, 9.0, 9.0, short, False)
 
-    refuse_short(copies, [copy("one", 0.59), copy("two", 1.19)])
+    refuse(copies, [copy("one", 0.59), copy("two", 1.19)], clip=True)
     with pytest.raises(EditError, match=r"two: .* cannot hold the copy: .* by 21 % .* .#5.") as caught:
-        refuse_short(copies, [copy("one", 0.59), copy("two", 1.26)])
+        refuse(copies, [copy("one", 0.59), copy("two", 1.26)], clip=True)
     assert caught.value.code == Code.CANNOT_EDIT
 
 

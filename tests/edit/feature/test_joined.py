@@ -9,9 +9,9 @@ from mracad.bspline.surface import Net
 from mracad.constraint.border import Border
 from mracad.constraint.joint import Joint
 from mracad.constraint.seam import Seam
-from mracad.edit.feature.crossing import crossing
 from mracad.edit.feature.detail import save
 from mracad.edit.feature.edits import extract, repeat
+from mracad.edit.feature.seams import crossing
 from mracad.errors import EditError
 from mracad.occ.view import view
 from mracad.spec.steps import Repeat

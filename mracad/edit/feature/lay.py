@@ -1,0 +1,269 @@
+"""Copies of a feature as offsets of control points: the ideal displacement as far as seams, edges and holes allow it.
+
+Where copies lie over a seam between two faces that move, it moves with them: exactly where both sides end there along
+parameter lines, to a tolerance along trim curves.  A seam that would not hold stays, and takes its part of the copies.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from mracad.bspline.surface import Net
+from mracad.constraint.border import opening
+from mracad.constraint.cause import Cause, Still
+from mracad.constraint.frozen import separate
+from mracad.constraint.seam import Seam
+from mracad.constraint.trace import Trace
+from mracad.constraint.trimmed import TrimmedSeam
+from mracad.constraint.wishes import Wishes
+from mracad.edit.feature.exact import Shifts, shifted
+from mracad.edit.feature.fit import MISSED, holding, over_knots
+from mracad.edit.feature.ground import Ground
+from mracad.edit.feature.ideal import Copies
+from mracad.edit.feature.score import Copy, Outcome, compared, refuse
+from mracad.edit.feature.seams import Crossing, Softness, Wanted, crossing, held, refined, trace
+from mracad.edit.pose import TIGHT, WITHIN
+from mracad.edit.tolerances import Tolerances
+from mracad.model.brep import Model
+from mracad.model.displacement import Displacement, Offset, lifted
+from mracad.seam.interface import Joints, joints
+
+Array = np.ndarray
+
+ALLOWED = Tolerances()
+"""What a seam along trim curves may lack after a copy."""
+
+WIDER = 1e-7
+"""An exact seam may gape so much more (mm) and turn as much more as the others; otherwise it stays."""
+
+MOVED = 1e-7
+"""A seam moves where a copy displaces it by more than this share of its height."""
+
+HALVINGS, LARGEST = 3, 100_000
+"""Most times that the spans under a trimmed seam are halved, and most control points of a net for which they are."""
+
+_EVENLY = np.linspace(0, 1, 401)
+
+
+@dataclass(frozen=True, eq=False)
+class Laid:
+    """Copies as offsets of control points.
+
+    Attributes
+    ----------
+    offsets : dict of int to Offset
+        By surface, in its own frame.
+    copies : tuple of Copy
+    frozen : dict of int to Cause
+        Edges of the faces under copies that do not move, and why.
+    moving, loose : frozenset of int
+        Edges that moved with both faces, exactly and to a tolerance.
+    """
+
+    offsets: dict[int, Offset]
+    copies: tuple[Copy, ...]
+    frozen: Mapping[int, Cause] = field(default_factory=dict)
+    moving: frozenset[int] = frozenset()
+    loose: frozenset[int] = frozenset()
+
+
+@dataclass(frozen=True, eq=False)
+class _Task:
+    """Copies that are to be laid.
+
+    Attributes
+    ----------
+    copies : Copies
+        All that are not exact shifts.
+    known, removed : mapping of int to ndarray (nu, nv, 3)
+        By surface, offsets over its own net: exact shifts and what is removed, and the latter alone.
+    nets : dict of int to Net
+        The surfaces with the knots that hold the copies.
+    poles : dict of int to ndarray (nu, nv, 3)
+        Offsets over these that the copies are.
+    joints : Joints
+        Of the faces under them.
+    softness : Softness
+    """
+
+    copies: Copies
+    known: Mapping[int, Array]
+    removed: Mapping[int, Array]
+    nets: dict[int, Net]
+    poles: dict[int, Array]
+    joints: Joints
+    softness: Softness
+
+    @property
+    def model(self) -> Model:
+        return self.copies.ground.model
+
+
+@dataclass(frozen=True, eq=False)
+class _Attempt:
+    """What comes of moving some seams: by surface, what was wanted, the offsets that obey them, and what moves."""
+
+    wanted: dict[int, Wanted]
+    done: dict[int, Array]
+    offsets: dict[int, Offset]
+
+
+def laid(copies: Copies, wishes: Wishes, coupled: bool, clip: bool, removed: Mapping[int, Array]) -> Laid:
+    """Copies as offsets.
+
+    Parameters
+    ----------
+    copies : Copies
+    wishes : Wishes
+    coupled : bool
+        Whether edges between faces of the ground may move.
+    clip : bool
+        Whether what stays may take more than a little of a copy.
+    removed : mapping of int to ndarray (nu, nv, 3)
+        Offsets over the surfaces' own nets to be added: those that take the source's feature away.
+
+    Raises
+    ------
+    EditError
+        For a copy that points which stay take too much of.
+    """
+    shifts = shifted(copies)
+    task = _task(copies, shifts, wishes, removed)
+    attempt, moving, given_up = _settled(task, _crossings(task, copies) if coupled else [])
+    gone = {i: lifted(task.model.surfaces[i].net, attempt.wanted[i].net, each) for i, each in removed.items()}
+    outcomes = {
+        i: Outcome(each.net, attempt.done[i] - gone.get(i, 0.0), each.alone) for i, each in attempt.wanted.items()
+    }
+    found = compared(copies, outcomes, shifts.matched)
+    refuse(copies, found, clip)
+    exact, loose = (
+        frozenset(edge for each in moving if isinstance(each.seam, kind) for edge in each.edges)
+        for kind in (Seam, TrimmedSeam)
+    )
+    return Laid(attempt.offsets, tuple(found), {**task.joints.frozen, **given_up}, exact - loose, loose)
+
+
+def _task(copies: Copies, shifts: Shifts, wishes: Wishes, removed: Mapping[int, Array]) -> _Task:
+    ground, rest = copies.ground, copies.only(~shifts.matched)
+    known, nets, poles = {}, {}, {}
+    for i, patch in ground.patches.items():
+        if i in removed or copies.on(patch).any():
+            own = ground.model.surfaces[i].net
+            known[i] = removed.get(i, np.zeros(own.poles.shape)) + shifts.offsets.get(i, 0.0)
+            nets[i], poles[i] = own, np.zeros(own.poles.shape)
+            if rest.on(patch).any():
+                knots, laid = holding(rest, patch)
+                nets[i], poles[i] = own.over(*knots), laid @ patch.turn
+    under = {face.index for i in nets for face in ground.patches[i].faces}
+    reach = float(copies.reach.max())
+    tolerances = TIGHT * ALLOWED.gap, TIGHT * (WITHIN * ALLOWED.angle), TIGHT * ALLOWED.bend / reach
+    softness = Softness(tolerances, (MISSED * copies.height) ** 2 * reach)
+    joined = _told(ground, under, _sewn(joints(ground.model, under, wishes)))
+    return _Task(rest, known, removed, nets, poles, joined, softness)
+
+
+def _sewn(joined: Joints) -> Joints:
+    """Joints without the trimmed seams between edges that only coincide: which of their points belong together is not
+    known to the tolerance of a copy."""
+    loose = tuple(seam for seam in joined.loose if seam.edge == seam.twin)
+    apart = {edge: Cause(Still.UNSEWN) for seam in joined.loose if seam not in loose for edge in (seam.edge, seam.twin)}
+    exact = tuple(seam for seam in joined.exact if seam.edge not in apart)
+    return replace(joined, exact=exact, loose=loose, frozen={**joined.frozen, **apart})
+
+
+def _told(ground: Ground, under: Collection[int], joined: Joints) -> Joints:
+    """Joints with what is to be said of edges beyond which a face could move if a copy lay there, too."""
+    apart = ground.chosen - set(under)
+    bare = Cause(Still.BARE)
+    sides = {e: {side.face for side in ground.model.edges[e].sides} for e in joined.frozen}
+    return replace(joined, frozen={e: bare if sides[e] & apart else why for e, why in joined.frozen.items()})
+
+
+def _crossings(task: _Task, copies: Copies) -> list[Crossing]:
+    """The seams that copies, or what is removed, displace."""
+    every: tuple[Seam | TrimmedSeam, ...] = task.joints.exact + task.joints.loose
+    found = [seam for seam in every if any(_reached(copies, trace(x), task.removed) for x in (seam.a, seam.b))]
+    moved = {i: np.any(_wanted(task, i, net)[0], axis=2) for i, net in task.nets.items()} if found else {}
+    return [crossing(seam, task.nets, moved) for seam in found]
+
+
+def _reached(copies: Copies, side: Trace, removed: Mapping[int, Array]) -> bool:
+    """Whether copies, or what is removed (offsets by surface over its own net), displace one side of a seam."""
+    patch, uv = copies.ground.patches[side.surface], side.places(_EVENLY)
+    moved = [copies.at(patch, uv)]
+    if side.surface in removed:
+        moved.append(np.asarray(Net(*patch.knots, removed[side.surface], patch.net.weights).evaluate(uv)))
+    return bool(max(np.linalg.norm(each, axis=1).max() for each in moved) > MOVED * copies.height)
+
+
+def _wanted(task: _Task, index: int, net: Net) -> tuple[Array, Array]:
+    """Offsets over a net of a surface, ``(nu, nv, 3)``: of all that is wanted, and of the copies alone."""
+    own, patch, poles = task.model.surfaces[index].net, task.copies.ground.patches[index], task.poles[index]
+    every = alone = lifted(own, net, task.known[index])
+    if index in task.removed:
+        alone = every - lifted(own, net, task.removed[index])
+    if (net.u, net.v) != (task.nets[index].u, task.nets[index].v):
+        poles = over_knots(task.copies, patch, (net.u, net.v)) @ patch.turn
+    return every + poles, alone + poles
+
+
+def _settled(task: _Task, found: Sequence[Crossing]) -> tuple[_Attempt, Sequence[Crossing], dict[int, Cause]]:
+    """The copies with those seams moved that hold, which these are, and why others do not move.
+
+    The spans under a trimmed seam that does not hold are halved a few times before it is given up.
+    """
+    given_up: dict[int, Cause] = {}
+    while True:
+        attempt = _attempt(task, found)
+        after = Displacement(attempt.offsets).applied(task.model)
+        failed = [each for each in found if not _holds(task, each, after)]
+        if not failed:
+            return attempt, found, given_up
+        finer = {each.seam.edge for each in failed if _finer(each, attempt)}
+        for each in failed:
+            if not _finer(each, attempt):
+                why = Still.BROKEN if isinstance(each.seam, Seam) else Still.OPEN
+                given_up |= dict.fromkeys(each.edges, Cause(why))
+        found = [
+            replace(each, halvings=each.halvings + (each.seam.edge in finer))
+            for each in found
+            if each.edges.isdisjoint(given_up)
+        ]
+
+
+def _attempt(task: _Task, found: Sequence[Crossing]) -> _Attempt:
+    """The copies with some seams moved by them."""
+    moving = set(task.joints.closing) | {edge for each in found for edge in each.edges}
+    wanted = {}
+    for i, net in refined(task.nets, found).items():
+        on_it = [task.model.faces[f] for f in task.model.surfaces[i].faces]
+        faces = task.copies.ground.patches[i].faces
+        free = separate(net, on_it, [face.index for face in faces], task.joints.orders, moving).free
+        wanted[i] = Wanted(net, *_wanted(task, i, net), free, faces[0])
+    done = held(wanted, found, task.softness)
+    offsets = {i: Offset.of(task.model.surfaces[i].net, wanted[i].net, each) for i, each in done.items() if each.any()}
+    return _Attempt(wanted, done, offsets)
+
+
+def _holds(task: _Task, each: Crossing, after: Model) -> bool:
+    """Whether a seam is no worse than it may be after an edit."""
+    seam = each.seam
+    if isinstance(seam, TrimmedSeam):
+        more = WIDER, WITHIN * ALLOWED.angle, ALLOWED.bend / float(task.copies.reach.max())
+        return bool(seam.excess(task.model, after, (ALLOWED.gap, 0.0, 0.0), more)[1].max() <= 1.0)
+    for stretch in each.stretches:
+        part = seam.part(*stretch)
+        old, new = (opening(model, part.a, part.b) for model in (task.model, after))
+        if new[0] > old[0] + WIDER or (seam.joint.order and new[1] > old[1] + ALLOWED.angle):
+            return False
+    return True
+
+
+def _finer(each: Crossing, attempt: _Attempt) -> bool:
+    """Whether the spans under a seam can be halved, and that can be of use."""
+    nets = (attempt.wanted[i].net for i in each.surfaces)
+    small = all(net.u.count * net.v.count <= LARGEST for net in nets)
+    return small and isinstance(each.seam, TrimmedSeam) and each.halvings < HALVINGS

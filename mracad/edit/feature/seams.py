@@ -1,0 +1,288 @@
+"""Seams under copies of a feature: the stretches that move, and the admissible displacement nearest to the copies.
+
+Only control points beside the stretches of seams that copies lie over take part, in windows of the nets: all others
+have the displacement that the copies are.  Both sides of a stretch get the knots that its conditions need there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mracad.bspline.knots import KnotVector
+from mracad.bspline.surface import Net
+from mracad.constraint.border import Border
+from mracad.constraint.frozen import jet_support, meeting
+from mracad.constraint.seam import Seam
+from mracad.constraint.trace import Trace, along, crossings
+from mracad.constraint.trimmed import TrimmedSeam
+from mracad.edit.feature.fit import grown
+from mracad.model.brep import Face
+from mracad.model.cells import quadrature
+from mracad.model.region import supported
+from mracad.seam.conditions import SAME, doubled, matched
+from mracad.seam.conditions import rows as seam_rows
+from mracad.seam.contact import Contact
+from mracad.seam.contact import rows as contact_rows
+from mracad.seam.energy import forms
+from mracad.seam.solve import Problem, Space
+
+Array = np.ndarray
+Stretch = tuple[float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Crossing:
+    """A seam that copies lie over.
+
+    Attributes
+    ----------
+    seam : Seam or TrimmedSeam
+    stretches : sequence of (float, float)
+        Fractions between which control points that move reach it: the rest of it stays.
+    halvings : int
+        How often the spans under them are to be halved.
+    """
+
+    seam: Seam | TrimmedSeam
+    stretches: Sequence[Stretch]
+    halvings: int = 0
+
+    @property
+    def edges(self) -> set[int]:
+        return {self.seam.edge, self.seam.twin}
+
+    @property
+    def surfaces(self) -> set[int]:
+        return {self.seam.a.surface, self.seam.b.surface}
+
+    def rests(self) -> Iterator[Stretch]:
+        """What is not in a stretch."""
+        ends = [0.0, *(x for stretch in self.stretches for x in stretch), 1.0]
+        yield from ((low, high) for low, high in zip(ends[::2], ends[1::2], strict=True) if low < high)
+
+
+@dataclass(frozen=True, eq=False)
+class Wanted:
+    """What copies are on a surface.
+
+    Attributes
+    ----------
+    net : Net
+        The surface undisplaced, in the space of its displacement.
+    offset, alone : ndarray (nu, nv, 3)
+        Of its control points, mm: all that is wanted, and what the copies are of that.
+    free : ndarray of bool (nu, nv)
+        Control points that may move.
+    face : Face
+        One of those on it.
+    """
+
+    net: Net
+    offset: Array
+    alone: Array
+    free: Array
+    face: Face
+
+
+@dataclass(frozen=True)
+class Softness:
+    """How closely seams to a tolerance are kept.
+
+    Attributes
+    ----------
+    tolerances : (float, float, float)
+        Of gaps (mm), angles and curvatures (1/mm).
+    weight : float
+        Squared displacement (mm²) times length (mm) that a seam off by its tolerances is worth.
+    """
+
+    tolerances: tuple[float, float, float]
+    weight: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Window:
+    """A part of a net: the control points of its rows and columns, and which of them take part."""
+
+    part: tuple[slice, slice]
+    net: Net
+    local: Array
+
+
+def trace(side: Border | Trace) -> Trace:
+    """One side of a seam of either kind."""
+    return along(side) if isinstance(side, Border) else side
+
+
+def crossing(seam: Seam | TrimmedSeam, nets: Mapping[int, Net], moved: Mapping[int, Array]) -> Crossing:
+    """The parts of a seam that copies move.
+
+    Parameters
+    ----------
+    seam : Seam or TrimmedSeam
+    nets : mapping of int to Net
+        By surface.
+    moved : mapping of int to ndarray of bool (nu, nv)
+        Control points of those that move.
+    """
+    found: list[Stretch] = []
+    for side in map(trace, (seam.a, seam.b)):
+        net = nets[side.surface]
+        knots = net.u, net.v
+        # over finer knots, other functions may reach as far as those that overlap these
+        near = grown(moved[side.surface], knots, max(kv.degree for kv in knots))
+        breaks = crossings(side, knots)
+        shares = Net(*knots, near[..., None].astype(float)).evaluate(side.inside(net, (breaks[1:] + breaks[:-1]) / 2))
+        hit = np.flatnonzero(np.asarray(shares)[:, 0] > 0)
+        found += [(float(breaks[k]), float(breaks[k + 1])) for k in hit]
+    return Crossing(seam, tuple(_merged(found)))
+
+
+def _merged(stretches: Sequence[Stretch]) -> Iterator[Stretch]:
+    """Stretches in order, those that meet as one."""
+    low = high = -1.0
+    for start, stop in sorted(stretches):
+        if start > high + SAME:
+            if high > low:
+                yield low, high
+            low = start
+        high = max(high, stop)
+    if high > low:
+        yield low, high
+
+
+def refined(nets: Mapping[int, Net], found: Sequence[Crossing]) -> dict[int, Net]:
+    """The nets with the knots that seams need under copies."""
+    result = dict(nets)
+    for each in found:
+        for side in map(trace, (each.seam.a, each.seam.b) * each.halvings):
+            net = result[side.surface]
+            cells = _met(net, side, each.stretches)
+            middles = ((kv.breaks[:-1] + kv.breaks[1:]) / 2 for kv in (net.u, net.v))
+            result[side.surface] = net.refined(*(x[cells.any(axis=1 - axis)] for axis, x in enumerate(middles)))
+    parts = _exact_parts(found)
+    return matched(doubled(matched(result, parts), parts), parts)
+
+
+def _exact_parts(found: Sequence[Crossing]) -> list[Seam]:
+    """Those parts of seams that move exactly, as seams."""
+    return [each.seam.part(*s) for each in found if isinstance(each.seam, Seam) for s in each.stretches]
+
+
+def _met(net: Net, side: Trace, stretches: Sequence[Stretch]) -> Array:
+    """Knot cells of a net through which stretches of a trace run, a mask."""
+    shares = [np.empty(0)]
+    for low, high in stretches:
+        breaks = low + (high - low) * crossings(side.part(low, high), (net.u, net.v))
+        shares.append((breaks[1:] + breaks[:-1]) / 2)
+    return side.cells(net, np.concatenate(shares))
+
+
+def held(wanted: Mapping[int, Wanted], found: Sequence[Crossing], softness: Softness) -> dict[int, Array]:
+    """The offsets nearest to those wanted that keep seams under copies.
+
+    Parameters
+    ----------
+    wanted : mapping of int to Wanted
+        By surface; those of both sides of a seam have the same knots where copies move it.
+    found : sequence of Crossing
+    softness : Softness
+
+    Returns
+    -------
+    dict of int to ndarray (nu, nv, 3)
+    """
+    result = {i: np.where(each.free[..., None], each.offset, 0.0) for i, each in wanted.items()}
+    windows = {}
+    for i in sorted({i for each in found for i in each.surfaces}):
+        near, barred = _near(wanted[i].net, i, found)
+        result[i] = np.where(barred[..., None], 0.0, result[i])
+        windows[i] = _window(wanted[i].net, near, near & ~barred & wanted[i].free)
+    if windows:
+        laid = np.concatenate([result[i][window.part].reshape(-1, 3) for i, window in windows.items()])
+        problem = _problem({i: wanted[i].face for i in windows}, laid, windows, found, softness)
+        change = problem.split(problem.nearest(np.zeros_like(problem.f)))
+        for i, window in windows.items():
+            result[i][window.part] += change[i]
+    return result
+
+
+def _problem(
+    faces: Mapping[int, Face],
+    laid: Array,
+    windows: Mapping[int, _Window],
+    found: Sequence[Crossing],
+    softness: Softness,
+) -> Problem:
+    """The changes of offsets ``(points, 3)`` that make seams hold, nearest to none."""
+    nets = {i: window.net for i, window in windows.items()}
+    spaces = {}
+    for i, window in windows.items():
+        # copies go on beyond trim curves: what barely reaches into a face stays near them
+        masses = forms(window.net, window.net, quadrature(window.net, [replace(faces[i], trims=())]))
+        spaces[i] = Space(window.net, masses, window.local, np.ones_like(window.local))
+    rows, _ = seam_rows(nets, _exact_parts(found), everywhere=True)
+    contacts = [
+        Contact(each.seam.a.part(*stretch), each.seam.b.part(*stretch), each.seam.order, since=each.seam.since)
+        for each in found
+        if isinstance(each.seam, TrimmedSeam)
+        for stretch in each.stretches
+    ]
+    if not contacts:
+        return Problem(spaces, rows, -(rows @ laid))
+    soft = contact_rows(nets, contacts)
+    weight, limits = softness.weight, np.asarray(softness.tolerances)[soft.order]
+    pull = weight * soft.pull(-(soft.matrix @ laid), limits)
+    return Problem(spaces, rows, -(rows @ laid), weight * soft.form(limits), pull)
+
+
+def _near(net: Net, surface: int, found: Sequence[Crossing]) -> tuple[Array, Array]:
+    """Control points beside stretches of seams, and those on which the rest of these seams depends."""
+    near, barred = (np.zeros(net.poles.shape[:2], bool) for _ in range(2))
+    for each in found:
+        rests = tuple(each.rests())
+        for side in (each.seam.a, each.seam.b):
+            if side.surface != surface:
+                continue
+            if isinstance(side, Border) and isinstance(each.seam, Seam):
+                kv = (net.u, net.v)[side.axis]
+                rows = jet_support(kv, side.at, each.seam.joint.order)
+                near |= _crossed(net, side, grown(rows[:, None], (kv, kv), kv.degree)[:, 0], each.stretches)
+                barred |= _crossed(net, side, rows, rests)
+            else:
+                near |= supported(net, _met(net, trace(side), each.stretches))
+                barred |= supported(net, _met(net, trace(side), rests))
+    return near, barred
+
+
+def _crossed(net: Net, border: Border, rows: Array, stretches: Sequence[Stretch]) -> Array:
+    """Control points in some rows whose functions along a border overlap stretches of it."""
+    knots = (net.u, net.v)[1 - border.axis]
+    columns = np.zeros(knots.count, bool)
+    margin = 1e-9 * abs(border.stop - border.start)
+    for stretch in stretches:
+        part = border.part(*stretch)
+        low, high = sorted((part.start, part.stop))
+        columns |= meeting(knots, low + margin, high - margin)
+    return rows[:, None] & columns if border.axis == 0 else columns[:, None] & rows
+
+
+def _window(net: Net, near: Array, local: Array) -> _Window:
+    """The part of a net that holds the whole support of control points."""
+    (rows, u), (columns, v) = (
+        _cut(kv, np.flatnonzero(near.any(axis=1 - axis))) for axis, kv in enumerate((net.u, net.v))
+    )
+    part = rows, columns
+    return _Window(part, Net(u, v, net.poles[part], None if net.weights is None else net.weights[part]), local[part])
+
+
+def _cut(kv: KnotVector, functions: Array) -> tuple[slice, KnotVector]:
+    """The functions that overlap some, and their knots; all of them in a periodic direction."""
+    if kv.periodic:
+        return slice(None), kv
+    low = max(int(functions.min()) - kv.degree, 0)
+    high = min(int(functions.max()) + kv.degree + 1, kv.count)
+    return slice(low, high), KnotVector(kv.knots[low : high + kv.degree + 1], kv.degree)
