@@ -26,8 +26,8 @@ from mracad.edit.feature.patch import Patch, pairs
 from mracad.edit.feature.score import Copy, Figures, copied
 from mracad.errors import EditError
 from mracad.model.brep import Model
-from mracad.spec.steps import Transfer
 from mracad.model.displacement import Offset, lifted
+from mracad.spec.steps import Transfer
 from mracad.wavelet.ladder import arc_lengths
 from mracad.wavelet.project import band as band_of
 
