@@ -25,8 +25,7 @@ def distances(net: Net, points: Array) -> Array:
     grid = np.asarray(net.grid(us, vs)).reshape(-1, 3)
     _, seeds = cKDTree(grid).query(points, k=_SEEDS)
     starts = np.stack([us[seeds // len(vs)], vs[seeds % len(vs)]], axis=-1)
-    found = [_descend(net, points, starts[:, k]) for k in range(_SEEDS)]
-    return np.asarray(np.min(found, axis=0))
+    return np.asarray(np.min([_descend(net, points, starts[:, k])[1] for k in range(_SEEDS)], axis=0))
 
 
 def _places(net: Net, axis: int) -> Array:
@@ -42,12 +41,40 @@ def _places(net: Net, axis: int) -> Array:
     return np.unique(np.concatenate([knots.breaks, even]))
 
 
-def _descend(net: Net, points: Array, uv: Array) -> Array:
-    """Distances that Newton's method reaches from the given parameters."""
-    uv = uv.copy()
+def feet(net: Net, points: Array, uv: Array) -> tuple[Array, Array]:
+    """The points of a surface nearest to points, as far as Newton's method reaches from given parameters.
+
+    Parameters
+    ----------
+    net : Net
+    points : ndarray (q, 3)
+    uv : ndarray (q, 2)
+        Where to begin.
+
+    Returns
+    -------
+    uv : ndarray (q, 2)
+    distances : ndarray (q,)
+    """
+    uv, best = _descend(net, points, uv)
+    # distances say little of parameters near the least of them
+    low, high = _limits(net)
+    tried = np.clip(uv + _newton(net, points, uv, low, high), low, high)
+    good = np.linalg.norm(np.asarray(net.evaluate(tried)) - points, axis=1) <= best * (1 + 1e-15)
+    return np.where(good[:, None], tried, uv), best
+
+
+def _limits(net: Net) -> tuple[Array, Array]:
+    """Least and largest parameters; infinite where there are none."""
     low, high = np.array([net.u.domain, net.v.domain]).T
     periodic = np.array([net.u.periodic, net.v.periodic])
-    low, high = np.where(periodic, -np.inf, low), np.where(periodic, np.inf, high)
+    return np.where(periodic, -np.inf, low), np.where(periodic, np.inf, high)
+
+
+def _descend(net: Net, points: Array, uv: Array) -> tuple[Array, Array]:
+    """Parameters that Newton's method reaches from given ones, and distances there."""
+    low, high = _limits(net)
+    uv = np.clip(uv, low, high)
     best = np.linalg.norm(np.asarray(net.evaluate(uv)) - points, axis=1)
     active = np.arange(len(points))
     for _ in range(_STEPS):
@@ -66,7 +93,7 @@ def _descend(net: Net, points: Array, uv: Array) -> Array:
         active = active[moved]
         if not len(active):
             break
-    return best
+    return uv, best
 
 
 def _newton(net: Net, points: Array, uv: Array, low: Array, high: Array) -> Array:

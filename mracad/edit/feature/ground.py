@@ -8,6 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
+from mracad.bspline.closest import feet as closest
 from mracad.edit.feature.chart import Charts, charts
 from mracad.edit.feature.patch import Patch
 from mracad.model.brep import Model
@@ -121,7 +122,7 @@ class Ground:
                 continue
             which = cKDTree(spots).query(points, k=min(3, len(seeds)))[1].reshape(len(points), -1)
             for k in range(which.shape[1]):
-                at, apart = patch.nearest(points, seeds[which[:, k]])
+                at, apart = closest(patch.net, points, seeds[which[:, k]])
                 better = (apart < best - 1e-12) & patch.covers(at)
                 best[better], surface[better], uv[better] = apart[better], index, at[better]
         return self.standing(surface, uv, best)
@@ -166,7 +167,7 @@ class Ground:
                 spread = float(np.linalg.norm(np.ptp(spots, axis=0)) / 8)
                 far, which = cKDTree(spots).query(feet.points)
                 other = ~here & (far <= 1.5 * reach + spread)
-                start[other] = patch.nearest(feet.points[other], seeds[which[other]])[0]
+                start[other] = closest(patch.net, feet.points[other], seeds[which[other]])[0]
                 here |= other
             if not here.any():
                 continue

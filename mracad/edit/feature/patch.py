@@ -20,9 +20,6 @@ Array = np.ndarray
 SEEDS = 90
 """Places in each direction from which a point is projected, at most."""
 
-STEPS = 12
-"""Newton steps of a projection."""
-
 
 @dataclass(frozen=True, eq=False)
 class Patch:
@@ -116,35 +113,6 @@ class Patch:
         uv = pairs(*lists)
         uv = uv[self.covers(uv)]
         return uv, np.asarray(self.net.evaluate(uv))
-
-    def nearest(self, points: Array, uv: Array) -> tuple[Array, Array]:
-        """Feet of points, by Gauss and Newton from ``uv``, and their distances."""
-        low, high = self.domain
-        size = high - low
-        low, high = np.where(self.periodic, -np.inf, low), np.where(self.periodic, np.inf, high)
-        uv = np.clip(uv, low, high)
-        apart = np.linalg.norm(np.asarray(self.net.evaluate(uv)) - points, axis=1)
-        share = np.ones(len(uv))
-        for _ in range(STEPS):
-            s, su, sv, suu, suv, svv = self.net.evaluate(uv, 2)
-            r = s - points
-            p, q = (r * su).sum(1), (r * sv).sum(1)
-            e, f, g = (su * su).sum(1), (su * sv).sum(1), (sv * sv).sum(1)
-            ee, ff, gg = e + (r * suu).sum(1), f + (r * suv).sum(1), g + (r * svv).sum(1)
-            bent = (ee > 0) & (gg > 0) & (ee * gg - ff * ff > 1e-6 * e * g)
-            e, f, g = np.where(bent, ee, e), np.where(bent, ff, f), np.where(bent, gg, g)
-            held = [((uv[:, i] <= low[i]) & (x > 0)) | ((uv[:, i] >= high[i]) & (x < 0)) for i, x in enumerate((p, q))]
-            p, q, f = np.where(held[0], 0, p), np.where(held[1], 0, q), np.where(held[0] | held[1], 0, f)
-            det = np.maximum(e * g - f * f, 1e-14 * e * g + 1e-300)
-            step = np.stack([f * q - g * p, f * p - e * q], axis=1) / det[:, None]
-            tried = np.clip(uv + share[:, None] * step, low, high)
-            there = np.linalg.norm(np.asarray(self.net.evaluate(tried)) - points, axis=1)
-            good = there <= apart * (1 + 1e-15)
-            uv, apart = np.where(good[:, None], tried, uv), np.where(good, there, apart)
-            share = np.where(good, 1.0, share / 4)
-            if (np.abs(step) <= 1e-13 * size).all():
-                break
-        return uv, apart
 
     def around(self, uv: Array, centre: Array, reach: Array, count: int) -> tuple[Array, Array, Array]:
         """Samples around places, ``count`` in each direction.
