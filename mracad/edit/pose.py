@@ -64,11 +64,9 @@ class Scene:
         Where both faces of an edge move, each by itself, they share it.
         """
         t = self.tolerances
-        if contact.b is not None:
-            return t.gap, t.angle, t.bend / width
         meeting, edge = joined.meetings.get(contact.edge), self.model.edges[contact.edge]
-        if meeting is None:
-            return t.gap, t.angle, t.bend / width
+        if contact.b is not None or meeting is None:
+            return t.contact(width)
         moving = sum(self.model.faces[face].surface in self.sheets for face in meeting.faces)
         sharing = min(max(moving, 1), 2)
         return t.wider(edge, meeting.gap) / sharing, t.angle / sharing, t.bend / width / sharing
@@ -159,7 +157,7 @@ def pose(
     mends = np.array([(each.close, each.fit, False) for each in contacts], bool).reshape(-1, 3)
     mends = mends[found.owner, found.order]
     limits = np.where(mends, tolerances, limits)
-    weight = (detail / TIGHT) ** 2 * width
+    weight = worth(detail, width)
     shut = np.where(mends[:, None], opened, 0.0) if joined.mended else opened
     soft, pull = (weight * found.form(limits), -weight * found.pull(shut, limits)) if contacts else (None, None)
     smooth = pairs & np.array([each.order > 0 for each in contacts], bool)[found.owner]
@@ -167,6 +165,11 @@ def pose(
     trimmed = mends & np.array([not each.since for each in contacts], bool)[found.owner]
     problem = Problem(spaces, rows, np.where(goal[:, None], -(rows @ f), 0.0), soft, pull, between)
     return Pose(problem, found, [each.surfaces for each in contacts], opened, limits, trimmed)
+
+
+def worth(detail: float, width: float) -> float:
+    """What a contact that lacks all that it may counts for, mm³: displacements (mm) of a size within a width (mm)."""
+    return (detail / TIGHT) ** 2 * width
 
 
 def beside_rims(sheet: Sheet, joined: Joints) -> Net:

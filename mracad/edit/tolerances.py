@@ -48,6 +48,10 @@ class Tolerances:
     growth: Growth = GROWTH
     deviation: float = np.inf
 
+    def contact(self, width: float) -> tuple[float, float, float]:
+        """Gap (mm), angle and curvature (1/mm) of a seam along a trim curve, for an edit of a wavelength (mm)."""
+        return self.gap, self.angle, self.bend / width
+
     def wider(self, edge: Edge, gap: float) -> float:
         """By how much an edge that gapes by ``gap`` (mm) may gape more where it stays, mm: up to its own tolerance."""
         return max(min(max(edge.tolerance, self.least), self.gap) - gap, MORE * gap)

@@ -24,17 +24,13 @@ from mracad.edit.feature.fit import MISSED, holding, over_knots
 from mracad.edit.feature.ground import Ground
 from mracad.edit.feature.ideal import Copies
 from mracad.edit.feature.score import Copy, Outcome, compared, refuse
-from mracad.edit.feature.seams import Crossing, Softness, Wanted, crossing, held, refined, trace
-from mracad.edit.pose import TIGHT, WITHIN
-from mracad.edit.tolerances import Tolerances
+from mracad.edit.feature.seams import ALLOWED, Crossing, Wanted, crossing, held, refined, trace
+from mracad.edit.pose import WITHIN
 from mracad.model.brep import Model
 from mracad.model.displacement import Displacement, Offset, lifted
 from mracad.seam.interface import Joints, joints
 
 Array = np.ndarray
-
-ALLOWED = Tolerances()
-"""What a seam along trim curves may lack after a copy."""
 
 WIDER = 1e-7
 """An exact seam may gape so much more (mm) and turn as much more as the others; otherwise it stays."""
@@ -86,7 +82,8 @@ class _Task:
         Offsets over these that the copies are.
     joints : Joints
         Of the faces under them.
-    softness : Softness
+    size : (float, float)
+        By how much the least copy may be off, and how far the largest reaches, mm.
     """
 
     copies: Copies
@@ -95,7 +92,7 @@ class _Task:
     nets: dict[int, Net]
     poles: dict[int, Array]
     joints: Joints
-    softness: Softness
+    size: tuple[float, float]
 
     @property
     def model(self) -> Model:
@@ -158,11 +155,9 @@ def _task(copies: Copies, shifts: Shifts, wishes: Wishes, removed: Mapping[int, 
                 knots, laid = holding(rest, patch)
                 nets[i], poles[i] = own.over(*knots), laid @ patch.turn
     under = {face.index for i in nets for face in ground.patches[i].faces}
-    reach = float(copies.reach.max())
-    tolerances = TIGHT * ALLOWED.gap, TIGHT * (WITHIN * ALLOWED.angle), TIGHT * ALLOWED.bend / reach
-    softness = Softness(tolerances, (MISSED * copies.height) ** 2 * reach)
+    size = MISSED * copies.height, float(copies.reach.max())
     joined = _told(ground, under, _sewn(joints(ground.model, under, wishes)))
-    return _Task(rest, known, removed, nets, poles, joined, softness)
+    return _Task(rest, known, removed, nets, poles, joined, size)
 
 
 def _sewn(joined: Joints) -> Joints:
@@ -243,7 +238,7 @@ def _attempt(task: _Task, found: Sequence[Crossing]) -> _Attempt:
         faces = task.copies.ground.patches[i].faces
         free = separate(net, on_it, [face.index for face in faces], task.joints.orders, moving).free
         wanted[i] = Wanted(net, *_wanted(task, i, net), free, faces[0])
-    done = held(wanted, found, task.softness)
+    done = held(wanted, found, task.size)
     offsets = {i: Offset.of(task.model.surfaces[i].net, wanted[i].net, each) for i, each in done.items() if each.any()}
     return _Attempt(wanted, done, offsets)
 
@@ -252,8 +247,9 @@ def _holds(task: _Task, each: Crossing, after: Model) -> bool:
     """Whether a seam is no worse than it may be after an edit."""
     seam = each.seam
     if isinstance(seam, TrimmedSeam):
-        more = WIDER, WITHIN * ALLOWED.angle, ALLOWED.bend / float(task.copies.reach.max())
-        return bool(seam.excess(task.model, after, (ALLOWED.gap, 0.0, 0.0), more)[1].max() <= 1.0)
+        gap, angle, bend = ALLOWED.contact(task.size[1])
+        more = WIDER, WITHIN * angle, bend
+        return bool(seam.excess(task.model, after, (gap, 0.0, 0.0), more)[1].max() <= 1.0)
     for stretch in each.stretches:
         part = seam.part(*stretch)
         old, new = (opening(model, part.a, part.b) for model in (task.model, after))

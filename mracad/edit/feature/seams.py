@@ -14,11 +14,12 @@ import numpy as np
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
 from mracad.constraint.border import Border
-from mracad.constraint.frozen import jet_support, meeting
 from mracad.constraint.seam import Seam
 from mracad.constraint.trace import Trace, along, crossings
 from mracad.constraint.trimmed import TrimmedSeam
 from mracad.edit.feature.fit import grown
+from mracad.edit.pose import WITHIN, worth
+from mracad.edit.tolerances import Tolerances
 from mracad.model.brep import Face
 from mracad.model.cells import quadrature
 from mracad.model.region import supported
@@ -31,6 +32,9 @@ from mracad.seam.solve import Problem, Space
 
 Array = np.ndarray
 Stretch = tuple[float, float]
+
+ALLOWED = Tolerances()
+"""What a seam may lack after a copy."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,22 +89,6 @@ class Wanted:
     alone: Array
     free: Array
     face: Face
-
-
-@dataclass(frozen=True)
-class Softness:
-    """How closely seams to a tolerance are kept.
-
-    Attributes
-    ----------
-    tolerances : (float, float, float)
-        Of gaps (mm), angles and curvatures (1/mm).
-    weight : float
-        Squared displacement (mm²) times length (mm) that a seam off by its tolerances is worth.
-    """
-
-    tolerances: tuple[float, float, float]
-    weight: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,7 +169,7 @@ def _met(net: Net, side: Trace, stretches: Sequence[Stretch]) -> Array:
     return side.cells(net, np.concatenate(shares))
 
 
-def held(wanted: Mapping[int, Wanted], found: Sequence[Crossing], softness: Softness) -> dict[int, Array]:
+def held(wanted: Mapping[int, Wanted], found: Sequence[Crossing], size: tuple[float, float]) -> dict[int, Array]:
     """The offsets nearest to those wanted that keep seams under copies.
 
     Parameters
@@ -189,7 +177,8 @@ def held(wanted: Mapping[int, Wanted], found: Sequence[Crossing], softness: Soft
     wanted : mapping of int to Wanted
         By surface; those of both sides of a seam have the same knots where copies move it.
     found : sequence of Crossing
-    softness : Softness
+    size : (float, float)
+        By how much a copy may be off, and how far it reaches, mm.
 
     Returns
     -------
@@ -203,7 +192,7 @@ def held(wanted: Mapping[int, Wanted], found: Sequence[Crossing], softness: Soft
         windows[i] = _window(wanted[i].net, near, near & ~barred & wanted[i].free)
     if windows:
         laid = np.concatenate([result[i][window.part].reshape(-1, 3) for i, window in windows.items()])
-        problem = _problem({i: wanted[i].face for i in windows}, laid, windows, found, softness)
+        problem = _problem({i: wanted[i].face for i in windows}, laid, windows, found, size)
         change = problem.split(problem.nearest(np.zeros_like(problem.f)))
         for i, window in windows.items():
             result[i][window.part] += change[i]
@@ -215,7 +204,7 @@ def _problem(
     laid: Array,
     windows: Mapping[int, _Window],
     found: Sequence[Crossing],
-    softness: Softness,
+    size: tuple[float, float],
 ) -> Problem:
     """The changes of offsets ``(points, 3)`` that make seams hold, nearest to none."""
     nets = {i: window.net for i, window in windows.items()}
@@ -234,7 +223,7 @@ def _problem(
     if not contacts:
         return Problem(spaces, rows, -(rows @ laid))
     soft = contact_rows(nets, contacts)
-    weight, limits = softness.weight, np.asarray(softness.tolerances)[soft.order]
+    weight, limits = worth(*size), WITHIN * np.array(ALLOWED.contact(size[1]))[soft.order]
     pull = weight * soft.pull(-(soft.matrix @ laid), limits)
     return Problem(spaces, rows, -(rows @ laid), weight * soft.form(limits), pull)
 
@@ -243,31 +232,11 @@ def _near(net: Net, surface: int, found: Sequence[Crossing]) -> tuple[Array, Arr
     """Control points beside stretches of seams, and those on which the rest of these seams depends."""
     near, barred = (np.zeros(net.poles.shape[:2], bool) for _ in range(2))
     for each in found:
-        rests = tuple(each.rests())
-        for side in (each.seam.a, each.seam.b):
-            if side.surface != surface:
-                continue
-            if isinstance(side, Border) and isinstance(each.seam, Seam):
-                kv = (net.u, net.v)[side.axis]
-                rows = jet_support(kv, side.at, each.seam.joint.order)
-                near |= _crossed(net, side, grown(rows[:, None], (kv, kv), kv.degree)[:, 0], each.stretches)
-                barred |= _crossed(net, side, rows, rests)
-            else:
-                near |= supported(net, _met(net, trace(side), each.stretches))
-                barred |= supported(net, _met(net, trace(side), rests))
+        for side in map(trace, (each.seam.a, each.seam.b)):
+            if side.surface == surface:
+                near |= supported(net, _met(net, side, each.stretches))
+                barred |= supported(net, _met(net, side, tuple(each.rests())))
     return near, barred
-
-
-def _crossed(net: Net, border: Border, rows: Array, stretches: Sequence[Stretch]) -> Array:
-    """Control points in some rows whose functions along a border overlap stretches of it."""
-    knots = (net.u, net.v)[1 - border.axis]
-    columns = np.zeros(knots.count, bool)
-    margin = 1e-9 * abs(border.stop - border.start)
-    for stretch in stretches:
-        part = border.part(*stretch)
-        low, high = sorted((part.start, part.stop))
-        columns |= meeting(knots, low + margin, high - margin)
-    return rows[:, None] & columns if border.axis == 0 else columns[:, None] & rows
 
 
 def _window(net: Net, near: Array, local: Array) -> _Window:
