@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import lru_cache
 
 import numpy as np
 
 from mracad.bspline.knots import Array, KnotVector, Side
+from mracad.memo import kept
 
 SHORT = 64
 """Most parameters for which values are kept."""
@@ -49,13 +49,10 @@ def jet(kv: KnotVector, x: Array, orders: Sequence[int], side: Side = "right") -
     return _computed(kv, at, orders, side)
 
 
-@lru_cache(maxsize=4096)
+@kept(4096)
 def _remembered(kv: KnotVector, at: bytes, orders: tuple[int, ...], side: Side) -> tuple[Array, Array]:
     """Few places are often asked for again: the samples of a seam before and after an edit."""
-    first, values = _computed(kv, np.frombuffer(at), orders, side)
-    for array in (first, values):
-        array.setflags(write=False)
-    return first, values
+    return _computed(kv, np.frombuffer(at), orders, side)
 
 
 def _computed(kv: KnotVector, at: Array, orders: Sequence[int], side: Side) -> tuple[Array, Array]:
@@ -113,7 +110,7 @@ def gauss(kv: KnotVector, points: int) -> tuple[Array, Array, Array]:
     return kv.span_index, 0.5 * lengths * (nodes + 1), 0.5 * lengths * weights
 
 
-@lru_cache(maxsize=32)
+@kept(32)
 def legendre(points: int) -> tuple[Array, Array]:
     """Nodes and weights of the Gauss–Legendre rule on [-1, 1]."""
     return np.polynomial.legendre.leggauss(points)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from math import comb
 
 import numpy as np
@@ -16,7 +18,7 @@ from mracad.errors import UsageError
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """A NURBS curve.
+    """A NURBS curve; two are equal when all their numbers are.
 
     Attributes
     ----------
@@ -73,25 +75,36 @@ class Curve:
         poles = refinement(self.knots, fine).apply(homogeneous(self.poles, self.weights))
         return Curve(fine, *euclidean(poles, self.weights is not None))
 
-    def bezier(self) -> tuple[Array, Array, Array | None]:
-        """The curve's polynomial (or rational) pieces in Bézier form.
+    @cached_property
+    def _key(self) -> tuple[KnotVector, bytes, bytes]:
+        return self.knots, self.poles.tobytes(), b"" if self.weights is None else self.weights.tobytes()
 
-        Returns
-        -------
-        breaks : ndarray (s + 1,)
-        poles : ndarray (s, d + 1, k)
-        weights : ndarray (s, d + 1) or None
-        """
-        knots, d = self.knots.unrolled(), self.knots.degree
-        index = np.arange(knots.count) % self.knots.count
-        open_curve = Curve(knots, self.poles[index], None if self.weights is None else self.weights[index])
-        pieces = open_curve.over(KnotVector(np.repeat(self.knots.breaks, d + 1), d))
-        shape = (self.knots.spans, d + 1)
-        return (
-            self.knots.breaks,
-            pieces.poles.reshape(*shape, -1),
-            None if pieces.weights is None else pieces.weights.reshape(shape),
-        )
+    def __hash__(self) -> int:
+        return hash(self._key)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Curve) and self._key == other._key
+
+    def bezier(self) -> Array:
+        """Homogeneous Bézier points of the polynomial (or rational) pieces, ``(s, d + 1, k + 1)``."""
+        points, d = homogeneous(self.poles, self.weights), self.knots.degree
+        if self.knots.spans > 1 or self.knots.multiplicities[0] <= d:
+            knots, fine = self.knots.unrolled(), KnotVector(np.repeat(self.knots.breaks, d + 1), d)
+            points = refinement(knots, fine).apply(points[np.arange(knots.count) % self.knots.count])
+        if self.weights is None:
+            points = np.concatenate([points, np.ones((len(points), 1))], axis=1)
+        return points.reshape(self.knots.spans, d + 1, -1)
+
+
+def bezier_pieces(curves: Sequence[Curve]) -> Iterator[tuple[Array, Array]]:
+    """Homogeneous Bézier points ``(q, d + 1, k + 1)`` of curves and whose they are ``(q,)``, by degree."""
+    by_degree: dict[int, list[tuple[Array, Array]]] = defaultdict(list)
+    for i, curve in enumerate(curves):
+        points = curve.bezier()
+        by_degree[curve.knots.degree].append((points, np.full(len(points), i)))
+    for parts in by_degree.values():
+        points, owners = (np.concatenate(column) for column in zip(*parts, strict=True))
+        yield points, owners
 
 
 def check_weights(weights: Array | None, shape: tuple[int, ...]) -> None:

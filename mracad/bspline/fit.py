@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import lru_cache
 
 import numpy as np
 
@@ -11,6 +10,7 @@ from mracad.bspline.basis import basis
 from mracad.bspline.knots import Array, KnotVector
 from mracad.bspline.solve import BandSolver, folded
 from mracad.bspline.surface import Net
+from mracad.memo import kept
 
 Knots = tuple[KnotVector, KnotVector]
 """In u and v."""
@@ -83,7 +83,7 @@ def evenly(kv: KnotVector, pieces: Array) -> Array:
     return np.concatenate(found) if found else np.empty(0)
 
 
-@lru_cache(maxsize=64)
+@kept(64)
 def _solver(kv: KnotVector) -> BandSolver:
     first, values = basis(kv, kv.greville())
     n, width = values.shape

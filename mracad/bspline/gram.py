@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,6 +11,7 @@ from mracad.bspline.basis import gauss, local_values
 from mracad.bspline.knots import Array, KnotVector
 from mracad.bspline.rows import Rows
 from mracad.errors import UsageError
+from mracad.memo import kept
 
 if TYPE_CHECKING:
     import scipy.sparse
@@ -27,7 +28,6 @@ class Gram:
 
     def __init__(self, bands: Array, periodic: bool = False) -> None:
         self.bands, self.periodic = bands, periodic
-        bands.setflags(write=False)
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -87,7 +87,7 @@ def gram(kv: KnotVector, derivative: int = 0, weights: Array | None = None) -> G
     return _remembered(kv, derivative) if weights is None else _computed(kv, derivative, checked_weights(kv, weights))
 
 
-@lru_cache(maxsize=512)
+@kept(512)
 def _remembered(kv: KnotVector, derivative: int) -> Gram:
     """Surfaces often share their knots."""
     return _computed(kv, derivative, np.ones(kv.spans))

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
-
 import numpy as np
 
 from mracad.bspline.basis import local_values
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.rows import Rows
 from mracad.errors import UsageError
+from mracad.memo import kept
 
 
 def is_nested(coarse: KnotVector, fine: KnotVector) -> bool:
@@ -24,7 +23,7 @@ def is_nested(coarse: KnotVector, fine: KnotVector) -> bool:
     return bool((fine.breaks[place] == coarse.breaks).all() and enough.all())
 
 
-@lru_cache(maxsize=256)
+@kept(256)
 def refinement(coarse: KnotVector, fine: KnotVector) -> Rows:
     """The matrix P that takes poles over ``coarse`` to the poles of the same spline over ``fine``.
 

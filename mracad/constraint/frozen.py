@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 
@@ -19,6 +18,7 @@ from mracad.bspline.basis import basis
 from mracad.bspline.curve import Curve
 from mracad.bspline.knots import KnotVector, Side
 from mracad.bspline.surface import Net
+from mracad.memo import kept
 from mracad.model.brep import Face
 from mracad.model.region import Region, face_region, supported
 
@@ -133,7 +133,7 @@ def frozen_along(net: Net, curves: Sequence[Curve], region: Region, orders: Sequ
     return frozen | supported(net, trimmed)
 
 
-@lru_cache(maxsize=4096)
+@kept(4096)
 def jet_support(knots: KnotVector, at: float, highest: int) -> Array:
     """Basis functions ``(n,)`` with a non-zero derivative of order ≤ ``highest`` at ``at``, from either side.
 

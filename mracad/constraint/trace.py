@@ -79,7 +79,7 @@ class Trace:
     def cells(self, net: Net, share: Array) -> Array:
         """Knot cells of a surface on which the face meets the seam at fractions of it, a mask."""
         uv = self.inside(net, share)
-        return meeting(net, np.stack([uv, uv], axis=1))
+        return meeting(net.u, net.v, np.stack([uv, uv], axis=1))
 
     def part(self, low: float, high: float) -> Trace:
         """What lies between two fractions of the seam, itself from 0 to 1."""

@@ -287,11 +287,7 @@ def _walls(document: Document, least: float | None) -> Layer:
         return Layer("walls", "skipped", "no least thickness was given")
     parts = [part for part in document.parts if has_solids(part.shape)]
     gauge = KernelGauge(document)
-    found = [
-        (index, *gauge.thinnest(index, part))
-        for part in parts
-        for index in range(part.first, part.first + part.faces.Extent())
-    ]
+    found = [(index, *gauge.thinnest(index, part)) for part in parts for index in part.numbers]
     if not found:
         return Layer("walls", "skipped", "no solids")
     findings = tuple(

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 
 from mracad.bspline.basis import legendre
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
+from mracad.memo import kept
 from mracad.model.brep import Face
 from mracad.model.outline import MARGIN, Outline, outline
 
@@ -235,7 +235,7 @@ def _gauss(pieces: Array, points: int, fewest: int, ends: bool) -> tuple[Array, 
     return x, half * weights
 
 
-@lru_cache(maxsize=32)
+@kept(32)
 def lobatto(points: int) -> tuple[Array, Array]:
     """Nodes and weights of the Gauss–Lobatto rule on [-1, 1]."""
     last = np.polynomial.Legendre.basis(points - 1)

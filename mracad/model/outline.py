@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from math import comb
-from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from mracad.bspline.curve import Curve
+from mracad.bspline.curve import Curve, bezier_pieces
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
+from mracad.memo import kept
 from mracad.model.brep import Face
-from mracad.model.region import bezier_points
 
 Array = np.ndarray
 
@@ -27,8 +24,6 @@ FLAT = 2e-4
 
 LONGEST = 4096
 """Most chords of one polynomial piece of a curve."""
-
-_OUTLINES: WeakKeyDictionary[Face, dict[tuple[KnotVector, KnotVector], Outline]] = WeakKeyDictionary()
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,20 +63,19 @@ class Outline:
 
 
 def outline(face: Face, net: Net) -> Outline:
-    """The boundary of a face on its surface ``net``, remembered by the knots of the net."""
-    known = _OUTLINES.setdefault(face, {})
-    if (net.u, net.v) not in known:
-        known[net.u, net.v] = _outline(net, [trim.curve for trim in face.trims])
-    return known[net.u, net.v]
+    """The boundary of a face on its surface ``net``."""
+    return _outline(net.u, net.v, tuple(trim.curve for trim in face.trims))
 
 
-def _outline(net: Net, curves: Sequence[Curve]) -> Outline:
-    if not curves or _natural(net, curves):
+@kept(2048)
+def _outline(u: KnotVector, v: KnotVector, curves: tuple[Curve, ...]) -> Outline:
+    if not curves or _natural(u, v, curves):
         return Outline(np.empty((0, 2, 2)), natural=True)
-    chords, owners = _flattened(curves, np.array([net.u.period / net.u.spans, net.v.period / net.v.spans]))
+    lengths = np.array([u.period, v.period])
+    chords, owners = _flattened(curves, lengths / [u.spans, v.spans])
     ends = np.array([(curve.poles[0], curve.poles[-1]) for curve in curves])
-    periods = np.array([kv.period if kv.periodic else np.inf for kv in (net.u, net.v)])
-    loops = _loops(ends, np.array([net.u.period, net.v.period]), periods)
+    periods = np.array([kv.period if kv.periodic else np.inf for kv in (u, v)])
+    loops = _loops(ends, lengths, periods)
     shifts, closing, around = _closed(ends, loops, periods)
     chords = np.concatenate([chords + shifts[owners][:, None], closing])
     if np.isfinite(periods).any():
@@ -89,12 +83,12 @@ def _outline(net: Net, curves: Sequence[Curve]) -> Outline:
     return Outline(chords[(chords[:, 0] != chords[:, 1]).any(axis=1)], around=around)
 
 
-def _natural(net: Net, curves: Sequence[Curve]) -> bool:
+def _natural(u: KnotVector, v: KnotVector, curves: Sequence[Curve]) -> bool:
     """Whether all curves lie on the border of the domain (of any one period where periodic)."""
     boxes = np.array([(curve.poles.min(axis=0), curve.poles.max(axis=0)) for curve in curves])
     low, high = boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
-    margin = MARGIN * np.array([net.u.period, net.v.period])
-    for axis, kv in enumerate((net.u, net.v)):
+    margin = MARGIN * np.array([u.period, v.period])
+    for axis, kv in enumerate((u, v)):
         wanted = (low[axis], low[axis] + kv.period) if kv.periodic else kv.domain
         if max(abs(low[axis] - wanted[0]), abs(high[axis] - wanted[1])) > margin[axis]:
             return False
@@ -104,16 +98,11 @@ def _natural(net: Net, curves: Sequence[Curve]) -> bool:
 
 def _flattened(curves: Sequence[Curve], spans: Array) -> tuple[Array, Array]:
     """Chords ``(q, 2, 2)`` of the curves, in any order, and whose they are ``(q,)``."""
-    by_degree: dict[int, list[tuple[Array, Array]]] = defaultdict(list)
-    for i, curve in enumerate(curves):
-        points = bezier_points(curve)
-        by_degree[curve.knots.degree].append((points, np.full(len(points), i)))
     boxes = np.array([(curve.poles.min(axis=0), curve.poles.max(axis=0)) for curve in curves])
     extent = boxes[:, 1].max(axis=0) - boxes[:, 0].min(axis=0)
     tolerance = FLAT * np.minimum(spans, np.where(extent > 0, extent, spans))
     chords, owners = [], []
-    for parts in by_degree.values():
-        points, whose = (np.concatenate(column) for column in zip(*parts, strict=True))
+    for points, whose in bezier_pieces(curves):
         polygons, piece = _polygons(points, _chord_counts(points, tolerance))
         same = piece[1:] == piece[:-1]
         chords.append(np.stack([polygons[:-1][same], polygons[1:][same]], axis=1))
@@ -150,7 +139,7 @@ def _polygons(points: Array, counts: Array) -> tuple[Array, Array]:
     return found[:, :2] / found[:, 2:], piece
 
 
-@lru_cache(maxsize=32)
+@kept(32)
 def _binomials(degree: int) -> Array:
     return np.array([comb(degree, k) for k in range(degree + 1)], dtype=float)
 

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
-from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from mracad.bspline.curve import Curve
+from mracad.bspline.curve import Curve, bezier_pieces
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
+from mracad.memo import kept
 from mracad.model.brep import Face
+from mracad.model.cells import inside_grid
 
 Array = np.ndarray
 
@@ -21,8 +21,6 @@ MARGIN = 1e-9
 
 DEPTH = 24
 """Most halvings of one Bézier piece on the walk over the knot grid."""
-
-_REGIONS: WeakKeyDictionary[Face, dict[tuple[KnotVector, KnotVector], Region]] = WeakKeyDictionary()
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,21 +39,13 @@ class Region:
     crossed: tuple[Array, ...]
 
 
-def region(net: Net, curves: Sequence[Curve]) -> Region:
-    """Cells of the knot grid that a face bounded by ``curves`` crosses and covers.
-
-    Parameters
-    ----------
-    net : Net
-        The surface.
-    curves : sequence of Curve
-        The pcurves of all its edges, closed loops in the parameter plane.  None: the whole surface.
-    """
-    if not curves:
+def face_region(net: Net, face: Face) -> Region:
+    """The cells of the knot grid of its surface ``net`` that a face covers, and those that its trims cross."""
+    if not face.trims:
         return Region(np.ones((net.u.spans, net.v.spans), bool), ())
-    boxes, chords, owners = _pieces(net, curves)
-    crossed = tuple(meeting(net, boxes[owners == i]) for i in range(len(curves)))
-    return Region(np.logical_or.reduce(crossed) | _covered(net, chords), crossed)
+    crossed = _crossed(net.u, net.v, tuple(trim.curve for trim in face.trims))
+    middles = ((kv.breaks[:-1] + kv.breaks[1:]) / 2 for kv in (net.u, net.v))
+    return Region(np.logical_or.reduce(crossed) | inside_grid(face, net, *middles), crossed)
 
 
 def supported(net: Net, cells: Array) -> Array:
@@ -88,49 +78,32 @@ def _supports(knots: KnotVector) -> tuple[Array, Array]:
     return first, first + count
 
 
-def _pieces(net: Net, curves: Sequence[Curve]) -> tuple[Array, Array, Array]:
-    """Bounding boxes ``(q, 2, 2)`` and chords ``(q, 2, 2)`` of short pieces of the curves, and whose they are ``(q,)``.
+@kept(2048)
+def _crossed(u: KnotVector, v: KnotVector, curves: tuple[Curve, ...]) -> tuple[Array, ...]:
+    """For each curve the cells that it may pass through.
 
     A Bézier piece lies in the hull of its control points (weights are positive); it is halved until its box
     meets at most two cells or is a negligible part of one.
     """
-    by_degree: dict[int, list[tuple[Array, Array]]] = defaultdict(list)
-    for i, curve in enumerate(curves):
-        points = bezier_points(curve)
-        by_degree[curve.knots.degree].append((points, np.full(len(points), i)))
-    found = []
-    for parts in by_degree.values():
-        points, owners = (np.concatenate(column) for column in zip(*parts, strict=True))
-        found += list(_short(net, points, owners))
-    boxes, chords, owners = (np.concatenate(column) for column in zip(*found, strict=True))
-    return boxes, chords, owners
+    found = [part for points, owners in bezier_pieces(curves) for part in _short((u, v), points, owners)]
+    boxes, owners = (np.concatenate(column) for column in zip(*found, strict=True))
+    return tuple(meeting(u, v, boxes[owners == i]) for i in range(len(curves)))
 
 
-def bezier_points(curve: Curve) -> Array:
-    """Homogeneous Bézier points ``(q, p + 1, 3)`` of a curve."""
-    if curve.knots.spans == 1 and curve.knots.multiplicities[0] == curve.knots.degree + 1:
-        poles, weights = curve.poles[None], None if curve.weights is None else curve.weights[None]
-    else:
-        _, poles, weights = curve.bezier()
-    if weights is None:
-        return np.concatenate([poles, np.ones((*poles.shape[:2], 1))], axis=-1)
-    return np.concatenate([poles * weights[..., None], weights[..., None]], axis=-1)
-
-
-def _short(net: Net, points: Array, owners: Array) -> Iterator[tuple[Array, Array, Array]]:
-    """Boxes, chords and owners of Bézier pieces, halved as :func:`_pieces` says."""
-    smallest = np.array([np.diff(k.breaks).min() for k in (net.u, net.v)]) / 64
+def _short(grid: tuple[KnotVector, KnotVector], points: Array, owners: Array) -> Iterator[tuple[Array, Array]]:
+    """Boxes ``(q, 2, 2)`` and owners of Bézier pieces, halved as :func:`_crossed` says."""
+    smallest = np.array([np.diff(knots.breaks).min() for knots in grid]) / 64
     for depth in range(DEPTH):
         plane = points[..., :2] / points[..., 2:]
         low, high = plane.min(axis=1), plane.max(axis=1)
         size = high - low
         crossings = np.zeros(len(points), dtype=np.int64)
-        for i, knots in enumerate((net.u, net.v)):
+        for i, knots in enumerate(grid):
             start = _wrapped(knots, low[:, i])[0]
             crossings += np.searchsorted(knots.breaks, start + size[:, i]) - np.searchsorted(knots.breaks, start)
         done = (crossings <= 1) | (size <= smallest).all(axis=1) | (size.min(axis=1) == 0) | (depth == DEPTH - 1)
         if done.any():
-            yield np.stack([low[done], high[done]], axis=1), plane[done][:, [0, -1]], owners[done]
+            yield np.stack([low[done], high[done]], axis=1), owners[done]
         if done.all():
             return
         points, owners = _halved(points[~done]), np.tile(owners[~done], 2)
@@ -171,11 +144,11 @@ def _cell_ranges(knots: KnotVector, low: Array, high: Array) -> tuple[Array, Arr
     return first, np.minimum(last, first + cells - 1)
 
 
-def meeting(net: Net, boxes: Array) -> Array:
+def meeting(u: KnotVector, v: KnotVector, boxes: Array) -> Array:
     """Cells ``(cells_u, cells_v)`` met by boxes ``(q, 2, 2)`` (low, high corner)."""
-    cells = (len(net.u.breaks) - 1, len(net.v.breaks) - 1)
-    first_u, last_u = _cell_ranges(net.u, boxes[:, 0, 0], boxes[:, 1, 0])
-    first_v, last_v = _cell_ranges(net.v, boxes[:, 0, 1], boxes[:, 1, 1])
+    cells = u.spans, v.spans
+    first_u, last_u = _cell_ranges(u, boxes[:, 0, 0], boxes[:, 1, 0])
+    first_v, last_v = _cell_ranges(v, boxes[:, 0, 1], boxes[:, 1, 1])
     wide = np.zeros((2 * cells[0] + 1, 2 * cells[1] + 1), dtype=np.int64)
     np.add.at(wide, (first_u, first_v), 1)
     np.add.at(wide, (last_u + 1, last_v + 1), 1)
@@ -183,36 +156,3 @@ def meeting(net: Net, boxes: Array) -> Array:
     np.add.at(wide, (last_u + 1, first_v), -1)
     met = wide.cumsum(0).cumsum(1)[: 2 * cells[0], : 2 * cells[1]] > 0
     return np.asarray(met.reshape(2, cells[0], 2, cells[1]).any(axis=(0, 2)))
-
-
-def _covered(net: Net, chords: Array) -> Array:
-    """Cells whose middle lies inside the polygon made of ``chords`` (q, 2, 2), by parity along lines v = const."""
-    middles, copies = [], []
-    for knots in (net.u, net.v):
-        start, end = knots.domain
-        turns = np.arange(-2, 3) if knots.periodic else np.array([0])
-        middle = (knots.breaks[:-1] + knots.breaks[1:]) / 2
-        middles.append((middle + turns[:, None] * (end - start)).ravel())
-        copies.append(len(turns))
-    columns, lines = middles
-    (u0, v0), (u1, v1) = chords[:, 0].T, chords[:, 1].T
-    first = np.searchsorted(lines, np.minimum(v0, v1))
-    last = np.searchsorted(lines, np.maximum(v0, v1))
-    crossings = last - first
-    chord = np.repeat(np.arange(len(chords)), crossings)
-    line = (
-        np.arange(crossings.sum()) - np.repeat(crossings.cumsum() - crossings, crossings) + np.repeat(first, crossings)
-    )
-    at = u0[chord] + (u1 - u0)[chord] * (lines[line] - v0[chord]) / (v1 - v0)[chord]
-    toggles = np.zeros((len(columns) + 1, len(lines)), dtype=np.int64)
-    np.add.at(toggles, (np.searchsorted(columns, at), line), 1)
-    odd = toggles[:-1].cumsum(axis=0) % 2 == 1
-    return np.asarray(odd.reshape(copies[0], -1, copies[1], len(net.v.breaks) - 1).any(axis=(0, 2)))
-
-
-def face_region(net: Net, face: Face) -> Region:
-    """The :class:`Region` of a face on its surface ``net``; its crossed cells are in the order of the trims."""
-    known = _REGIONS.setdefault(face, {})
-    if (net.u, net.v) not in known:
-        known[net.u, net.v] = region(net, [trim.curve for trim in face.trims])
-    return known[net.u, net.v]

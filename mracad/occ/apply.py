@@ -16,9 +16,10 @@ from mracad.errors import MracadError, UsageError
 from mracad.model.brep import Model, Surface
 from mracad.model.displacement import Displacement, Offset
 from mracad.occ.convert import lay
-from mracad.occ.document import Document, label_key
+from mracad.occ.document import Document
 from mracad.occ.follow import following
 from mracad.occ.geometry import basis, nets, set_poles, spline
+from mracad.occ.labels import label_key
 from mracad.occ.settings import quiet
 from mracad.occ.topology import edge_uses
 

@@ -100,7 +100,7 @@ def _placed(model: Model, document: Document) -> tuple[Array, list[Array]]:
     pairs = [
         (face, frame)
         for part, frames in zip(document.parts, model.places, strict=True)
-        for face in range(part.first, part.first + part.faces.Extent())
+        for face in part.numbers
         for frame in frames
     ]
     return np.array([face for face, _ in pairs]), [frame for _, frame in pairs]

@@ -53,7 +53,7 @@ def check(document: Document, faces: Iterable[int] | None = None, distances: boo
             shells=len(shells),
             faces=len(document.faces),
             open_shells=sum(not BRep_Tool.IsClosed_s(shell) for shell in shells),
-            free_edges=_free_edges(document),
+            free_edges=sum(count == 1 for count in Counter(edge for edge, _, _ in looks(document)).values()),
             edge_tolerance=tolerance.Tolerance(subject, 1, TopAbs_EDGE),
             vertex_tolerance=tolerance.Tolerance(subject, 1, TopAbs_VERTEX),
             curve_distance=max(map(_distance, members), default=0.0) if distances else None,
@@ -96,17 +96,6 @@ def _statuses(analyzer: BRepCheck_Analyzer, shape: TopoDS_Shape, context: TopoDS
     return list(dict.fromkeys(names))
 
 
-def _free_edges(document: Document) -> int:
-    """Edges that one face uses once, degenerate ones left out."""
-    uses = Counter(
-        part.first_edge + part.edges.FindIndex(edge) - 1
-        for part in document.parts
-        for face in document.faces[part.first : part.first + part.faces.Extent()]
-        for edge in edge_uses(face)
-    )
-    return sum(count == 1 and not BRep_Tool.Degenerated_s(document.edges[edge]) for edge, count in uses.items())
-
-
 def _distance(face: TopoDS_Face) -> float:
     """Largest distance between the 3D curves of a face's edges and their curves on it, memory units."""
     forward = TopoDS.Face_s(face.Oriented(TopAbs_FORWARD))
@@ -124,11 +113,11 @@ def _distance(face: TopoDS_Face) -> float:
 def looks(document: Document) -> Iterator[tuple[int, int, bool]]:
     """Every use of an edge by a face of the document: edge, face, and whether the boundary runs along the edge."""
     for part in document.parts:
-        for index in range(part.first, part.first + part.faces.Extent()):
+        for index in part.numbers:
             for edge in edge_uses(document.faces[index]):
                 if not BRep_Tool.Degenerated_s(edge):
                     along = edge.Orientation() == TopAbs_FORWARD
-                    yield part.first_edge + part.edges.FindIndex(edge) - 1, index, along
+                    yield part.edge_number(edge), index, along
 
 
 def centres(document: Document) -> list[tuple[float, float, float]]:

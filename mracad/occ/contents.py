@@ -7,7 +7,6 @@ from collections.abc import Iterable, Iterator
 from OCP.Quantity import Quantity_ColorRGBA
 from OCP.TDF import TDF_Label
 from OCP.TopAbs import TopAbs_FACE
-from OCP.TopLoc import TopLoc_Location
 from OCP.XCAFDoc import (
     XCAFDoc_ColorTool,
     XCAFDoc_ColorType,
@@ -18,7 +17,8 @@ from OCP.XCAFDoc import (
 )
 
 from mracad.model.facts import Carrier, Contents, Occurrence
-from mracad.occ.document import Document, colour_text, components, label_key, label_name, labels, referred
+from mracad.occ.document import Document
+from mracad.occ.labels import colour_text, components, label_key, label_name, labels, usages
 from mracad.occ.topology import matrix
 
 _COLOURS = {
@@ -35,9 +35,14 @@ def contents(document: Document) -> Contents:
     pmi = XCAFDoc_DocumentTool.DimTolTool_s(main)
     products = list(labels(document.shape_tool.GetShapes))
     where = {label_key(label): (label, place) for label, place in _places(document, products)}
-    tree: list[Occurrence] = []
-    for label in labels(document.shape_tool.GetFreeShapes):
-        _grow(label, (), TopLoc_Location(), tree)
+    tree = [
+        Occurrence(
+            tuple(map(label_name, usage.chain)),
+            label_name(usage.product),
+            tuple(matrix(usage.frame)[:3].ravel().tolist()),
+        )
+        for usage in usages(document.shape_tool)
+    ]
     on_layers = [
         (where[label_key(shape)][1], label_name(layer))
         for layer in labels(layer_tool.GetLayerLabels)
@@ -73,7 +78,7 @@ def _places(document: Document, products: list[TDF_Label]) -> Iterator[tuple[TDF
         for sub in labels(lambda found, label=label: XCAFDoc_ShapeTool.GetSubShapes_s(label, found)):
             shape = XCAFDoc_ShapeTool.GetShape_s(sub)
             if part and shape.ShapeType() == TopAbs_FACE:
-                yield sub, Carrier(product, face=part.first + part.faces.FindIndex(shape) - 1)
+                yield sub, Carrier(product, face=part.face_number(shape))
             else:
                 yield sub, Carrier(product, inside=True)
 
@@ -84,12 +89,3 @@ def _colours(places: Iterable[tuple[TDF_Label, Carrier]]) -> Iterator[tuple[Carr
         for name, kind in _COLOURS.items():
             if XCAFDoc_ColorTool.GetColor_s(label, kind, colour):
                 yield place, name, colour_text(colour)
-
-
-def _grow(label: TDF_Label, above: tuple[str, ...], frame: TopLoc_Location, tree: list[Occurrence]) -> None:
-    """Add a label and what it is made of."""
-    frame = frame * XCAFDoc_ShapeTool.GetLocation_s(label)
-    path, product = (*above, label_name(label)), referred(label)
-    tree.append(Occurrence(path, label_name(product), tuple(matrix(frame)[:3].ravel().tolist())))
-    for component in components(product):
-        _grow(component, path, frame, tree)

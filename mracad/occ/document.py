@@ -10,19 +10,19 @@ from typing import TYPE_CHECKING
 from OCP.BRep import BRep_Tool
 from OCP.Geom import Geom_BSplineSurface
 from OCP.Geom2d import Geom2d_Curve
-from OCP.Quantity import Quantity_ColorRGBA
 from OCP.TCollection import TCollection_ExtendedString
 from OCP.TDataStd import TDataStd_Name
-from OCP.TDF import TDF_AttributeSequence, TDF_ChildIterator, TDF_Label, TDF_LabelSequence
+from OCP.TDF import TDF_AttributeSequence, TDF_ChildIterator, TDF_Label
 from OCP.TDocStd import TDocStd_Document
 from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE
 from OCP.TopExp import TopExp
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS, TopoDS_Edge, TopoDS_Face, TopoDS_Shape
 from OCP.TopTools import TopTools_IndexedMapOfShape
-from OCP.XCAFDoc import XCAFDoc_ColorTool, XCAFDoc_ColorType, XCAFDoc_DocumentTool, XCAFDoc_ShapeTool
+from OCP.XCAFDoc import XCAFDoc_DocumentTool, XCAFDoc_ShapeTool
 
 from mracad.errors import FileError
+from mracad.occ.labels import components, label_colour, label_key, label_name, labels, usages
 from mracad.occ.units import Units, metres
 
 if TYPE_CHECKING:
@@ -70,6 +70,19 @@ class Part:
     face_names: dict[int, str]
     face_colours: dict[int, str]
     body_colours: dict[int, str]
+
+    @property
+    def numbers(self) -> range:
+        """Document-wide indices of its faces."""
+        return range(self.first, self.first + self.faces.Extent())
+
+    def face_number(self, face: TopoDS_Shape) -> int:
+        """Document-wide index of one of its faces."""
+        return self.first + self.faces.FindIndex(face) - 1
+
+    def edge_number(self, edge: TopoDS_Shape) -> int:
+        """Document-wide index of one of its edges."""
+        return self.first_edge + self.edges.FindIndex(edge) - 1
 
     def face_colour(self, position: int, tint: str = "") -> str:
         """The colour of a face by its position, where an instance has that of ``tint``: its own goes before that."""
@@ -155,13 +168,22 @@ class Document:
         """Everything, placed, as one shape."""
         return self.shape_tool.GetOneShape()
 
+    def changed(self) -> None:
+        """Look again for parts, faces and edges: what the kernel's document is made of is no longer the same."""
+        for name in ("parts", "faces", "edges"):
+            vars(self).pop(name, None)
+
     @cached_property
     def parts(self) -> list[Part]:
         """The shape definitions that hold geometry, in document order."""
         placed: dict[str, list[TopLoc_Location]] = {}
         tints: dict[str, str] = {}
-        for label in labels(self.shape_tool.GetFreeShapes):
-            _walk(label, TopLoc_Location(), "", placed, tints)
+        for usage in usages(self.shape_tool):
+            key = label_key(usage.product)
+            placed.setdefault(key, []).append(usage.frame)
+            tint = next(filter(None, map(label_colour, usage.chain)), "")
+            if tint:
+                tints.setdefault(key, tint)
         parts: list[Part] = []
         first = first_edge = 0
         for label in labels(self.shape_tool.GetShapes):
@@ -215,24 +237,6 @@ def no_faces(name: str) -> FileError:
     return FileError(f"'{name}' holds no faces", "the file needs surfaces or solids, not only curves or meshes")
 
 
-def label_key(label: TDF_Label) -> str:
-    """A text that names a label within its document."""
-    tags = []
-    while not label.IsRoot():
-        tags.append(label.Tag())
-        label = label.Father()
-    return ":".join(map(str, reversed(tags)))
-
-
-def label_name(label: TDF_Label) -> str:
-    """The name on a label, or ``""``."""
-    if not label.IsAttribute(TDataStd_Name.GetID_s()):
-        return ""
-    attribute = TDataStd_Name()
-    label.FindAttribute(TDataStd_Name.GetID_s(), attribute)
-    return attribute.Get().ToExtString()
-
-
 def named_labels(document: Document) -> Iterator[TDF_Label]:
     """Whatever may have a name: products, instances, faces."""
     every = TDF_ChildIterator(document.shape_tool.Label(), True)
@@ -241,20 +245,6 @@ def named_labels(document: Document) -> Iterator[TDF_Label]:
         every.Next()
         if label.IsAttribute(TDataStd_Name.GetID_s()):
             yield label
-
-
-def name_label(label: TDF_Label, name: str) -> None:
-    """Give a label a name."""
-    TDataStd_Name.Set_s(label, TCollection_ExtendedString(name, True))
-
-
-def label_colour(label: TDF_Label) -> str:
-    """The surface (or general) colour on a label as :func:`colour_text` has it, or ``""``."""
-    colour = Quantity_ColorRGBA()
-    for kind in (XCAFDoc_ColorType.XCAFDoc_ColorSurf, XCAFDoc_ColorType.XCAFDoc_ColorGen):
-        if XCAFDoc_ColorTool.GetColor_s(label, kind, colour):
-            return colour_text(colour)
-    return ""
 
 
 def nested_colours(document: Document) -> Iterator[tuple[tuple[str, ...], str]]:
@@ -272,55 +262,6 @@ def nested_colours(document: Document) -> Iterator[tuple[tuple[str, ...], str]]:
                     path.append(label_key(node.Label().Father()))
                 if colour:
                     yield tuple(path), colour
-
-
-def colour_text(colour: Quantity_ColorRGBA) -> str:
-    """``"#rrggbb"``, or ``"#rrggbbaa"`` where it is transparent."""
-    text = Quantity_ColorRGBA.ColorToHex_s(colour).ToCString().lower()
-    return text[:7] if colour.Alpha() > 1 - 1e-3 else text
-
-
-def labels(fill) -> Iterator[TDF_Label]:
-    """The labels that a kernel function puts in the sequence it is given."""
-    sequence = TDF_LabelSequence()
-    fill(sequence)
-    for i in range(1, sequence.Length() + 1):
-        yield sequence.Value(i)
-
-
-def referred(label: TDF_Label) -> TDF_Label:
-    """The product that an instance is one of; a product itself."""
-    if not XCAFDoc_ShapeTool.IsReference_s(label):
-        return label
-    product = TDF_Label()
-    XCAFDoc_ShapeTool.GetReferredShape_s(label, product)
-    return product
-
-
-def components(label: TDF_Label) -> Iterator[TDF_Label]:
-    """The instances that an assembly is made of; none for a part."""
-    return labels(lambda found: XCAFDoc_ShapeTool.GetComponents_s(label, found, False))
-
-
-def _walk(
-    label: TDF_Label,
-    frame: TopLoc_Location,
-    colour: str,
-    placed: dict[str, list[TopLoc_Location]],
-    tints: dict[str, str],
-) -> None:
-    """Follow an assembly down to its parts; note where each stands and the colour its instances give it."""
-    frame = frame * XCAFDoc_ShapeTool.GetLocation_s(label)
-    colour = colour or label_colour(label)
-    label = referred(label)
-    if XCAFDoc_ShapeTool.IsAssembly_s(label):
-        for component in components(label):
-            _walk(component, frame, colour, placed, tints)
-        return
-    key = label_key(label)
-    placed.setdefault(key, []).append(frame)
-    if colour:
-        tints.setdefault(key, colour)
 
 
 def _described(

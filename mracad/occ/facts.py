@@ -113,7 +113,7 @@ def _lines(document: Document) -> tuple[list[Line], list[int]]:
     own = [np.empty((0, 6)) if lost else _along(edge) for edge, lost in zip(document.edges, whole, strict=True)]
     closing = []
     for part in document.parts:
-        for index in range(part.first, part.first + part.faces.Extent()):
+        for index in part.numbers:
             face = TopoDS.Face_s(document.faces[index].Oriented(TopAbs_FORWARD))
             surface = BRep_Tool.Surface_s(face, TopLoc_Location())
             plane = _plane(face) if isinstance(surface, Geom_Plane) else None
@@ -123,7 +123,7 @@ def _lines(document: Document) -> tuple[list[Line], list[int]]:
             ):
                 closing.append(index)
             for edge in edge_uses(face):
-                number = part.first_edge + part.edges.FindIndex(edge) - 1
+                number = part.edge_number(edge)
                 if not whole[number]:
                     owners[number].append(index)
                     sides[number].append(_onto(own[number], *plane) if plane else _beside(edge, face, ground))
@@ -171,7 +171,7 @@ def _onto(points: Array, origin: Array, normal: Array) -> Array:
 def _places(document: Document) -> Iterator[tuple[Array, int, float]]:
     """Where every placed face is, which face that is, and the largest tolerance of its vertices."""
     for part in document.parts:
-        for index in range(part.first, part.first + part.faces.Extent()):
+        for index in part.numbers:
             face = document.faces[index]
             vertices = [TopoDS.Vertex_s(vertex) for vertex in inside(face, TopAbs_VERTEX)]
             points = np.array([BRep_Tool.Pnt_s(vertex).Coord() for vertex in vertices]).reshape(-1, 3)

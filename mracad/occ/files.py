@@ -11,7 +11,8 @@ from typing import BinaryIO
 
 from mracad.errors import EditError, FileError, UsageError
 from mracad.formats import FORMATS, by_content, by_ending
-from mracad.occ.document import Document, label_name, named_labels, nested_colours
+from mracad.occ.document import Document, named_labels, nested_colours
+from mracad.occ.labels import label_name
 from mracad.occ.literals import known
 from mracad.occ.load import load
 from mracad.occ.writable import Cut

@@ -19,8 +19,9 @@ from OCP.TCollection import TCollection_HAsciiString
 from OCP.TopoDS import TopoDS_Shape
 
 from mracad.errors import FileError
-from mracad.occ.document import Document, empty, label_name, name_label, named_labels, no_faces
+from mracad.occ.document import Document, empty, named_labels, no_faces
 from mracad.occ.iges_text import prepared
+from mracad.occ.labels import label_name, name_label
 from mracad.occ.load import load
 from mracad.occ.settings import all_digits, exchange, moment, quiet
 from mracad.occ.units import UNITS, Units, named

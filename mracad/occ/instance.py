@@ -21,7 +21,8 @@ from OCP.XCAFDoc import (
 )
 
 from mracad.errors import UsageError
-from mracad.occ.document import Document, components, label_key, label_name, labels, referred
+from mracad.occ.document import Document
+from mracad.occ.labels import components, label_key, label_name, labels, referred
 
 _VALUES = (TDataStd_Name, TDataStd_NamedData, XCAFDoc_Area, XCAFDoc_Volume, XCAFDoc_Centroid)
 
@@ -90,8 +91,7 @@ def isolate(document: Document, path: str) -> Own:
                 below = [label_key(label) for label in order].index(label_key(chain[number + 1]))
                 chain[number + 1] = list(components(copy))[below]
     document.shape_tool.UpdateAssemblies()
-    for cached in ("parts", "faces", "edges"):
-        document.__dict__.pop(cached, None)
+    document.changed()
     return _own(document, referred(chain[-1]))
 
 

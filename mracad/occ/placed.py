@@ -5,16 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from OCP.TDF import TDF_Label
 from OCP.TopLoc import TopLoc_Location
 from OCP.XCAFDoc import XCAFDoc_DocumentTool, XCAFDoc_ShapeTool
 
-from mracad.occ.document import Document, Part, components, empty, label_colour, label_key, labels, referred
+from mracad.occ.document import Document, Part, empty
+from mracad.occ.labels import label_colour, label_key, usages
 from mracad.occ.topology import compound
 
 
 @dataclass(frozen=True, eq=False)
-class Placed:
+class OnePart:
     """A document with one part, and where its shapes come from.
 
     Attributes
@@ -32,7 +32,7 @@ class Placed:
     colours: tuple[str, ...]
 
 
-def placed(document: Document) -> Placed:
+def placed(document: Document) -> OnePart:
     """Put every instance of a document into one part, in its place."""
     stands = list(_stands(document))
     xcaf = empty()
@@ -49,22 +49,14 @@ def placed(document: Document) -> Placed:
             colours[at] = part.face_colour(i, colour)
         for i in range(part.edges.Extent()):
             edges[one.edges.FindIndex(part.edges.FindKey(i + 1).Moved(frame)) - 1] = part.first_edge + i
-    return Placed(whole, tuple(faces), tuple(edges), tuple(colours))
+    return OnePart(whole, tuple(faces), tuple(edges), tuple(colours))
 
 
 def _stands(document: Document) -> Iterator[tuple[Part, TopLoc_Location, str]]:
     """Every part where it stands, and the colour that its instances give it there."""
     parts = {label_key(part.label): part for part in document.parts}
-
-    def walk(label: TDF_Label, frame: TopLoc_Location, colour: str) -> Iterator[tuple[Part, TopLoc_Location, str]]:
-        product = referred(label)
-        frame = frame * XCAFDoc_ShapeTool.GetLocation_s(label)
-        if label_key(product) != label_key(label):
-            colour = colour or label_colour(label)
-        if label_key(product) in parts:
-            yield parts[label_key(product)], frame, colour
-        for component in components(product):
-            yield from walk(component, frame, colour)
-
-    for label in labels(document.shape_tool.GetFreeShapes):
-        yield from walk(label, TopLoc_Location(), "")
+    for usage in usages(document.shape_tool):
+        if label_key(usage.product) in parts:
+            instances = (label for label in usage.chain if XCAFDoc_ShapeTool.IsReference_s(label))
+            colour = next(filter(None, map(label_colour, instances)), "")
+            yield parts[label_key(usage.product)], usage.frame, colour

@@ -9,7 +9,8 @@ from OCP.gp import gp_Pnt
 from OCP.TDF import TDF_ChildIterator, TDF_Label
 from OCP.XCAFDoc import XCAFDoc_Area, XCAFDoc_Centroid, XCAFDoc_ShapeTool, XCAFDoc_Volume
 
-from mracad.occ.document import Document, components, label_key, referred
+from mracad.occ.document import Document
+from mracad.occ.labels import components, label_key, referred
 from mracad.occ.measure import mass_of
 
 _KINDS = (XCAFDoc_Area, XCAFDoc_Volume, XCAFDoc_Centroid)

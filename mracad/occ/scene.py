@@ -13,16 +13,8 @@ from OCP.XCAFDoc import XCAFDoc_ShapeTool
 from mracad.errors import FileError, UsageError
 from mracad.mesh.scene import Body, Node, Scene
 from mracad.model.facts import Triangles
-from mracad.occ.document import (
-    Document,
-    components,
-    label_colour,
-    label_key,
-    label_name,
-    labels,
-    nested_colours,
-    referred,
-)
+from mracad.occ.document import Document, nested_colours
+from mracad.occ.labels import components, label_colour, label_key, label_name, labels, referred
 from mracad.occ.topology import inside, matrix
 from mracad.occ.triangles import triangles
 
@@ -138,4 +130,4 @@ def _enclosing(document: Document) -> Iterator[int]:
     for part in document.parts:
         for solid in inside(part.shape, TopAbs_SOLID):
             if all(BRep_Tool.IsClosed_s(shell) for shell in inside(solid, TopAbs_SHELL)):
-                yield from (part.first + part.faces.FindIndex(face) - 1 for face in inside(solid, TopAbs_FACE))
+                yield from map(part.face_number, inside(solid, TopAbs_FACE))

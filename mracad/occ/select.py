@@ -30,9 +30,9 @@ def select_cq(document: Document, expression: str) -> set[int]:
     from pyparsing import ParseException
 
     placed = [
-        (Face(face.Moved(placement)), index)
+        (Face(document.faces[index].Moved(placement)), index)
         for part in document.parts
-        for index, face in enumerate(document.faces[part.first : part.first + part.faces.Extent()], part.first)
+        for index in part.numbers
         for placement in part.placements
     ]
     try:

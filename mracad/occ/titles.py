@@ -15,7 +15,8 @@ from dataclasses import dataclass
 from OCP.TDataStd import TDataStd_Name
 from OCP.TDF import TDF_Label
 
-from mracad.occ.document import Document, components, label_key, label_name, labels, name_label
+from mracad.occ.document import Document
+from mracad.occ.labels import components, label_key, label_name, labels, name_label
 from mracad.occ.literals import decoded
 
 _STRING = rb"'([^']*+(?:''[^']*+)*+)'"

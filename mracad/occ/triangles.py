@@ -89,7 +89,7 @@ def _collected(document: Document) -> Triangles:
     for number, part in enumerate(document.parts):
         first = count
         own: list[Array] = []
-        for index in range(part.first, part.first + part.faces.Extent()):
+        for index in part.numbers:
             face, location = document.faces[index], TopLoc_Location()
             mesh = BRep_Tool.Triangulation_s(face, location)
             if mesh is None:

@@ -107,12 +107,12 @@ def view(document: Document, convert: Iterable[int] = (), edges: Container[int] 
         faces = tuple(
             Face(
                 index, kinds[index], found.surface_of[index], trims.get(index, ()),
-                face.Orientation() == TopAbs_REVERSED, found.frames[index], boxes[index],
+                found.faces[index].Orientation() == TopAbs_REVERSED, found.frames[index], boxes[index],
                 part.face_names.get(index - part.first, ""), part.product,
                 part.face_colour(index - part.first) or part.tint, len(part.placements),
             )
             for part in document.parts
-            for index, face in enumerate(found.faces[part.first : part.first + part.faces.Extent()], part.first)
+            for index in part.numbers
         )  # fmt: skip
         surfaces = tuple(
             Surface(index, net, tuple(members), kinds[members[0]])
@@ -167,7 +167,7 @@ def _walk(document: Document, chosen: frozenset[int]) -> _Found:
     """Go through all faces and their edges."""
     found = _Found(document.faces)
     for part in document.parts:
-        for index in range(part.first, part.first + part.faces.Extent()):
+        for index in part.numbers:
             face = TopoDS.Face_s(found.faces[index].Oriented(TopAbs_FORWARD))
             location = TopLoc_Location()
             ground = basis(BRep_Tool.Surface_s(face, location))
@@ -179,7 +179,7 @@ def _walk(document: Document, chosen: frozenset[int]) -> _Found:
             found.frames.append(matrix(location))
             found.surface_of.append(list(found.surfaces).index(handle) if handle in found.surfaces else None)
             for position, edge in enumerate(edge_uses(face)):
-                place = part.first_edge + part.edges.FindIndex(edge) - 1
+                place = part.edge_number(edge)
                 curve = replaced.pcurves[position] if replaced else pcurve(edge, face)
                 found.uses.append(_Use(index, place, curve, *BRep_Tool.Range_s(edge, face)))
     return found

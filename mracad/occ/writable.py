@@ -42,8 +42,9 @@ from OCP.XCAFDoc import XCAFDoc_ShapeTool
 
 from mracad.errors import EditError
 from mracad.occ.convert import conversion, lay
-from mracad.occ.document import Conversion, Document, Part, labels
+from mracad.occ.document import Conversion, Document, Part
 from mracad.occ.instance import say
+from mracad.occ.labels import labels
 from mracad.occ.topology import edge_uses, inside
 from mracad.occ.tubes import tubes
 
@@ -104,7 +105,7 @@ def writable(document: Document, copier: Copier) -> Iterator[tuple[Cut, ...]]:
     """
     wrong: dict[int, list[int]] = {}
     for number, part in enumerate(document.parts):
-        for index in range(part.first, part.first + part.faces.Extent()):
+        for index in part.numbers:
             face = document.faces[index]
             if _closes(face) and BRepCheck_Analyzer(face).IsValid() and not _kept(face, copier(face)):
                 wrong.setdefault(number, []).append(index)

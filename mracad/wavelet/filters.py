@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
-
 import numpy as np
 
 from mracad.bspline.gram import Gram, gram
@@ -11,6 +9,7 @@ from mracad.bspline.knots import Array, KnotVector
 from mracad.bspline.refine import refinement
 from mracad.bspline.rows import Rows
 from mracad.errors import MracadError, UsageError
+from mracad.memo import kept
 
 
 class Columns:
@@ -54,7 +53,7 @@ class Columns:
         return self.transposed.toarray().T
 
 
-@lru_cache(maxsize=256)
+@kept(256)
 def wavelets(coarse: KnotVector, fine: KnotVector, vanish: tuple[int, int] = (0, 0)) -> Columns:
     """A basis Q of the wavelets: fine splines orthogonal to all coarse ones, of minimal support.
 

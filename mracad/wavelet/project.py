@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Set as AbstractSet
-from functools import cached_property, lru_cache
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -16,6 +16,7 @@ from mracad.bspline.rows import Rows
 from mracad.bspline.solve import BandSolver, folded
 from mracad.bspline.surface import Net
 from mracad.errors import UsageError
+from mracad.memo import kept
 from mracad.wavelet.ladder import arc_lengths, ladder_for_scale
 
 _SMALL = 256  # poles up to which the dense operator is as quick, and spares loading LAPACK's banded solvers
@@ -185,7 +186,7 @@ def band(net: Net, low: float, high: float) -> tuple[Net, Net]:
     return coarse, Net(net.u, net.v, fine.poles - coarse.poles, net.weights)
 
 
-@lru_cache(maxsize=128)
+@kept(128)
 def _cached(coarse: KnotVector, fine: KnotVector, weights: tuple[float, ...] | None) -> Projection:
     return Projection(coarse, fine, None if weights is None else np.array(weights))
 

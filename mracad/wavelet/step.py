@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cached_property, lru_cache
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -13,6 +13,7 @@ from mracad.bspline.refine import refinement
 from mracad.bspline.rows import LARGE, Rows
 from mracad.bspline.solve import BandSolver, folded
 from mracad.errors import UsageError
+from mracad.memo import kept
 from mracad.wavelet.filters import wavelets
 from mracad.wavelet.project import projection
 
@@ -131,7 +132,7 @@ class Chain:
         return coarse
 
 
-@lru_cache(maxsize=128)
+@kept(128)
 def step(coarse: KnotVector, fine: KnotVector) -> Step | Chain:
     """The step between two nested spaces, factored once.
 

@@ -135,13 +135,13 @@ def test_bezier_pieces(kind, rational):
     rng = np.random.default_rng(2)
     kv = random_knots(3, kind, 5, 8)
     curve = Curve(kv, rng.standard_normal((kv.count, 2)), rng.uniform(0.5, 2, kv.count) if rational else None)
-    breaks, poles, weights = curve.bezier()
-    assert poles.shape == (5, 4, 2)
+    breaks, pieces = kv.breaks, curve.bezier()
+    assert pieces.shape == (5, 4, 3)
     x = np.linspace(0, 1, 9)[1:-1]
     bernstein = np.array([comb(3, i) * x**i * (1 - x) ** (3 - i) for i in range(4)]).T
     for k in range(5):
-        w = np.ones(4) if weights is None else weights[k]
-        piece = bernstein @ (poles[k] * w[:, None]) / (bernstein @ w)[:, None]
+        points = bernstein @ pieces[k]
+        piece = points[:, :2] / points[:, 2:]
         np.testing.assert_allclose(piece, curve.evaluate(breaks[k] + x * (breaks[k + 1] - breaks[k]))[0], atol=1e-12)
 
 

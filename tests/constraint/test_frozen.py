@@ -7,7 +7,7 @@ from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
 from mracad.constraint.frozen import CONTINUITY, frozen_along, jet_support, separate
 from mracad.model.brep import Face, Trim
-from mracad.model.region import region
+from mracad.model.region import face_region
 from tests.model.test_region import circle, segment, square
 
 TRIMS = {
@@ -23,7 +23,7 @@ TRIMS = {
 
 def along(net, curve, keep="g1"):
     """Points frozen by one curve."""
-    return frozen_along(net, [curve], region(net, [curve]), [CONTINUITY[keep]])
+    return frozen_along(net, [curve], face_region(net, face(0, [curve])), [CONTINUITY[keep]])
 
 
 def random_net(degrees, seed=0):

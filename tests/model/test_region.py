@@ -8,7 +8,8 @@ from hypothesis import strategies as st
 from mracad.bspline.curve import Curve
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
-from mracad.model.region import region, supported
+from mracad.model.brep import Face, Trim
+from mracad.model.region import face_region, supported
 
 
 def plane(nu=12, nv=9, periodic=False):
@@ -25,9 +26,14 @@ def segment(a, b):
     return Curve(KnotVector.clamped([0, 1], 1), np.array([a, b], float))
 
 
+def face(curves):
+    trims = tuple(Trim(edge, curve) for edge, curve in enumerate(curves))
+    return Face(0, "bspline", 0, trims, False, np.eye(4), np.zeros((2, 3)))
+
+
 def region_cells(net, curve):
     """Cells crossed by one curve."""
-    return region(net, [curve]).crossed[0]
+    return face_region(net, face([curve])).crossed[0]
 
 
 def circle(centre, radius):
@@ -70,7 +76,7 @@ def test_a_curve_on_a_knot_line_crosses_the_cells_on_both_sides():
 
 def test_inside_of_a_square_with_a_hole():
     net = plane(40, 40)
-    area = region(net, [*square(0.1, 0.9), circle([0.5, 0.5], 0.2)])
+    area = face_region(net, face([*square(0.1, 0.9), circle([0.5, 0.5], 0.2)]))
     middles = (np.arange(40) + 0.5) / 40
     x, y = np.meshgrid(middles, middles, indexing="ij")
     r = np.hypot(x - 0.5, y - 0.5)
@@ -83,13 +89,13 @@ def test_inside_of_a_square_with_a_hole():
 def test_a_region_that_runs_over_the_seam_of_a_periodic_surface():
     net = plane(40, 10, periodic=True)
     c = [(0.8, 0.2), (1.3, 0.2), (1.3, 0.8), (0.8, 0.8)]
-    area = region(net, [segment(c[i], c[(i + 1) % 4]) for i in range(4)])
+    area = face_region(net, face([segment(c[i], c[(i + 1) % 4]) for i in range(4)]))
     assert area.inside[:11, 5].all() and area.inside[33:, 5].all()
     assert not area.inside[14:31].any() and not area.inside[:, 9].any()
 
 
 def test_a_face_without_edges_covers_its_surface():
-    area = region(plane(5, 4), [])
+    area = face_region(plane(5, 4), face([]))
     assert area.inside.all() and area.crossed == ()
 
 

@@ -18,8 +18,9 @@ from OCP.TopLoc import TopLoc_Location
 from OCP.XCAFDoc import XCAFDoc_ColorType, XCAFDoc_DocumentTool, XCAFDoc_GraphNode
 
 from mracad.occ.contents import contents
-from mracad.occ.document import Document, components, empty, labels, name_label
+from mracad.occ.document import Document, empty
 from mracad.occ.files import read, write
+from mracad.occ.labels import components, labels, name_label
 from mracad.occ.load import Text
 from tests.occ import shapes
 

@@ -15,8 +15,9 @@ from OCP.XCAFDoc import XCAFDoc_DocumentTool
 from mracad.errors import UsageError
 from mracad.occ.charset import detect
 from mracad.occ.contents import contents
-from mracad.occ.document import components, label_name, labels, name_label, named_labels
+from mracad.occ.document import named_labels
 from mracad.occ.files import read, write
+from mracad.occ.labels import components, label_name, labels, name_label
 from mracad.occ.literals import decoded, encoded
 from mracad.occ.load import Text
 from tests.occ import shapes

@@ -10,8 +10,8 @@ from OCP.XCAFDoc import XCAFDoc_Area, XCAFDoc_Centroid, XCAFDoc_Volume
 
 from mracad.model.displacement import Displacement, Offset
 from mracad.occ.apply import apply
-from mracad.occ.document import label_key, label_name, labels
 from mracad.occ.files import read, write
+from mracad.occ.labels import label_key, label_name, labels
 from mracad.occ.load import Text
 from mracad.occ.measure import mass_of
 from mracad.occ.view import view

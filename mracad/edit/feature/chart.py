@@ -11,10 +11,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
+
+from mracad.memo import kept
 
 Array = np.ndarray
 
@@ -31,7 +33,7 @@ RIDGE = 1e-9
 """Keeps fits with few points from swinging."""
 
 
-@cache
+@kept(16)
 def _powers(degree: int) -> tuple[Array, Array]:
     """Exponents of a and b, by total degree."""
     pairs = [(total - k, k) for total in range(degree + 1) for k in range(total + 1)]
@@ -148,7 +150,7 @@ def _products(at: Array) -> Array:
     return powers[0, i] * powers[1, j]
 
 
-@cache
+@kept(16)
 def _derivations() -> tuple[Array, Array]:
     """Matrices that take the coefficients of a polynomial to those of its derivatives by a and by b."""
     i, j = _powers(DEGREE + 1)

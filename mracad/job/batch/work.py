@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from mracad import note
+from mracad import memo, note
 from mracad.errors import Code, MracadError
 from mracad.inspect.faults import ReadBack
 from mracad.spec.recipe import Step, title, versions
@@ -99,6 +99,7 @@ def do(work: Work) -> Product:
         os.environ.pop("SOURCE_DATE_EPOCH", None)
     else:
         os.environ["SOURCE_DATE_EPOCH"] = work.epoch
+    memo.clear()
     target = Target(work.name, work.format, work.schema)
     with tempfile.TemporaryDirectory() as folder:
         steps = _here(work, Path(folder))
