@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from mracad.errors import UsageError
-from mracad.spec.steps import Repeat, Selection
+from mracad.spec.steps import Selection, Single
 from mracad_cli import options
 from mracad_cli.files import check_target, deliver, read
 
@@ -43,7 +43,7 @@ def list_(source: str, input_unit: str | None, encoding: str | None, faces: tupl
 @options.apply(
     options.reading,
     click.option("--feature", required=True, help="near:X,Y,Z,radius:R (mm) or #3@u0:u1,v0:v1."),
-    options.of(Repeat, " ".join(f for f in Repeat.__struct_fields__ if f not in ("faces", "taper", "base", "band"))),
+    options.of(Single, " ".join(f for f in Single.__struct_fields__ if f not in ("faces", "taper", "base", "band"))),
     click.option(
         "-o", "--output", "output", metavar="F.feature", required=True, type=click.Path(), help="File to write."
     ),
@@ -62,7 +62,7 @@ def extract(
 ) -> None:
     """Save a feature to a file: a library of details that mracad repeat and mracad transfer lay elsewhere."""
     from mracad.edit.feature.detail import save
-    from mracad.edit.feature.edits import extract as taken
+    from mracad.edit.feature.extract import feature_of
     from mracad.occ.look import looked_at
     from mracad.spec.text import options as options_of
     from mracad_cli.render import json_text, mm
@@ -71,9 +71,9 @@ def extract(
     if path.suffix != ".feature":
         raise UsageError(f"cannot write {path}: unknown ending {path.suffix!r}", "end it in .feature")
     check_target(path, overwrite)
-    chosen_options = options_of(Repeat, {**given, "feature": feature, "at": ("0,0,0",)})
+    chosen_options = options_of(Single, {**given, "feature": feature})
     model, scope = looked_at(read(source, input_unit, encoding), chosen_options)
-    found = taken(model, chosen_options, scope.chosen)
+    found = feature_of(model, chosen_options, scope.chosen, feature)
     body = {
         "file": model.name,
         "radius": found.radius,

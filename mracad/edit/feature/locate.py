@@ -180,19 +180,20 @@ class Window:
 
     Attributes
     ----------
+    name : str
+        It as it was given.
     feet : Feet
         Its middle.
     point : ndarray (3,)
-    radius : float
-        Of a disc, mm; half the diagonal of a rectangle.
+    radius, width : float
+        Of the disc, half the diagonal of the rectangle; and of the taper beyond it, mm.
     box : ndarray (2, 2) or None
         Least and largest parameters of a rectangle.
     patch : Patch or None
         Its surface.
-    width : float
-        Of the taper, mm.
     """
 
+    name: str
     feet: Feet
     point: Array
     radius: float
@@ -200,45 +201,51 @@ class Window:
     box: Array | None = None
     patch: Patch | None = None
 
-    def reach(self, width: float) -> float:
-        """How far the window reaches with a taper, mm."""
-        return self.radius + width
+    @property
+    def label(self) -> str:
+        """It in messages."""
+        return f"feature {self.name}"
 
-    def share(self, patch: Patch, points: Array, xy: Array, width: float) -> Array:
-        """How far into the taper Greville points (flat indices) of a patch lie: below 0 inside, 1 and more beyond."""
+    @property
+    def reach(self) -> float:
+        """How far it reaches with its taper, mm."""
+        return self.radius + self.width
+
+    def shares(self, patch: Patch, points: Array, xy: Array) -> Array:
+        """How far into the taper the Greville points ``(nu, nv)`` of a patch lie: below 0 inside, 1 and more beyond.
+
+        Only those may lie inside of which flat indices and normal coordinates ``(q, 2)`` are given.
+        """
         if self.box is None:
             beyond = np.linalg.norm(xy, axis=1) - self.radius
         elif patch is not self.patch:
-            return np.full(len(points), np.inf)
+            beyond = np.full(len(points), np.inf)
         else:
             beyond = _beyond(patch.net, self.box)[points]
-        return np.asarray(beyond / width if width else np.where(beyond > 0, np.inf, 0.0))
+        found = np.full(patch.net.poles.shape[:2], np.inf)
+        found.ravel()[points] = beyond / self.width if self.width else np.where(beyond > 0, np.inf, 0.0)
+        return found
 
 
 def _beyond(net: Net, box: Array) -> Array:
     """Distance (mm, along the parameter lines) of the Greville points from a rectangle, ``(nu nv,)``; 0 inside."""
     apart = []
-    middle = box.mean(axis=0)
     for axis, kv in enumerate((net.u, net.v)):
-        at = kv.greville()
-        ends = np.stack([np.full(len(at), middle[0]), np.full(len(at), middle[1])], axis=1)
-        ends[:, axis] = np.clip(at, *box[:, axis])
-        line = np.concatenate([at, box[:, axis]])
+        line = np.concatenate([kv.greville(), box[:, axis]])
         order = np.argsort(line)
-        uv = np.tile(middle, (len(line), 1))
+        uv = np.tile(box.mean(axis=0), (len(line), 1))
         uv[:, axis] = line[order]
-        length = np.zeros(len(line))
         steps = np.linalg.norm(np.diff(np.asarray(net.evaluate(uv)), axis=0), axis=1)
+        length = np.zeros(len(line))
         length[order] = np.append(0.0, np.cumsum(steps))
-        own, low, high = length[:-2], length[-2], length[-1]
-        apart.append(np.maximum(np.maximum(low - own, own - high), 0.0))
+        apart.append(np.maximum(np.maximum(length[-2] - length[:-2], length[:-2] - length[-1]), 0.0))
     return np.hypot(apart[0][:, None], apart[1]).ravel()
 
 
-def window(ground: Ground, text: str, taper: float | None) -> Window:
+def window(ground: Ground, text: str, width: float | None) -> Window:
     """A window from ``near:X,Y,Z,radius:R`` or ``#3@u0:u1,v0:v1``; raises UsageError and EditError.
 
-    ``taper`` (mm) is a quarter of the radius, or of the shorter side of a rectangle, by default.
+    ``width`` of the taper (mm) is a quarter of the radius, or of the shorter side of a rectangle, by default.
     """
     label = f"feature {text}"
     disc = re.fullmatch(rf"near:(.*),\s*radius:\s*({_NUMBER})\s*(?:mm)?", text)
@@ -248,26 +255,30 @@ def window(ground: Ground, text: str, taper: float | None) -> Window:
             raise UsageError(f"{label}: radius {radius:g} is not greater than zero", WINDOW)
         given = place(ground, disc[1], label.partition(",radius")[0])
         feet = standing(ground, [given], radius)
-        return Window(feet, given.point, radius, radius / 4 if taper is None else taper)
+        return Window(text, feet, given.point, radius, radius / 4 if width is None else width)
     box = re.fullmatch(rf"(.+)@({_NUMBER}):({_NUMBER}),({_NUMBER}):({_NUMBER})", text.replace(" ", ""))
     if not box:
         raise UsageError(f"{label}: this is not a window", WINDOW)
     face = face_number(ground.model, box[1], label, WINDOW)
-    patch = patch_of(ground, face, label)
-    (u0, u1, v0, v1) = (float(x) for x in box.groups()[1:])
-    corners = np.array([[u0, v0], [u1, v1]])
+    u0, u1, v0, v1 = (float(x) for x in box.groups()[1:])
     if not (u0 < u1 and v0 < v1):
         raise UsageError(f"{label}: the window is empty", WINDOW)
+    return _rectangle(ground, face, np.array([[u0, v0], [u1, v1]]), text, width)
+
+
+def _rectangle(ground: Ground, face: int, corners: Array, text: str, width: float | None) -> Window:
+    """The window between two corners ``(2, 2)`` in the parameters of a face."""
+    label = f"feature {text}"
+    patch = patch_of(ground, face, label)
     if not patch.within(corners).all():
         raise EditError(f"{label}: the window is outside the face: {_domain(patch)}", "give parameters inside the face")
     middle = corners.mean(axis=0)
     if not patch.inside(ground.model.faces[face], middle[None])[0]:
         raise EditError(f"{label}: the middle of the window is outside the face", "move it onto the face")
-    surface = ground.model.faces[face].surface
-    feet = ground.standing(np.array([surface]), middle[None], np.zeros(1))
-    edge = np.array([[u0, v0], [u1, v0], [u1, v1], [u0, v1]])
-    points = np.asarray(patch.net.evaluate(edge))
+    feet = ground.standing(np.array([patch.index]), middle[None], np.zeros(1))
+    (u0, v0), (u1, v1) = corners
+    points = np.asarray(patch.net.evaluate(np.array([[u0, v0], [u1, v0], [u1, v1], [u0, v1]])))
     sides = np.linalg.norm(points - np.roll(points, 1, axis=0), axis=1)
     radius = float(np.linalg.norm(points - feet.points[0], axis=1).max())
-    width = float(sides.min()) / 4 if taper is None else taper
-    return Window(feet, feet.points[0], radius, width, corners, patch)
+    width = float(sides.min()) / 4 if width is None else width
+    return Window(text, feet, feet.points[0], radius, width, corners, patch)

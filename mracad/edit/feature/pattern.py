@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
+from mracad.edit.feature.detail import Feature
 from mracad.edit.feature.ground import SIDEWAYS, Feet, Ground, axes
-from mracad.edit.feature.locate import MOST_PLACES, Place, numbers, place, table, whole
+from mracad.edit.feature.locate import MOST_PLACES, Place, numbers, place, standing, table, whole
 from mracad.errors import EditError, UsageError
 from mracad.model.brep import Model
+from mracad.spec.quantity import length
+from mracad.spec.steps import Repeat
 
 Array = np.ndarray
 
@@ -23,6 +27,54 @@ STRIDES = 4
 """Steps from one place of a grid to the next."""
 
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+
+
+def places(ground: Ground, feature: Feature, options: Repeat) -> list[Place]:
+    """All places of copies, each with what turns and scales the copy there.
+
+    Raises
+    ------
+    UsageError
+        For words that are not right.
+    EditError
+        For a place off the ground.
+    FileError
+        For a file that is none of places.
+    """
+    found = listed(ground, options.at)
+    if options.grid or options.polar:
+        first = found[0] if found else None
+        own = feature.origin is not None and first is None
+        origin, frame = _beginning(ground, feature, first)
+        if options.grid:
+            laid = grid(ground, options.grid, origin, frame, own)
+        else:
+            laid = polar(options.polar or "", origin, frame, own)
+        if first is not None:
+            laid = [replace(p, rotate=first.rotate, size=first.size, height=first.height) for p in laid]
+        found = laid + found[1:]
+    if options.along:
+        found = found + along(ground, options.along)
+    turn = math.radians(options.rotate)
+    found = [
+        replace(p, rotate=p.rotate + turn, size=p.size * options.size, height=p.height * options.height) for p in found
+    ]
+    if options.jitter is not None or options.spin:
+        jitter = 0.0 if options.jitter is None else length(options.jitter, ground.model.diagonal, "jitter")
+        feet = standing(ground, found, feature.reach)
+        found = scattered(found, feet, jitter, math.radians(options.spin), options.seed)
+    return found
+
+
+def _beginning(ground: Ground, feature: Feature, first: Place | None) -> tuple[Array, Array]:
+    """Where a pattern begins, and its frame: at the first place if there is one, else at the feature's own."""
+    if first is not None:
+        foot = standing(ground, [first], feature.reach)
+        return foot.points[0], axes(foot.normals, foot.along)[0]
+    if feature.origin is None:
+        raise EditError("a feature from a file has no place of its own to begin at", "give --at, too")
+    feet = feature.origin.feet
+    return ground.standing(feet.surface, feet.uv, np.zeros(1)).points[0], feature.origin.axes
 
 
 def listed(ground: Ground, words: Sequence[str]) -> list[Place]:

@@ -12,13 +12,14 @@ from OCP.gp import gp_Ax2, gp_Dir, gp_Pnt
 
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
-from mracad.edit.feature.edits import extract, repeat
+from mracad.edit.feature.edits import repeat
+from mracad.edit.feature.extract import feature_of
 from mracad.edit.feature.score import Copy, refuse
 from mracad.errors import Code, EditError
 from mracad.inspect.seams import seams
 from mracad.occ.step import read_step, write_step
 from mracad.occ.view import view
-from mracad.spec.steps import Repeat
+from mracad.spec.steps import Repeat, Single
 from samples import make
 from tests.conftest import CORPUS
 from tests.edit import panels
@@ -79,7 +80,7 @@ def test_copies_whole_spans_away_are_exact(plane, tmp_path):
     ways = [(x, y) for x in (0, 51, 98) for y in (0, 50, 99, 101)]
     places = [word((50 + x, 50 + y, 0)) for x, y in ways if x or y] + [word((77, 66, 0))]
     before, after, report = repeated(plane, tmp_path / "out.step", *(w for p in places for w in ("--at", p)))
-    own = extract(before, Repeat(feature=FEATURE, at=("0,0,0",)), {0}).origin.offsets[0]
+    own = feature_of(before, Single(feature=FEATURE), {0}, FEATURE).origin.offsets[0]
     expected = np.zeros_like(own)
     for x, y in [*(w for w in ways if any(w)), (27, 16)]:
         i, j, _ = (slice(a.min(), a.max() + 1) for a in np.nonzero(own))
@@ -201,7 +202,7 @@ def test_surroundings_tell_the_ground(radius):
 
     flat = sheet(grounds.plane(120.0, (60.0, 60.0)))
     window = f"near:60,60,0,radius:{0.8 * radius * SIGMA}"
-    found = extract(flat, Repeat(feature=window, at=("0,0,0",), taper=f"{0.2 * radius * SIGMA}mm"), {0})
+    found = feature_of(flat, Single(feature=window, taper=f"{0.2 * radius * SIGMA}mm"), {0}, window)
     net = flat.surfaces[0].net
     left = Net(net.u, net.v, net.poles - found.origin.offsets[0])
     points = left.evaluate(square(left))

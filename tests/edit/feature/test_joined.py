@@ -10,11 +10,12 @@ from mracad.constraint.border import Border
 from mracad.constraint.joint import Joint
 from mracad.constraint.seam import Seam
 from mracad.edit.feature.detail import save
-from mracad.edit.feature.edits import extract, repeat
+from mracad.edit.feature.edits import repeat
+from mracad.edit.feature.extract import feature_of
 from mracad.edit.feature.seams import crossing
 from mracad.errors import EditError
 from mracad.occ.view import view
-from mracad.spec.steps import Repeat
+from mracad.spec.steps import Repeat, Single
 from tests import zoo
 from tests.edit import panels
 from tests.edit.feature import grounds
@@ -22,12 +23,13 @@ from tests.edit.feature.grounds import HEIGHT, SIGMA, bump
 from tests.edit.models import sheet
 from tests.occ import shapes
 
+WINDOW = "near:50,50,0,radius:20"
+
 
 @pytest.fixture(scope="module")
 def feature(tmp_path_factory):
     path = tmp_path_factory.mktemp("feature") / "bump.feature"
-    window = Repeat(feature="near:50,50,0,radius:20", at=("0,0,0",))
-    path.write_bytes(save(extract(sheet(grounds.plane()), window, {0})))
+    path.write_bytes(save(feature_of(sheet(grounds.plane()), Single(feature=WINDOW), {0}, WINDOW)))
     return str(path)
 
 

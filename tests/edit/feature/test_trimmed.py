@@ -8,7 +8,8 @@ import pytest
 from mracad.constraint.cause import Cause, Still
 from mracad.constraint.wishes import Wishes
 from mracad.edit.feature.detail import save
-from mracad.edit.feature.edits import extract, move, repeat
+from mracad.edit.feature.edits import move, repeat
+from mracad.edit.feature.extract import feature_of
 from mracad.errors import EditError
 from mracad.inspect.seams import seams
 from mracad.job.document import run
@@ -16,19 +17,19 @@ from mracad.model.displacement import Displacement, Offset
 from mracad.occ.step import read_step, write_step
 from mracad.occ.view import view
 from mracad.seam.interface import joints
-from mracad.spec.steps import Move, Repeat
+from mracad.spec.steps import Move, Repeat, Single
 from tests.edit import halves
 from tests.edit.feature import grounds
 from tests.edit.feature.grounds import HEIGHT, bump
 from tests.edit.models import sheet
 
+WINDOW = "near:50,50,0,radius:20"
+
 
 @pytest.fixture(scope="module")
 def feature(tmp_path_factory):
     path = tmp_path_factory.mktemp("feature") / "bump.feature"
-    path.write_bytes(
-        save(extract(sheet(grounds.plane()), Repeat(feature="near:50,50,0,radius:20", at=("0,0,0",)), {0}))
-    )
+    path.write_bytes(save(feature_of(sheet(grounds.plane()), Single(feature=WINDOW), {0}, WINDOW)))
     return str(path)
 
 
