@@ -69,8 +69,7 @@ class BandSolver:
             from mracad.bspline import sweeps
 
             x = b if overwrite else np.empty(b.shape)
-            lower, upper, inverse, rows = self.triangles
-            sweeps.solve(lower, upper, inverse, rows, self.column_order, b, axis % b.ndim, x)
+            sweeps.solve(self.triangles, self.column_order, b, axis % b.ndim, x)
             return x
         from scipy.linalg.lapack import dgbtrs
 

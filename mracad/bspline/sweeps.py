@@ -15,13 +15,17 @@ from mracad.bspline.rows import Rows
 _LINES = 48
 _UNROLL = 4
 # One signature a kernel, so that each is compiled once, and kept on disk.  Lines come as flat memory and its layout:
-# sizes (before, along, after) and the steps of the first two.
-_FLAT_IN = types.Array(types.float64, 1, "C", readonly=True)
-_FLAT_OUT = types.float64[::1]
-_LAYOUT = types.UniTuple(types.int64, 5)
-_TAPS = types.Array(types.float64, 2, "C", readonly=True)
+# sizes (before, along, after) and the steps of the first two; a band as its taps, and where each row of them begins or
+# ends.
 _REAL = types.Array(types.float64, 1, "C", readonly=True)
 _INDEX = types.Array(types.int64, 1, "C", readonly=True)
+_TAPS = types.Array(types.float64, 2, "C", readonly=True)
+_BAND = types.Tuple((_TAPS, _INDEX))
+_LAYOUT = types.UniTuple(types.int64, 5)
+_IN = types.Tuple((_REAL, _LAYOUT))
+_OUT = types.Tuple((types.float64[::1], _LAYOUT))
+
+_Lines = tuple[Array, tuple[int, ...]]
 
 
 def apply(start: Array, values: Array, c: Array, axis: int) -> Array:
@@ -29,14 +33,14 @@ def apply(start: Array, values: Array, c: Array, axis: int) -> Array:
     out = np.empty((*c.shape[:axis], len(start), *c.shape[axis + 1 :]))
     place, target = np.arange(c.shape[axis]), np.arange(len(start))
     nothing = _lines(c[(slice(None),) * axis + (slice(0),)], axis)
-    _product(*_lines(c, axis), *nothing, place, start, *_padded(values), target, *_lines(out, axis))
+    _product(_lines(c, axis), nothing, place, start, _padded(values), target, _lines(out, axis))
     return out
 
 
 def scatter(start: Array, values: Array, columns: int, c: Array, axis: int) -> Array:
     """The transpose of the matrix with runs ``values`` from columns ``start`` times ``c`` along ``axis``."""
     out = np.empty((*c.shape[:axis], columns, *c.shape[axis + 1 :]))
-    _scatter(*_lines(c, axis), start, values, *_lines(out, axis))
+    _scatter(_lines(c, axis), start, values, _lines(out, axis))
     return out
 
 
@@ -46,23 +50,21 @@ def combine(matrix: Rows, columns: Array, rows: Array, coarse: Array, detail: Ar
     ``out`` may be the array of which ``coarse`` and ``detail`` are the two parts.
     """
     first, second, place = _lines(coarse, axis), _lines(detail, axis), np.argsort(columns)
-    _product(*first, *second, place, matrix.start, *_padded(matrix.values), np.argsort(rows), *_target(out, axis))
+    _product(first, second, place, matrix.start, _padded(matrix.values), np.argsort(rows), _target(out, axis))
 
 
-def solve(
-    lower: Rows, upper: Rows, inverse: Array, rows: Array, columns: Array, b: Array, axis: int, out: Array
-) -> None:
-    """``L U out[columns] = b[rows]`` along ``axis``; the triangles come without their diagonals.
+def solve(triangles: tuple[Rows, Rows, Array, Array], columns: Array, b: Array, axis: int, out: Array) -> None:
+    """``L U out[columns] = b[rows]`` along ``axis``, which may take the place of ``b``.
 
-    ``out`` may be ``b``.
+    The triangles come as strict L and U, one over the diagonal of U, and ``rows``.
     """
-    low, below = _window(lower, before=True)
-    high, above = _window(upper, before=False)
-    place, target = np.argsort(rows), np.argsort(columns)
-    _solve(*_lines(b, axis), place, target, -low, below, -high, above, inverse, *_target(out, axis))
+    lower, upper, inverse, rows = triangles
+    order = np.argsort(rows), np.argsort(columns)
+    bands = _window(lower, before=True), _window(upper, before=False)
+    _solve(_lines(b, axis), order, *bands, inverse, _target(out, axis))
 
 
-def _lines(c: Array, axis: int) -> tuple[Array, tuple[int, ...]]:
+def _lines(c: Array, axis: int) -> _Lines:
     """Memory of the array from its first value on, and its layout; ``axis`` is not negative.
 
     The axes before ``axis`` must lie in memory as one, and those after it densely, as in any part of an array along
@@ -77,7 +79,7 @@ def _lines(c: Array, axis: int) -> tuple[Array, tuple[int, ...]]:
     return np.lib.stride_tricks.as_strided(lines, (extent,), (c.itemsize,)), (*lines.shape, steps[0], steps[1])
 
 
-def _target(out: Array, axis: int) -> tuple[Array, tuple[int, ...]]:
+def _target(out: Array, axis: int) -> _Lines:
     """The same of an array that is to be written to."""
     flat, layout = _lines(out, axis)
     if not np.may_share_memory(flat, out):
@@ -93,7 +95,8 @@ def _padded(values: Array) -> tuple[Array, Array]:
 
 
 def _window(triangle: Rows, before: bool) -> tuple[Array, Array]:
-    """Strict triangle as taps on the ``w`` rows just before (or after) each row, and where its taps begin (or end).
+    """A strict triangle, negative, as taps on the ``w`` rows just before (or after) each row, and where they begin (or
+    end).
 
     The taps of row ``i`` multiply rows ``i − w … i − 1``, or ``i + 1 … i + w``.
     """
@@ -101,7 +104,7 @@ def _window(triangle: Rows, before: bool) -> tuple[Array, Array]:
     distance = row - column if before else column - row
     width = -(-max(int(distance.max(initial=1)), 1) // _UNROLL) * _UNROLL
     taps = np.zeros((len(triangle.start), width))
-    taps[row, width - distance if before else distance - 1] = value
+    taps[row, width - distance if before else distance - 1] = -value
     reach = np.zeros(len(triangle.start), dtype=np.int64)
     np.maximum.at(reach, row, distance)
     reach = -(-reach // _UNROLL) * _UNROLL
@@ -109,8 +112,9 @@ def _window(triangle: Rows, before: bool) -> tuple[Array, Array]:
 
 
 @njit(cache=True)
-def _gather(flat, layout, a0, a1, b0, b1, place, buffer):
+def _gather(lines, block, place, buffer):
     """Lines ``[a0:a1, :, b0:b1]`` into the rows ``place`` of the buffer."""
+    (flat, layout), (a0, a1, b0, b1) = lines, block
     width = b1 - b0
     for i in range(place.size):
         row = buffer[place[i]]
@@ -121,8 +125,9 @@ def _gather(flat, layout, a0, a1, b0, b1, place, buffer):
 
 
 @njit(cache=True)
-def _spread(buffer, place, a0, a1, b0, b1, flat, layout):
+def _spread(buffer, place, block, lines):
     """Rows ``place`` of the buffer to lines ``[a0:a1, :, b0:b1]``."""
+    (flat, layout), (a0, a1, b0, b1) = lines, block
     width = b1 - b0
     for i in range(place.size):
         row = buffer[place[i]]
@@ -148,11 +153,11 @@ def _blocks(layout):
     return max(_LINES // width, 1), width
 
 
-@njit(types.void(_FLAT_IN, _LAYOUT, _INDEX, _TAPS, _FLAT_OUT, _LAYOUT), cache=True)
-def _scatter(c, layout, head, taps, out, out_layout):
-    before, along, after = layout[:3]
-    columns, reach = out_layout[1], taps.shape[1]
-    high, wide = _blocks(layout)
+@njit(types.void(_IN, _INDEX, _TAPS, _OUT), cache=True)
+def _scatter(c, head, taps, out):
+    before, along, after = c[1][:3]
+    columns, reach = out[1][1], taps.shape[1]
+    high, wide = _blocks(c[1])
     x = np.zeros((along, _LINES))
     y = np.zeros((columns + reach, _LINES))
     identity, targets = np.arange(along), np.arange(columns)
@@ -160,7 +165,8 @@ def _scatter(c, layout, head, taps, out, out_layout):
         a1 = min(a0 + high, before)
         for b0 in range(0, after, wide):
             b1 = min(b0 + wide, after)
-            _gather(c, layout, a0, a1, b0, b1, identity, x)
+            block = a0, a1, b0, b1
+            _gather(c, block, identity, x)
             y[:] = 0.0
             for i in range(along):
                 for k in range(reach):
@@ -169,22 +175,22 @@ def _scatter(c, layout, head, taps, out, out_layout):
                         row = y[head[i] + k]
                         for j in range(_LINES):
                             row[j] += tap * x[i, j]
-            _spread(y, targets, a0, a1, b0, b1, out, out_layout)
+            _spread(y, targets, block, out)
 
 
-@njit(
-    types.void(_FLAT_IN, _LAYOUT, _INDEX, _INDEX, _TAPS, _INDEX, _TAPS, _INDEX, _REAL, _FLAT_OUT, _LAYOUT), cache=True
-)
-def _solve(b, layout, place, target, low, below, high_taps, above, inverse, out, out_layout):
-    before, along, after = layout[:3]
+@njit(types.void(_IN, types.UniTuple(_INDEX, 2), _BAND, _BAND, _REAL, _OUT), cache=True)
+def _solve(b, order, lower, upper, inverse, out):
+    before, along, after = b[1][:3]
+    (place, target), (low, below), (high_taps, above) = order, lower, upper
     lead, tail = low.shape[1], high_taps.shape[1]
-    high, wide = _blocks(layout)
+    high, wide = _blocks(b[1])
     x = np.zeros((lead + along + tail, _LINES))
     for a0 in range(0, before, high):
         a1 = min(a0 + high, before)
         for b0 in range(0, after, wide):
             b1 = min(b0 + wide, after)
-            _gather(b, layout, a0, a1, b0, b1, place + lead, x)
+            block = a0, a1, b0, b1
+            _gather(b, block, place + lead, x)
             for i in range(along):
                 for k in range(below[i], lead, _UNROLL):
                     _axpy4(x[lead + i], low[i], k, x, i + k)
@@ -194,27 +200,25 @@ def _solve(b, layout, place, target, low, below, high_taps, above, inverse, out,
                     _axpy4(y, high_taps[i], k, x, lead + i + 1 + k)
                 for j in range(_LINES):
                     y[j] *= inverse[i]
-            _spread(x, target + lead, a0, a1, b0, b1, out, out_layout)
+            _spread(x, target + lead, block, out)
 
 
-@njit(
-    types.void(_FLAT_IN, _LAYOUT, _FLAT_IN, _LAYOUT, _INDEX, _INDEX, _TAPS, _INDEX, _INDEX, _FLAT_OUT, _LAYOUT),
-    cache=True,
-)
-def _product(first, first_layout, second, second_layout, place, head, taps, reach, target, out, layout):
-    before, _, after = layout[:3]
-    m, rows = first_layout[1], head.size
-    high, wide = _blocks(layout)
+@njit(types.void(_IN, _IN, _INDEX, _INDEX, _BAND, _INDEX, _OUT), cache=True)
+def _product(first, second, place, head, band, target, out):
+    (before, _, after), (taps, reach) = out[1][:3], band
+    m, rows = first[1][1], head.size
+    high, wide = _blocks(out[1])
     x = np.zeros((place.size + taps.shape[1], _LINES))
     y = np.zeros((rows, _LINES))
     for a0 in range(0, before, high):
         a1 = min(a0 + high, before)
         for b0 in range(0, after, wide):
             b1 = min(b0 + wide, after)
-            _gather(first, first_layout, a0, a1, b0, b1, place[:m], x)
-            _gather(second, second_layout, a0, a1, b0, b1, place[m:], x)
+            block = a0, a1, b0, b1
+            _gather(first, block, place[:m], x)
+            _gather(second, block, place[m:], x)
             for i in range(rows):
                 y[i] = 0.0
                 for k in range(0, reach[i], _UNROLL):
                     _axpy4(y[i], taps[i], k, x, head[i] + k)
-            _spread(y, target, a0, a1, b0, b1, out, layout)
+            _spread(y, target, block, out)

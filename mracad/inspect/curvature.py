@@ -79,23 +79,25 @@ def forms(jet: Array) -> Forms:
     points = jet.shape[2]
     _Work.done += points
     if _Work.done < MANY:
-        n, density, speeds, bending, variation, largest, regular = _figures(THIN, VOID, *jet[1:])
+        n, density, speeds, bending, variation, largest, regular = _figures(THIN, VOID, jet[1:])
         return Forms(np.stack(n), density, np.stack(speeds), bending, variation, largest, regular)
     density, bending, variation, largest = np.empty((4, points))
     regular = np.empty(points, bool)
     found = Forms(np.empty((3, points)), density, np.empty((2, points)), bending, variation, largest, regular)
-    _compiled()(np.ascontiguousarray(jet), THIN, VOID, *(getattr(found, each.name) for each in fields(found)))
+    _compiled()(np.ascontiguousarray(jet), THIN, VOID, tuple(getattr(found, each.name) for each in fields(found)))
     return found
 
 
-def _figures(thin, void, su, sv, suu, suv, svv, suuu, suuv, suvv, svvv):
-    """What :class:`Forms` holds, of derivatives whose coordinates are numbers or arrays of them.
+def _figures(thin, void, derivatives):
+    """What :class:`Forms` holds, of derivatives (u, v, uu, …, vvv) whose coordinates are numbers or arrays of them.
 
     Notes
     -----
     do Carmo, *Differential Geometry of Curves and Surfaces*, §3.3: H = (e G − 2 f F + g E) / 2 (E G − F²), the
     derivatives of the normal by Weingarten's equations.
     """
+
+    su, sv, suu, suv, svv, suuu, suuv, suvv, svvv = derivatives
 
     def dot(a, b):
         return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
@@ -133,15 +135,16 @@ def _figures(thin, void, su, sv, suu, suv, svv, suuu, suuv, suvv, svvv):
     )  # fmt: skip
 
 
-def _swept(jet, thin, void, normal, density, speeds, bending, variation, largest, regular):
-    """Fill in the figures point by point."""
+def _swept(jet, thin, void, found):
+    """Fill in the figures (those of :class:`Forms`, in order) point by point."""
+    normal, density, speeds, bending, variation, largest, regular = found
 
     def at(order, p):
         return jet[order, 0, p], jet[order, 1, p], jet[order, 2, p]
 
     for p in range(jet.shape[2]):
         n, density[p], (speeds[0, p], speeds[1, p]), bending[p], variation[p], largest[p], regular[p] = _figures(
-            thin, void, at(1, p), at(2, p), at(3, p), at(4, p), at(5, p), at(6, p), at(7, p), at(8, p), at(9, p)
+            thin, void, (at(1, p), at(2, p), at(3, p), at(4, p), at(5, p), at(6, p), at(7, p), at(8, p), at(9, p))
         )
         normal[0, p], normal[1, p], normal[2, p] = n
 

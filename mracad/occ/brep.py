@@ -27,21 +27,7 @@ from mracad.occ.units import UNITS, Units, named
 
 
 def read_brep(source: str | os.PathLike | BinaryIO, input_unit: str | None = None) -> Document:
-    """Read a BREP or BinBREP file; its numbers are taken as millimetres.
-
-    Parameters
-    ----------
-    source : path or binary stream
-    input_unit : str, optional
-        The length unit that they are in; also that of the output.
-
-    Raises
-    ------
-    FileError
-        For a file that is missing, unreadable, or without faces.
-    UsageError
-        For an unknown unit.
-    """
+    """Read a BREP or BinBREP file; its numbers are taken as millimetres; see :func:`mracad.occ.files.read`."""
     file = load(source)
     binary = by_content(file.getvalue(), file.name).name == "binbrep"
     unit = "mm" if input_unit is None else named(input_unit)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import contextlib
 import os
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 from mracad.errors import EditError, FileError, UsageError
 from mracad.formats import FORMATS, by_content, by_ending
@@ -106,25 +106,12 @@ def read(source: str | os.PathLike | BinaryIO, input_unit: str | None = None, en
         ) from error
 
 
-def write(
-    document: Document,
-    target: str | os.PathLike | BinaryIO,
-    format: str = "",
-    *,
-    schema: str = "",
-    chord: float | None = None,
-    angle: float | None = None,
-    ascii: bool = False,
-    options_text: str = "",
-) -> Written:
-    """Write a document, whole or not at all; the same bytes every time.
+@dataclass(frozen=True)
+class Writing:
+    """How a document is written.
 
-    Parameters
+    Attributes
     ----------
-    document : Document
-    target : path or binary stream
-    format : str
-        A key of ``mracad.formats.FORMATS``; by default what the ending of the path means, STEP for a stream.
     schema : str
         STEP: see ``write_step``.
     chord, angle : float, optional
@@ -133,6 +120,26 @@ def write(
         STL: text rather than binary.
     options_text : str
         What was done, for the header of STEP and IGES files.
+    """
+
+    schema: str = ""
+    chord: float | None = None
+    angle: float | None = None
+    ascii: bool = False
+    options_text: str = ""
+
+
+def write(document: Document, target: str | os.PathLike | BinaryIO, format: str = "", **how: Any) -> Written:
+    """Write a document, whole or not at all; the same bytes every time.
+
+    Parameters
+    ----------
+    document : Document
+    target : path or binary stream
+    format : str
+        A key of ``mracad.formats.FORMATS``; by default what the ending of the path means, STEP for a stream.
+    **how
+        The fields of :class:`Writing`.
 
     Returns
     -------
@@ -151,48 +158,57 @@ def write(
     UsageError
         For an unknown format or schema, or settings that make no sense.
     """
-    named = isinstance(target, str | os.PathLike)
-    if not format:
-        format = by_ending(target).name if named else "step"  # type: ignore[arg-type]
+    wanted, name = Writing(**how), document.name
+    if isinstance(target, str | os.PathLike):
+        format, name = format or by_ending(target).name, Path(target).name
+    format = format or "step"
     if format not in FORMATS:
         raise UsageError(f"unknown format '{format}'", "use one of " + ", ".join(FORMATS))
-    name = Path(target).name if named else document.name  # type: ignore[arg-type]
-    lost: tuple[Lost, ...] = ()
-    cut: tuple[Cut, ...] = ()
-    torn: tuple[int, ...] = ()
-    if format == "step":
-        from mracad.occ.step import step
-
-        with _expressing(document.name, format):
-            data, cut = step(document, name, schema, options_text)
-        lost = _opaque(document)
-    elif format == "iges":
-        from mracad.occ.iges import iges
-
-        with _expressing(document.name, format):
-            data, cut = iges(document, name, options_text)
-        lost = _unwritten(document)
-    elif format in ("brep", "binbrep"):
-        from mracad.occ.brep import brep
-
-        data = brep(document, binary=format == "binbrep")
-    else:
-        from mracad.mesh import write as write_mesh
-        from mracad.occ.scene import scene
-
-        seen, missing, torn = scene(document, chord, angle)
-        data = write_mesh(seen, format, ascii)
-        if missing:
-            count, names = len(document.faces), tuple(f"#{face + 1}" for face in missing)
-            lost = (Lost("faces", count, count - len(missing), names),)
+    data, written = _MAKERS.get(format, _mesh)(document, name, format, wanted)
     if FORMATS[format].kind == "exact" and document.annotations:
         from mracad.occ.part21 import pmi
 
         kept = pmi(data) if format == "step" else {}
         counts = {what: (names, len(kept.get(what, ()))) for what, names in document.annotations.items()}
-        lost += tuple(Lost(what, len(ns), count, ns) for what, (ns, count) in counts.items() if count < len(ns))
+        gone = (Lost(what, len(ns), count, ns) for what, (ns, count) in counts.items() if count < len(ns))
+        written = replace(written, lost=(*written.lost, *gone))
     put(data, target)
-    return Written(lost, cut, torn)
+    return written
+
+
+def _step(document: Document, name: str, format: str, how: Writing) -> tuple[bytes, Written]:
+    from mracad.occ.step import step
+
+    with _expressing(document.name, format):
+        data, cut = step(document, name, how.schema, how.options_text)
+    return data, Written(_opaque(document), cut)
+
+
+def _iges(document: Document, name: str, format: str, how: Writing) -> tuple[bytes, Written]:
+    from mracad.occ.iges import iges
+
+    with _expressing(document.name, format):
+        data, cut = iges(document, name, how.options_text)
+    return data, Written(_unwritten(document), cut)
+
+
+def _brep(document: Document, name: str, format: str, how: Writing) -> tuple[bytes, Written]:
+    from mracad.occ.brep import brep
+
+    return brep(document, binary=format == "binbrep"), Written()
+
+
+def _mesh(document: Document, name: str, format: str, how: Writing) -> tuple[bytes, Written]:
+    from mracad.mesh import write as write_mesh
+    from mracad.occ.scene import scene
+
+    seen, missing, torn = scene(document, how.chord, how.angle)
+    count, names = len(document.faces), tuple(f"#{face + 1}" for face in missing)
+    lost = (Lost("faces", count, count - len(missing), names),) if missing else ()
+    return write_mesh(seen, format, how.ascii), Written(lost, open=torn)
+
+
+_MAKERS = {"step": _step, "iges": _iges, "brep": _brep, "binbrep": _brep}
 
 
 @contextlib.contextmanager

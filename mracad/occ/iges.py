@@ -35,23 +35,7 @@ _MODES = ("Name", "Color", "Layer")
 def read_iges(
     source: str | os.PathLike | BinaryIO, input_unit: str | None = None, encoding: str | None = None
 ) -> Document:
-    """Read an IGES file.
-
-    Parameters
-    ----------
-    source : path or binary stream
-    input_unit : str, optional
-        The length unit that the file's numbers are in, whatever it says itself; also that of the output.
-    encoding : str, optional
-        The character set of its names; by default UTF-8 where that fits, otherwise the most likely one.
-
-    Raises
-    ------
-    FileError
-        For a file that is missing, unreadable, or without faces.
-    UsageError
-        For an unknown unit.
-    """
+    """Read an IGES file; see :func:`mracad.occ.files.read`."""
     file = load(source)
     _refuse_torn(file.getvalue(), file.name)
     unit = None if input_unit is None else named(input_unit)

@@ -22,15 +22,7 @@ from mracad.occ.triangles import triangles
 def scene(
     document: Document, chord: float | None = None, angle: float | None = None
 ) -> tuple[Scene, tuple[int, ...], tuple[int, ...]]:
-    """Mesh a document.
-
-    Parameters
-    ----------
-    document : Document
-    chord : float, optional
-        How far the mesh may be from the surface, mm; by default 1/5000 of the model's diagonal.
-    angle : float, optional
-        How far neighbouring triangles may turn along a curve, degrees; by default 12.
+    """Mesh a document, as finely as :func:`mracad.occ.triangles.triangles` is told.
 
     Returns
     -------

@@ -39,27 +39,7 @@ _SCHEMAS = {"AP203": "AP203", "AP214": "AP214IS", "AP242": "AP242DIS"}
 def read_step(
     source: str | os.PathLike | BinaryIO, input_unit: str | None = None, encoding: str | None = None
 ) -> Document:
-    """Read a STEP file with its names, colours, layers, tolerances and properties.
-
-    Parameters
-    ----------
-    source : path or binary stream
-    input_unit : str, optional
-        The length unit that the file's numbers are in, whatever it says itself; also that of the output.
-    encoding : str, optional
-        The character set of its texts; by default UTF-8 where that fits, otherwise the most likely one.
-
-    Returns
-    -------
-    Document
-
-    Raises
-    ------
-    FileError
-        For a file that is missing, unreadable, truncated, not STEP, or without geometry.
-    UsageError
-        For an unknown unit or character set.
-    """
+    """Read a STEP file with all that it says of its shapes; see :func:`mracad.occ.files.read`."""
     file = load(source)
     text, name = file.getvalue(), file.name
     if by_content(text, name).name != "step":
