@@ -22,7 +22,7 @@ def distances(net: Net, points: Array) -> Array:
     from scipy.spatial import cKDTree
 
     us, vs = _places(net, 0), _places(net, 1)
-    grid = np.asarray(net.grid(us, vs)).reshape(-1, 3)
+    grid = net.grid(us, vs).reshape(-1, 3)
     _, seeds = cKDTree(grid).query(points, k=_SEEDS)
     starts = np.stack([us[seeds // len(vs)], vs[seeds % len(vs)]], axis=-1)
     return np.asarray(np.min([_descend(net, points, starts[:, k])[1] for k in range(_SEEDS)], axis=0))
@@ -34,7 +34,7 @@ def _places(net: Net, axis: int) -> Array:
     spans = len(knots.breaks) - 1
     fine = np.interp(np.linspace(0, spans, 4 * spans + _PLACES), np.arange(spans + 1), knots.breaks)
     across = np.linspace(*other.domain, 9)
-    lines = np.asarray(net.grid(fine, across) if axis == 0 else net.grid(across, fine))
+    lines = net.grid(fine, across) if axis == 0 else net.grid(across, fine)
     steps = np.linalg.norm(np.diff(lines, axis=axis), axis=2).max(axis=1 - axis)
     length = np.concatenate([[0.0], np.cumsum(steps)])
     even = np.interp(np.linspace(0, length[-1], _PLACES), length, fine) if length[-1] > 0 else fine[:1]
@@ -60,7 +60,7 @@ def feet(net: Net, points: Array, uv: Array) -> tuple[Array, Array]:
     # distances say little of parameters near the least of them
     low, high = _limits(net)
     tried = np.clip(uv + _newton(net, points, uv, low, high), low, high)
-    good = np.linalg.norm(np.asarray(net.evaluate(tried)) - points, axis=1) <= best * (1 + 1e-15)
+    good = np.linalg.norm(net.evaluate(tried) - points, axis=1) <= best * (1 + 1e-15)
     return np.where(good[:, None], tried, uv), best
 
 
@@ -75,7 +75,7 @@ def _descend(net: Net, points: Array, uv: Array) -> tuple[Array, Array]:
     """Parameters that Newton's method reaches from given ones, and distances there."""
     low, high = _limits(net)
     uv = np.clip(uv, low, high)
-    best = np.linalg.norm(np.asarray(net.evaluate(uv)) - points, axis=1)
+    best = np.linalg.norm(net.evaluate(uv) - points, axis=1)
     active = np.arange(len(points))
     for _ in range(_STEPS):
         step = _newton(net, points[active], uv[active], low, high)
@@ -84,7 +84,7 @@ def _descend(net: Net, points: Array, uv: Array) -> tuple[Array, Array]:
         while share > 1e-3 and not moved.all():
             rest = ~moved
             tried = np.clip(uv[active[rest]] + share * step[rest], low, high)
-            there = np.linalg.norm(np.asarray(net.evaluate(tried)) - points[active[rest]], axis=1)
+            there = np.linalg.norm(net.evaluate(tried) - points[active[rest]], axis=1)
             nearer = there < best[active[rest]] * (1 - 1e-15)
             which = active[rest][nearer]
             uv[which], best[which] = tried[nearer], there[nearer]

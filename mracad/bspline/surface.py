@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Literal, overload
 
 import numpy as np
 
@@ -42,6 +43,16 @@ class Net:
                 f"control points of shape {self.poles.shape} where the knots want {self.u.count} × {self.v.count}"
             )
         check_weights(self.weights, self.poles.shape[:2])
+
+    def with_poles(self, poles: Array) -> Net:
+        """Other control points over the same knots, with the same weights."""
+        return Net(self.u, self.v, poles, self.weights)
+
+    @overload
+    def evaluate(self, uv: Array, derivatives: Literal[0] = 0, side: tuple[Side, Side] = ...) -> Array: ...  # type: ignore[overload-overlap]
+
+    @overload
+    def evaluate(self, uv: Array, derivatives: int, side: tuple[Side, Side] = ...) -> tuple[Array, ...]: ...
 
     def evaluate(
         self, uv: Array, derivatives: int = 0, side: tuple[Side, Side] = ("right", "right")
@@ -86,6 +97,12 @@ class Net:
         partial = np.matmul(in_u, local.reshape(q, a, b * k)).reshape(q, derivatives + 1, b, k)
         full = np.matmul(in_v[:, None], partial)
         return np.array([full[:, r, s] for r, s in orders])
+
+    @overload
+    def grid(self, us: Array, vs: Array, derivatives: Literal[0] = 0, side: tuple[Side, Side] = ...) -> Array: ...  # type: ignore[overload-overlap]
+
+    @overload
+    def grid(self, us: Array, vs: Array, derivatives: int, side: tuple[Side, Side] = ...) -> tuple[Array, ...]: ...
 
     def grid(
         self, us: Array, vs: Array, derivatives: int = 0, side: tuple[Side, Side] = ("right", "right")

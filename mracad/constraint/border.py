@@ -11,6 +11,7 @@ from mracad.bspline.surface import cross
 from mracad.constraint.frozen import ISO, local_span
 from mracad.constraint.sides import between, inner_side
 from mracad.model.brep import Edge, Model, Side
+from mracad.model.sampling import shares
 
 Array = np.ndarray
 Jet = tuple[Array, ...]
@@ -19,7 +20,7 @@ Jet = tuple[Array, ...]
 AFFINE = 1e-7
 """Largest deviation, as a fraction of the seam, from an affine map between the parameters along it."""
 
-SHARES = 0.5 - 0.5 * np.cos(np.pi * (np.arange(33) + 0.5) / 33)
+SHARES = shares(33)
 """Fractions of an edge at which two borders are compared."""
 
 
@@ -82,18 +83,13 @@ def border(model: Model, edge: Edge, side: Side, use: int) -> Border | None:
         along = (net.u, net.v)[1 - axis]
         start, stop = (_snapped(along.breaks, float(x)) for x in ends[:, 1 - axis])
         share = (side.uv[:, 1 - axis] - ends[0, 1 - axis]) / (ends[1, 1 - axis] - ends[0, 1 - axis])
-        if abs(share - _pace(len(share))).max() > AFFINE:
+        if abs(share - shares(len(share))).max() > AFFINE:
             return None
         limit: Limit = "right" if place <= low else "left"
         if low < place < high:
             limit = inner_side(face, trim.edge, axis, place)
         return Border(face.index, face.surface, axis, place, limit, start, stop)
     return None
-
-
-def _pace(count: int) -> Array:
-    """Fractions of an edge at which the model samples it."""
-    return 0.5 - 0.5 * np.cos(np.pi * (np.arange(count) + 0.5) / count)
 
 
 def _snapped(breaks: Array, x: float) -> float:
@@ -105,7 +101,7 @@ def jets(model: Model, border: Border, share: Array, order: int) -> tuple[Array,
     """``S, S_n, S_t`` and for order 2 ``S_nn`` at fractions of the edge in the part's frame; t is the fraction."""
     face, net = model.faces[border.face], model.surfaces[border.surface].net
     values = net.evaluate(border.places(share), order, border.limits("right"))
-    s, su, sv, *second = (x @ face.frame[:3, :3].T for x in values)
+    s, su, sv, *second = (face.turned(x) for x in values)
     pace = border.stop - border.start
     first = (su, sv * pace) if border.axis == 0 else (sv, su * pace)
     return (s + face.frame[:3, 3], *first, *second[:: 2 if border.axis == 0 else -2][:1])

@@ -41,14 +41,14 @@ def views(model: Model, uses: Sequence[tuple[Edge, Side]]) -> list[Array]:
             groups[side.face, limits].append((i, uv))
     for (number, limits), members in groups.items():
         face = model.faces[number]
-        net, frame, sign = _net(model, face), face.frame, -1 if face.reversed else 1
+        net = _net(model, face)
         uv = np.concatenate([uv for _, uv in members])
         point, su, sv, *second = net.evaluate(uv, 2, limits)
-        jets = np.stack([point, su, sv, *second, net.normals(uv, limits, (su, sv))]) @ frame[:3, :3].T
+        jets = face.turned(np.stack([point, su, sv, *second, net.normals(uv, limits, (su, sv))]))
         point, *derivatives, normal = jets
         tangents = np.concatenate([uses[i][0].tangents for i, _ in members])
-        bends = sign * curvature(tuple(derivatives), cross(normal, tangents))
-        table = np.column_stack([point + frame[:3, 3], sign * normal, bends])
+        bends = face.outward * curvature(tuple(derivatives), cross(normal, tangents))
+        table = np.column_stack([point + face.frame[:3, 3], face.outward * normal, bends])
         ends = np.cumsum([len(uv) for _, uv in members])[:-1]
         for (i, _), part in zip(members, np.split(table, ends), strict=True):
             result[i] = part

@@ -16,6 +16,7 @@ from mracad.constraint.frozen import local_span
 from mracad.constraint.sides import from_inside
 from mracad.model.brep import Face, Model, Trim
 from mracad.model.region import meeting
+from mracad.model.sampling import shares
 
 Array = np.ndarray
 
@@ -28,7 +29,7 @@ NEAR = 1e-9
 EVENLY = np.linspace(0.0, 1.0, SAMPLES)
 """Fractions of a trace at its points."""
 
-LOOKS = 0.5 - 0.5 * np.cos(np.pi * (np.arange(75) + 0.5) / 75)
+LOOKS = shares(75)
 """Fractions of a trace at which it is looked at, those of the report."""
 
 

@@ -168,13 +168,12 @@ def _opened(model: Model, traces: tuple[Trace, Trace], share: Array) -> tuple[Ar
     points, normals, bends = [], [], []
     for trace in traces:
         face, net = model.faces[trace.face], model.surfaces[trace.surface].net
-        s, *derivatives = (x @ face.frame[:3, :3].T for x in trace.on(net, share, 2))
+        s, *derivatives = (face.turned(x) for x in trace.on(net, share, 2))
         way = trace.way(share)
         along = derivatives[0] * way[:, :1] + derivatives[1] * way[:, 1:]
-        sign = -1 if face.reversed else 1
         points.append(s + face.frame[:3, 3])
-        normals.append(sign * np.cross(derivatives[0], derivatives[1]))
-        bends.append(sign * curvature(tuple(derivatives), np.cross(normals[-1], along)))
+        normals.append(face.outward * np.cross(derivatives[0], derivatives[1]))
+        bends.append(face.outward * curvature(tuple(derivatives), np.cross(normals[-1], along)))
     apart = across(points[0] - points[1], along)
     angle = between(*normals)
     angle[np.minimum(*(np.linalg.norm(n, axis=1) for n in normals)) == 0.0] = np.nan

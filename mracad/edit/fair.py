@@ -80,7 +80,7 @@ def calm(problem: Problem, target: Array, width: float) -> Array:
     """
     found = []
     for space, part in zip(problem.spaces.values(), problem.split(target).values(), strict=True):
-        net = Net(space.net.u, space.net.v, space.net.poles + part, space.net.weights)
+        net = space.net.with_poles(space.net.poles + part)
         us, vs = (knots.greville()[:, None] for knots in (net.u, net.v))
         jet = jets(net, us, vs, np.ones(net.poles.shape[:2], bool), np.zeros(3))
         bent = forms(jet).largest.reshape(len(vs), len(us)).T * width / (2 * np.pi)

@@ -200,7 +200,7 @@ def bounded(net: Net, offset: Array, bound: float, width: float) -> Array:
     us, vs = (_between(knots.greville()) for knots in (net.u, net.v))
     normals = cross(net.tangents(us, vs, 0), net.tangents(us, vs, 1))
     normals /= np.maximum(np.linalg.norm(normals, axis=-1, keepdims=True), 1e-300)
-    far = np.abs((np.asarray(Net(net.u, net.v, offset, net.weights).grid(us, vs)) * normals).sum(axis=-1))
+    far = np.abs((np.asarray(net.with_poles(offset).grid(us, vs)) * normals).sum(axis=-1))
     far = maximum_filter(far, 2 * FINER + 1, mode="nearest")[::FINER, ::FINER]
     share = bound / np.maximum(far, bound)
     return offset * eased(net, share, width)[..., None]
@@ -213,7 +213,7 @@ def _between(places: Array) -> Array:
 
 def displaced(net: Net, offset: Array) -> Net:
     """The surface with control points moved by ``(nu, nv, 3)``, mm."""
-    return Net(net.u, net.v, net.poles + offset, net.weights)
+    return net.with_poles(net.poles + offset)
 
 
 @dataclass(frozen=True, eq=False)

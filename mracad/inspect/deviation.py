@@ -10,7 +10,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mracad.bspline.surface import Net
 from mracad.model.brep import Model
 from mracad.model.displacement import Displacement
 from mracad.model.region import face_region, supported
@@ -44,17 +43,16 @@ def deviations(model: Model, displacement: Displacement) -> list[Deviation]:
     found = []
     for index, offset in displacement.offsets.items():
         surface = model.surfaces[index]
-        net = offset.over(surface.net)
-        delta = Net(net.u, net.v, offset.poles, net.weights)
+        net, motion = offset.over(surface.net), offset.motion(surface.net)
         us, vs = net.u.greville(), net.v.greville()
-        sizes = np.linalg.norm(delta.grid(us, vs), axis=-1)
+        sizes = np.linalg.norm(motion.grid(us, vs), axis=-1)
         for number in surface.faces:
             face = model.faces[number]
             reach = supported(net, face_region(net, face).inside)
             seen = np.where(reach, sizes, 0.0)
             i, j = np.unravel_index(seen.argmax(), seen.shape)
             point = net.evaluate(np.array([[us[i], vs[j]]]))[0]
-            where = face.frame[:3, :3] @ point + face.frame[:3, 3]
+            where = face.placed(point)
             bound = float(np.linalg.norm(offset.poles, axis=-1)[reach].max(initial=0.0))
             mean = float(sizes[reach].mean()) if reach.any() else 0.0
             found.append(Deviation(number, float(seen.max()), mean, bound, tuple(float(x) for x in where)))  # type: ignore[arg-type]

@@ -18,8 +18,8 @@ from mracad.constraint.crease import crease_lines
 from mracad.constraint.frozen import separate
 from mracad.model.brep import Face, Model, Surface
 from mracad.model.region import face_region
-from mracad.wavelet.ladder import arc_lengths, finest_scale, ladder_for_scale
-from mracad.wavelet.project import projection
+from mracad.wavelet.ladder import arc_lengths, finest_scale
+from mracad.wavelet.project import at_scale
 
 Array = np.ndarray
 
@@ -97,12 +97,9 @@ def _of_surface(model: Model, surface: Surface, scale: float, keep: str) -> list
     creases = crease_lines(net, 0, separation.visible), crease_lines(net, 1, separation.visible)
     directions = list(zip((net.u, net.v), spans, creases, strict=True))
     finest = [finest_scale(*each) for each in directions]
-    coarse = [
-        ladder_for_scale(knots, lengths, scale, kept) if 0 < least < scale else knots
-        for (knots, lengths, kept), least in zip(directions, finest, strict=True)
-    ]
-    coarser = coarse != [net.u, net.v]
-    squares = _squares(net, coarse) if coarser else np.zeros((net.u.spans, net.v.spans, 1))
+    smoothed = at_scale(net, scale, creases)
+    coarser = smoothed.poles is not net.poles
+    squares = _squares(net, net.poles - smoothed.poles) if coarser else np.zeros((net.u.spans, net.v.spans, 1))
     area = np.multiply.outer(*spans)
 
     def of(face: Face) -> FaceScales:
@@ -124,12 +121,10 @@ def _of_surface(model: Model, surface: Surface, scale: float, keep: str) -> list
     return [of(face) for face in faces]
 
 
-def _squares(net: Net, coarse: list[KnotVector]) -> Array:
-    """Squared heights of what goes at a few places of every knot cell, ``(cells_u, cells_v, places)``."""
-    smoothed = projection(coarse[0], net.u).apply(net.poles, axis=0)
-    smoothed = projection(coarse[1], net.v).apply(smoothed, axis=1)
+def _squares(net: Net, offsets: Array) -> Array:
+    """Squared lengths of offsets at a few places of every knot cell, ``(cells_u, cells_v, places)``."""
     us, vs = (_places(knots) for knots in (net.u, net.v))
-    heights = Net(net.u, net.v, net.poles - smoothed, net.weights).grid(us, vs)
+    heights = net.with_poles(offsets).grid(us, vs)
     squares = np.square(heights).sum(axis=-1)
     cells = squares.reshape(net.u.spans, _POINTS, net.v.spans, _POINTS)
     return cells.swapaxes(1, 2).reshape(net.u.spans, net.v.spans, _POINTS**2)

@@ -65,7 +65,7 @@ def box(face: Face, net: Net, rim: Array, outer: Array, slack: float = 0.0) -> A
     if not wanted:
         return rim
     us, vs = _grid(face, net)
-    points = net.grid(us, vs) @ face.frame[:3, :3].T + face.frame[:3, 3]
+    points = face.placed(net.grid(us, vs))
     result = rim.copy()
     inside: Array | None = None
     for k, axis in wanted:
@@ -92,7 +92,7 @@ def _with_long(face: Face, net: Net, rim: Array) -> Array:
     if not long:
         return rim
     uv = np.concatenate([curve.evaluate(_quarters(curve.knots.breaks))[0] for curve in long])
-    points = net.evaluate(uv) @ face.frame[:3, :3].T + face.frame[:3, 3]
+    points = face.placed(net.evaluate(uv))
     return np.array([np.minimum(rim[0], points.min(axis=0)), np.maximum(rim[1], points.max(axis=0))])
 
 

@@ -100,6 +100,23 @@ class Face:
     colour: str = ""
     instances: int = 1
 
+    @property
+    def outward(self) -> int:
+        """1 where S_u × S_v points outward, otherwise -1."""
+        return -1 if self.reversed else 1
+
+    def turned(self, vectors: Array) -> Array:
+        """Vectors ``(…, 3)`` of the surface's frame in the part's."""
+        return vectors @ self.frame[:3, :3].T
+
+    def placed(self, points: Array) -> Array:
+        """Points ``(…, 3)`` of the surface's frame in the part's."""
+        return self.turned(points) + self.frame[:3, 3]
+
+    def local(self, points: Array) -> Array:
+        """Points ``(…, 3)`` of the part's frame in the surface's."""
+        return (points - self.frame[:3, 3]) @ self.frame[:3, :3]
+
 
 @dataclass(frozen=True, eq=False)
 class Side:

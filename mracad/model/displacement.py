@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from mracad.bspline.surface import Net
-from mracad.model.brep import Model, Surface
+from mracad.model.brep import Model
 
 Array = np.ndarray
 
@@ -47,6 +47,10 @@ class Offset:
         u, v = (kv.elevated(degree) for kv, degree in zip((net.u, net.v), self.degrees, strict=True))
         return net.over(u.refined(self.u_knots), v.refined(self.v_knots))
 
+    def motion(self, net: Net) -> Net:
+        """The displacement of a surface as a net of its own."""
+        return self.over(net).with_poles(self.poles)
+
 
 @dataclass(frozen=True, eq=False)
 class Displacement:
@@ -62,14 +66,11 @@ class Displacement:
         """The model with its surfaces displaced (baked sides stay where they are)."""
         surfaces = list(model.surfaces)
         for index, offset in self.offsets.items():
-            old = surfaces[index]
-            net = offset.over(old.net)
-            surfaces[index] = Surface(
-                index, Net(net.u, net.v, net.poles + offset.poles, net.weights), old.faces, old.origin
-            )
+            net = offset.over(surfaces[index].net)
+            surfaces[index] = replace(surfaces[index], net=net.with_poles(net.poles + offset.poles))
         return model.with_surfaces(surfaces)
 
 
 def lifted(own: Net, fine: Net, offset: Array) -> Array:
     """Offsets of the control points of a net as those of a finer one of the same surface."""
-    return offset if fine is own else Net(own.u, own.v, offset, own.weights).over(fine.u, fine.v).poles
+    return offset if fine is own else own.with_poles(offset).over(fine.u, fine.v).poles

@@ -11,7 +11,6 @@ from OCP.TopAbs import TopAbs_FORWARD
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS
 
-from mracad.bspline.surface import Net
 from mracad.errors import MracadError, UsageError
 from mracad.model.brep import Model, Surface
 from mracad.model.displacement import Displacement, Offset
@@ -145,9 +144,7 @@ def _moved_edges(model: Model, displacement: Displacement) -> dict[int, int]:
     moved: dict[int, int] = {}
     for index, offset in displacement.offsets.items():
         if sides[index]:
-            net = offset.over(model.surfaces[index].net)
-            change = Net(net.u, net.v, offset.poles, net.weights)
-            along = change.evaluate(np.concatenate([uv for *_, uv in sides[index]]))
+            along = offset.motion(model.surfaces[index].net).evaluate(np.concatenate([uv for *_, uv in sides[index]]))
             starts = np.cumsum([0, *(len(uv) for *_, uv in sides[index][:-1])])
             far = np.maximum.reduceat(np.linalg.norm(along, axis=1), starts)
             loose = np.array([model.edges[edge].tolerance for edge, *_ in sides[index]])

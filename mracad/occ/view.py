@@ -20,6 +20,7 @@ from OCP.TopoDS import TopoDS, TopoDS_Edge, TopoDS_Face
 from mracad.bspline.surface import Net, cross, curvature
 from mracad.errors import FileError, UsageError
 from mracad.model.brep import Edge, Face, Model, Side, Surface, Trim
+from mracad.model.sampling import SAMPLES, shares
 from mracad.occ.boxes import diagonal
 from mracad.occ.convert import conversion
 from mracad.occ.document import Document
@@ -42,9 +43,7 @@ _KINDS = {
     "Geom_OffsetSurface": "offset",
 }
 _ABSURD = 1e12  # mm: the distance of a planet
-_SAMPLES = 25
-# fractions of an edge's range: Chebyshev points, close to the ends but never on them
-_SPREAD = 0.5 - 0.5 * np.cos(np.pi * (np.arange(_SAMPLES) + 0.5) / _SAMPLES)
+_SPREAD = shares(SAMPLES)
 _NONE = np.empty((0, 3))
 
 
@@ -243,7 +242,7 @@ def _along(edge: TopoDS_Edge) -> tuple[Array, Array]:
     if curve.GetType() == GeomAbs_Line:
         line = curve.Line()
         direction = np.array(line.Direction().Coord())
-        return np.array(line.Location().Coord()) + place[:, None] * direction, np.tile(direction, (_SAMPLES, 1))
+        return np.array(line.Location().Coord()) + place[:, None] * direction, np.tile(direction, (SAMPLES, 1))
     point, tangent = gp_Pnt(), gp_Vec()
     rows = []
     for t in place.tolist():
@@ -266,13 +265,13 @@ def _beside(found: _Found, uses: list[_Use], along: list[tuple[Array, Array]]) -
             origin = np.array(plane.Location().Coord())
             normal = np.array(plane.Axis().Direction().Coord()) * signs[use.face] * (1.0 if plane.Direct() else -1.0)
             feet = points - ((points - origin) @ normal)[:, None] * normal
-            sides[id(use)] = feet, np.tile(normal, (_SAMPLES, 1)), np.zeros(_SAMPLES)
+            sides[id(use)] = feet, np.tile(normal, (SAMPLES, 1)), np.zeros(SAMPLES)
         else:
             bent.append(use)
             jets.append(_jets(surface, _parameters(use)))
     if bent:
         feet, su, sv, *second = np.concatenate(jets).swapaxes(0, 1)
-        sign = np.repeat([signs[use.face] for use in bent], _SAMPLES)
+        sign = np.repeat([signs[use.face] for use in bent], SAMPLES)
         normals = _unit(cross(su, sv))
         tangents = np.concatenate([along[use.edge][1] for use in bent])
         bends = sign * curvature((su, sv, *second), cross(normals, tangents))

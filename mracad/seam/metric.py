@@ -72,4 +72,4 @@ def smoothed(net: Net, rule: Quadrature, stiffness: float) -> Net:
     points = seen(net, form)
     problem = Problem({0: Space(net, form, points, points)})
     moved = net.poles + problem.faired(stiffness).reshape(net.poles.shape)
-    return Net(net.u, net.v, moved, net.weights)
+    return net.with_poles(moved)

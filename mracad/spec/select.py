@@ -186,6 +186,6 @@ def _distance(model: Model, face: Face, point: np.ndarray) -> float:
     if face.trims:
         uv = np.concatenate([trim.curve.poles for trim in face.trims])
         corners = np.clip([uv.min(axis=0), uv.max(axis=0)], *corners)
-    local = face.frame[:3, :3].T @ (point - face.frame[:3, 3])
+    local = face.local(point)
     grid = net.grid(*np.linspace(corners[0], corners[1], 40).T)
     return float(np.linalg.norm(grid - local, axis=-1).min())

@@ -176,14 +176,14 @@ def at_scale(net: Net, scale: float, keep: tuple[AbstractSet[float], AbstractSet
         coarse = ladder_for_scale(knots, arc_lengths(net, axis), scale, keep=keep[axis])
         if coarse != knots:
             poles = projection(coarse, knots).apply(poles, axis=axis)
-    return Net(net.u, net.v, poles, net.weights)
+    return net.with_poles(poles)
 
 
 def band(net: Net, low: float, high: float) -> tuple[Net, Net]:
     """A net without what is finer than a scale, and what of that a lower scale leaves as offsets; scales in mm."""
     coarse = at_scale(net, high)
     fine = at_scale(net, low) if low else net
-    return coarse, Net(net.u, net.v, fine.poles - coarse.poles, net.weights)
+    return coarse, net.with_poles(fine.poles - coarse.poles)
 
 
 @kept(128)

@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mracad.bspline.surface import Net
 from mracad.edit.feature.patch import Patch
 from mracad.model.brep import Model
 from mracad.wavelet.ladder import arc_lengths
@@ -94,7 +93,7 @@ def _on(patch: Patch) -> list[Found]:
     scale = 4 * min(float(np.median(x)) for x in lengths)
     kept: list[Found] = []
     while scale < max(float(x.sum()) for x in lengths) / 2:
-        finer = Net(net.u, net.v, net.poles - at_scale(net, scale).poles, net.weights)
+        finer = net.with_poles(net.poles - at_scale(net, scale).poles)
         height = (np.asarray(finer.grid(us, vs)) * normals).sum(axis=-1)
         size = np.where(seen, np.abs(height), 0.0)
         usual = max(USUAL * float(np.median(size[seen])), LEAST)

@@ -44,9 +44,8 @@ class Patch:
         """A surface with some of its faces, and with other control points (in its own frame) if there are any."""
         own = model.surfaces[surface].net
         on_it = tuple(model.faces[i] for i in model.surfaces[surface].faces if i in faces)
-        frame = on_it[0].frame
-        poles = (own.poles if poles is None else poles) @ frame[:3, :3].T + frame[:3, 3]
-        return cls(surface, Net(own.u, own.v, poles, own.weights), on_it)
+        poles = on_it[0].placed(own.poles if poles is None else poles)
+        return cls(surface, own.with_poles(poles), on_it)
 
     @property
     def frame(self) -> Array:
@@ -88,7 +87,7 @@ class Patch:
 
     def signs(self, uv: Array) -> Array:
         """1.0 where S_u × S_v points outward on the face at, or nearest to, parameters ``(q, 2)``, else -1.0."""
-        signs = np.array([-1.0 if face.reversed else 1.0 for face in self.faces])
+        signs = np.array([float(face.outward) for face in self.faces])
         if (signs == signs[0]).all():
             return np.full(len(uv), signs[0])
         return signs[np.argmin([self._off(face, uv) for face in self.faces], axis=0)]

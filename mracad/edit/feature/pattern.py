@@ -14,6 +14,7 @@ from mracad.edit.feature.ground import SIDEWAYS, Feet, Ground, axes
 from mracad.edit.feature.locate import MOST_PLACES, Place, numbers, place, standing, table, whole
 from mracad.errors import EditError, UsageError
 from mracad.model.brep import Model
+from mracad.model.sampling import shares
 from mracad.spec.quantity import length
 from mracad.spec.steps import Repeat
 
@@ -208,7 +209,7 @@ def _even(points: Array, tangents: Array, count: int) -> tuple[Array, Array]:
 
 def _ends(points: Array, tangents: Array) -> Array:
     """The ends of an edge, a little beyond its first and last (Chebyshev) samples."""
-    place = 0.5 - 0.5 * np.cos(np.pi * (np.arange(len(points)) + 0.5) / len(points))
+    place = shares(len(points))
     share = place[0] / (place[1] - place[0])
     first = points[0] - share * np.linalg.norm(points[1] - points[0]) * tangents[0]
     last = points[-1] + share * np.linalg.norm(points[-1] - points[-2]) * tangents[-1]

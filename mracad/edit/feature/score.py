@@ -130,7 +130,7 @@ def _figures(copies: Copies, patch: Patch, outcome: Outcome) -> Iterator[tuple[i
         on = np.full(len(uv), patch.faces[0].index)
         if len(patch.faces) > 1:
             on = copies.ground.faces(np.full(len(uv), patch.index), uv)
-        values = np.asarray(Net(net.u, net.v, both, net.weights).evaluate(uv))
+        values = np.asarray(net.with_poles(both).evaluate(uv))
         done, alone = values[:, :3], values[:, 3:]
         missed, lost, short = (np.linalg.norm(x, axis=1) for x in (done - wanted, done - alone, alone - wanted))
         hits = cKDTree(points).query_ball_point(copies.charts.origin[chosen], copies.reach[chosen])

@@ -162,7 +162,7 @@ def _bound(ref: Model, new: Model, i: int, j: int) -> float | None:
             return None
     if old.weights is not None and np.abs(old.weights - fresh.weights).max() > 1e-12 * old.weights.max():
         return None
-    placed = [net.poles @ face.frame[:3, :3].T + face.frame[:3, 3] for net, face in ((old, a), (fresh, b))]
+    placed = [face.placed(net.poles) for net, face in ((old, a), (fresh, b))]
     seen = supported(old, face_region(old, a).inside) | supported(fresh, face_region(fresh, b).inside)
     return float(np.linalg.norm(placed[1] - placed[0], axis=-1)[seen].max(initial=0.0))
 
@@ -183,8 +183,7 @@ def _off(subject: Subject, index: int, points: Array) -> Array:
     face = subject.model.faces[index]
     if face.surface is None:
         return subject.gauge.distances(index, points)
-    local = (points - face.frame[:3, 3]) @ face.frame[:3, :3]
-    return distances(subject.model.surfaces[face.surface].net, local)
+    return distances(subject.model.surfaces[face.surface].net, face.local(points))
 
 
 def _spread(points: Array, off: Array) -> Spread:
