@@ -51,7 +51,7 @@ class Gram:
         """Diagonal of the matrix, ``(n,)``."""
         n = self.bands.shape[1]
         folded = self.bands[n::n].sum(axis=0) if self.periodic else 0.0
-        return self.bands[0] + 2 * folded
+        return np.asarray(self.bands[0] + 2 * folded)
 
     def apply(self, c: Array, axis: int = 0) -> Array:
         """The matrix times ``c`` along ``axis``."""

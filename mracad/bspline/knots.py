@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -103,7 +103,7 @@ class KnotVector:
     def __eq__(self, other: object) -> bool:
         return isinstance(other, KnotVector) and self._key == other._key
 
-    def __reduce__(self) -> tuple:
+    def __reduce__(self) -> tuple[Any, ...]:
         return KnotVector, (self.knots, self.degree, self.periodic)
 
     def __repr__(self) -> str:
@@ -296,4 +296,4 @@ def _periodic_layout(breaks: Array, mults: Array, degree: int) -> Array:
     turn, place = np.divmod(np.arange(count + 2 * (degree + 1) - m) - (degree + 1 - m), count)
     flat = base[place] + turn * period
     flat[(turn == 1) & (place < m)] = breaks[-1]
-    return flat
+    return np.asarray(flat)

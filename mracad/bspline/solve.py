@@ -60,7 +60,7 @@ class BandSolver:
     @property
     def pivots(self) -> Array:
         """Magnitudes on the diagonal of the factor U, in column order."""
-        return np.abs(self._factor[self._below + self._above])
+        return np.asarray(np.abs(self._factor[self._below + self._above]))
 
     def solve(self, b: Array, axis: int = 0, overwrite: bool = False) -> Array:
         """The solution of ``A x = b`` along ``axis``; it may take the place of ``b`` if ``overwrite`` says so."""

@@ -174,7 +174,7 @@ class Net:
             near = cross(su, sv)
             near[~(np.linalg.norm(near, axis=1) > 1e-13 * size)] = np.nan
             normal[bad] = near
-        return normal
+        return np.asarray(normal)
 
     def refined(self, u_knots: Array | Sequence[float], v_knots: Array | Sequence[float]) -> Net:
         """The same surface with more knots, exactly; itself when there is nothing to insert."""
@@ -195,7 +195,7 @@ class Net:
 def cross(a: Array, b: Array) -> Array:
     """Cross products of vectors ``(…, 3)``: those of numpy, whose general treatment of axes costs more than they."""
     i, j = [1, 2, 0], [2, 0, 1]
-    return a[..., i] * b[..., j] - a[..., j] * b[..., i]
+    return np.asarray(a[..., i] * b[..., j] - a[..., j] * b[..., i])
 
 
 def curvature(derivatives: tuple[Array, ...], direction: Array) -> Array:
@@ -222,7 +222,7 @@ def curvature(derivatives: tuple[Array, ...], direction: Array) -> Array:
         determinant = e * g - f * f
         a, b = (p * g - q * f) / determinant, (q * e - p * f) / determinant
         bend = sum(w * (x * normal).sum(axis=1) for w, x in ((a * a, suu), (2 * a * b, suv), (b * b, svv)))
-        return bend / np.sqrt(determinant) / (e * a * a + 2 * f * a * b + g * b * b)
+        return np.asarray(bend / np.sqrt(determinant) / (e * a * a + 2 * f * a * b + g * b * b))
 
 
 def _pairs(total: int) -> list[tuple[int, int]]:
@@ -253,4 +253,4 @@ def surface_quotient(stack: tuple[Array, ...]) -> tuple[Array, ...]:
 
 def _unit(vectors: Array) -> Array:
     with np.errstate(invalid="ignore", divide="ignore"):
-        return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
+        return np.asarray(vectors / np.linalg.norm(vectors, axis=-1, keepdims=True))

@@ -6,6 +6,8 @@ large arrays, because the compiler costs half a second to import.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numba import njit, types
 
@@ -112,7 +114,7 @@ def _window(triangle: Rows, before: bool) -> tuple[Array, Array]:
 
 
 @njit(cache=True)
-def _gather(lines, block, place, buffer):
+def _gather(lines: Any, block: Any, place: Any, buffer: Any) -> None:
     """Lines ``[a0:a1, :, b0:b1]`` into the rows ``place`` of the buffer."""
     (flat, layout), (a0, a1, b0, b1) = lines, block
     width = b1 - b0
@@ -125,7 +127,7 @@ def _gather(lines, block, place, buffer):
 
 
 @njit(cache=True)
-def _spread(buffer, place, block, lines):
+def _spread(buffer: Any, place: Any, block: Any, lines: Any) -> None:
     """Rows ``place`` of the buffer to lines ``[a0:a1, :, b0:b1]``."""
     (flat, layout), (a0, a1, b0, b1) = lines, block
     width = b1 - b0
@@ -138,7 +140,7 @@ def _spread(buffer, place, block, lines):
 
 
 @njit(cache=True, fastmath={"contract", "nsz"})
-def _axpy4(y, w, k, x, r):
+def _axpy4(y: Any, w: Any, k: Any, x: Any, r: Any) -> None:
     """``y += Σ w[k + s] x[r + s]`` over four rows."""
     w0, w1, w2, w3 = w[k], w[k + 1], w[k + 2], w[k + 3]
     x0, x1, x2, x3 = x[r], x[r + 1], x[r + 2], x[r + 3]
@@ -147,14 +149,14 @@ def _axpy4(y, w, k, x, r):
 
 
 @njit(cache=True)
-def _blocks(layout):
+def _blocks(layout: Any) -> Any:
     """Sizes of the blocks of lines."""
     width = min(layout[2], _LINES)
     return max(_LINES // width, 1), width
 
 
 @njit(types.void(_IN, _INDEX, _TAPS, _OUT), cache=True)
-def _scatter(c, head, taps, out):
+def _scatter(c: Any, head: Any, taps: Any, out: Any) -> None:
     before, along, after = c[1][:3]
     columns, reach = out[1][1], taps.shape[1]
     high, wide = _blocks(c[1])
@@ -179,7 +181,7 @@ def _scatter(c, head, taps, out):
 
 
 @njit(types.void(_IN, types.UniTuple(_INDEX, 2), _BAND, _BAND, _REAL, _OUT), cache=True)
-def _solve(b, order, lower, upper, inverse, out):
+def _solve(b: Any, order: Any, lower: Any, upper: Any, inverse: Any, out: Any) -> None:
     before, along, after = b[1][:3]
     (place, target), (low, below), (high_taps, above) = order, lower, upper
     lead, tail = low.shape[1], high_taps.shape[1]
@@ -204,7 +206,7 @@ def _solve(b, order, lower, upper, inverse, out):
 
 
 @njit(types.void(_IN, _IN, _INDEX, _INDEX, _BAND, _INDEX, _OUT), cache=True)
-def _product(first, second, place, head, band, target, out):
+def _product(first: Any, second: Any, place: Any, head: Any, band: Any, target: Any, out: Any) -> None:
     (before, _, after), (taps, reach) = out[1][:3], band
     m, rows = first[1][1], head.size
     high, wide = _blocks(out[1])

@@ -102,7 +102,7 @@ def _aside(kv: KnotVector, at: Array, side: int) -> Array:
     """Parameters just beside the lines, on the left (0) or on the right (1)."""
     limit = at[:, side]
     span, _ = kv.locate(limit, LIMITS[side])
-    return limit + (2 * side - 1) * BESIDE * (kv.knots[span + 1] - kv.knots[span])
+    return np.asarray(limit + (2 * side - 1) * BESIDE * (kv.knots[span + 1] - kv.knots[span]))
 
 
 def _present(face: Face, net: Net, axis: int, at: Array, places: Array) -> Array:

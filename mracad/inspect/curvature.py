@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from functools import cache
 from types import FunctionType
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 
@@ -88,7 +88,7 @@ def forms(jet: Array) -> Forms:
     return found
 
 
-def _figures(thin, void, derivatives):
+def _figures(thin: Any, void: Any, derivatives: Any) -> Any:
     """What :class:`Forms` holds, of derivatives (u, v, uu, …, vvv) whose coordinates are numbers or arrays of them.
 
     Notes
@@ -99,7 +99,7 @@ def _figures(thin, void, derivatives):
 
     su, sv, suu, suv, svv, suuu, suuv, suvv, svvv = derivatives
 
-    def dot(a, b):
+    def dot(a: Any, b: Any) -> Any:
         return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
     ee, ff, gg = dot(su, su), dot(su, sv), dot(sv, sv)
@@ -117,7 +117,7 @@ def _figures(thin, void, derivatives):
     uu_u, uv_u, vv_u = dot(su, suu), dot(su, suv), dot(su, svv)
     uu_v, uv_v, vv_v = dot(sv, suu), dot(sv, suv), dot(sv, svv)
 
-    def slope(pull, push, thirds, dee, dff, dgg):
+    def slope(pull: Any, push: Any, thirds: Any, dee: Any, dff: Any, dgg: Any) -> Any:
         a, b = (push * ff - pull * gg) / area2, (pull * ff - push * ee) / area2  # n_x = a S_u + b S_v
         de = dot(n, thirds[0]) + a * uu_u + b * uu_v
         df = dot(n, thirds[1]) + a * uv_u + b * uv_v
@@ -135,11 +135,11 @@ def _figures(thin, void, derivatives):
     )  # fmt: skip
 
 
-def _swept(jet, thin, void, found):
+def _swept(jet: Any, thin: Any, void: Any, found: Any) -> None:
     """Fill in the figures (those of :class:`Forms`, in order) point by point."""
     normal, density, speeds, bending, variation, largest, regular = found
 
-    def at(order, p):
+    def at(order: int, p: int) -> Any:
         return jet[order, 0, p], jet[order, 1, p], jet[order, 2, p]
 
     for p in range(jet.shape[2]):

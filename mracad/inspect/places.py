@@ -158,7 +158,7 @@ class Places:
     def _means(self, form: Forms, areas: Array) -> Array:
         """Means of bending and curvature variation, ``(2, nu, nv)``."""
         sums = [self._gathered(np.add, areas * each) for each in (form.bending, form.variation)]
-        return np.stack(sums) / np.maximum(self._gathered(np.add, areas), 1e-300)
+        return np.asarray(np.stack(sums) / np.maximum(self._gathered(np.add, areas), 1e-300))
 
 
 def _divided(rule: Quadrature, form: Forms, axis: int, side: float) -> tuple[Array, Array]:

@@ -127,10 +127,10 @@ def _squares(net: Net, offsets: Array) -> Array:
     heights = net.with_poles(offsets).grid(us, vs)
     squares = np.square(heights).sum(axis=-1)
     cells = squares.reshape(net.u.spans, _POINTS, net.v.spans, _POINTS)
-    return cells.swapaxes(1, 2).reshape(net.u.spans, net.v.spans, _POINTS**2)
+    return np.asarray(cells.swapaxes(1, 2).reshape(net.u.spans, net.v.spans, _POINTS**2))
 
 
 def _places(knots: KnotVector) -> Array:
     """Parameters of the places in every span."""
     span, offset, _ = gauss(knots, _POINTS)
-    return (knots.knots[span][:, None] + offset).ravel()
+    return np.asarray((knots.knots[span][:, None] + offset).ravel())

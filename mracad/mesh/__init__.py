@@ -1,5 +1,7 @@
 """Triangle meshes out, one module a format; numpy alone."""
 
+from collections.abc import Callable
+
 from mracad.mesh import gltf, obj, ply, stl, threemf
 from mracad.mesh.scene import Body, Node, Scene
 
@@ -12,4 +14,5 @@ def write(scene: Scene, format: str, ascii: bool = False) -> bytes:
         return stl.write(scene, ascii)
     if format in ("gltf", "glb"):
         return gltf.write(scene, binary=format == "glb")
-    return {"3mf": threemf, "obj": obj, "ply": ply}[format].write(scene)
+    others: dict[str, Callable[[Scene], bytes]] = {"3mf": threemf.write, "obj": obj.write, "ply": ply.write}
+    return others[format](scene)

@@ -56,7 +56,7 @@ def _content(scene: Scene) -> tuple[bytes, dict[str, Any]]:
     return bytes(data), content
 
 
-def _mesh(body: Body, colours: list[str], data: bytearray, views: list, accessors: list) -> dict[str, Any]:
+def _mesh(body: Body, colours: list[str], data: bytearray, views: list[Any], accessors: list[Any]) -> dict[str, Any]:
     """A body; its numbers go to the end of the buffer."""
     points = body.points.astype("<f4")
     views.append({"buffer": 0, "byteOffset": len(data), "byteLength": points.nbytes, "target": _POINTS})

@@ -31,7 +31,7 @@ def _normals(corners: Array) -> Array:
 
 def _binary(table: Array) -> bytes:
     header = f"mracad {__version__}, millimetres".encode().ljust(80)
-    return header + np.uint32(len(table)).astype("<u4").tobytes() + table.tobytes()
+    return bytes(header + np.uint32(len(table)).astype("<u4").tobytes() + table.tobytes())
 
 
 def _text(table: Array) -> bytes:

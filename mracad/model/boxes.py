@@ -83,7 +83,7 @@ def box(face: Face, net: Net, rim: Array, outer: Array, slack: float = 0.0) -> A
         if inside_grid(face, net, uv[:1], uv[1:]).all():
             best = max(best, peak + sign * face.frame[axis, 3])
         result[k, axis] = sign * max(sign * rim[k, axis], best)
-    return np.clip(result, outer[0], outer[1])
+    return np.asarray(np.clip(result, outer[0], outer[1]))
 
 
 def _with_long(face: Face, net: Net, rim: Array) -> Array:
@@ -99,7 +99,7 @@ def _with_long(face: Face, net: Net, rim: Array) -> Array:
 def _quarters(breaks: Array) -> Array:
     """Breaks, and the quarters of the spans between them."""
     count = len(breaks)
-    return np.interp(np.arange(4 * count - 3) / 4, np.arange(count), breaks)
+    return np.asarray(np.interp(np.arange(4 * count - 3) / 4, np.arange(count), breaks))
 
 
 def _lines(points: Array, tangents: Array) -> Array:
@@ -110,7 +110,9 @@ def _lines(points: Array, tangents: Array) -> Array:
     k = np.minimum(at.astype(int), count - 2)
     s = (at - k)[:, None]
     p, q, m, n = points[:, k], points[:, k + 1], slopes[:, k], slopes[:, k + 1]
-    return (1 + 2 * s) * (1 - s) ** 2 * p + s * (1 - s) ** 2 * m + s * s * (3 - 2 * s) * q + s * s * (s - 1) * n
+    return np.asarray(
+        (1 + 2 * s) * (1 - s) ** 2 * p + s * (1 - s) ** 2 * m + s * s * (3 - 2 * s) * q + s * s * (s - 1) * n
+    )
 
 
 def _peaks(lines: Array) -> Array:
@@ -120,7 +122,9 @@ def _peaks(lines: Array) -> Array:
     before, top, after = (np.take_along_axis(lines, i + k, axis=1)[:, 0] for k in (-1, 0, 1))
     bend = 2 * top - before - after
     curved = (place == i)[:, 0] & (bend > 0)
-    return lines.max(axis=1) + np.where(curved, (before - after) ** 2 / (8 * np.where(curved, bend, 1.0)), 0.0)
+    return np.asarray(
+        lines.max(axis=1) + np.where(curved, (before - after) ** 2 / (8 * np.where(curved, bend, 1.0)), 0.0)
+    )
 
 
 def _grid(face: Face, net: Net) -> tuple[Array, Array]:

@@ -107,15 +107,15 @@ class Face:
 
     def turned(self, vectors: Array) -> Array:
         """Vectors ``(…, 3)`` of the surface's frame in the part's."""
-        return vectors @ self.frame[:3, :3].T
+        return np.asarray(vectors @ self.frame[:3, :3].T)
 
     def placed(self, points: Array) -> Array:
         """Points ``(…, 3)`` of the surface's frame in the part's."""
-        return self.turned(points) + self.frame[:3, 3]
+        return np.asarray(self.turned(points) + self.frame[:3, 3])
 
     def local(self, points: Array) -> Array:
         """Points ``(…, 3)`` of the part's frame in the surface's."""
-        return (points - self.frame[:3, 3]) @ self.frame[:3, :3]
+        return np.asarray((points - self.frame[:3, 3]) @ self.frame[:3, :3])
 
 
 @dataclass(frozen=True, eq=False)

@@ -54,7 +54,7 @@ class Quadrature:
     @property
     def weights(self) -> Array:
         """Weights of all products of parameters, zero off the faces, shaped as ``mask``."""
-        return self.wu.reshape(-1, 1) * self.wv.reshape(-1) * self.mask
+        return np.asarray(self.wu.reshape(-1, 1) * self.wv.reshape(-1) * self.mask)
 
 
 def inside_grid(face: Face, net: Net, u: Array, v: Array) -> Array:
@@ -77,7 +77,7 @@ def inside_grid(face: Face, net: Net, u: Array, v: Array) -> Array:
     u, v = np.asarray(u, dtype=float), np.asarray(v, dtype=float)
     shape = outline(face, net)
     if shape.natural:
-        return _within(net.u, u)[:, None] & _within(net.v, v)
+        return np.asarray(_within(net.u, u)[:, None] & _within(net.v, v))
     if shape.around[1] and not shape.around[0]:
         return _covered(shape.chords[..., ::-1], shape.box[:, ::-1], (net.v, net.u), v, u).T
     return _covered(shape.chords, shape.box, (net.u, net.v), u, v)

@@ -59,7 +59,7 @@ class Outline:
         straight = steps[:, axis] <= MARGIN * (high - low)[axis]
         places, of = np.unique(self.chords[straight, 0, axis], return_inverse=True)
         lengths = np.bincount(of, steps[straight, 1 - axis], minlength=len(places))
-        return places[lengths >= (high - low)[1 - axis] / 8]
+        return np.asarray(places[lengths >= (high - low)[1 - axis] / 8])
 
 
 def outline(face: Face, net: Net) -> Outline:
@@ -125,7 +125,7 @@ def _chord_counts(points: Array, tolerance: Array) -> Array:
     bend = np.linalg.norm(np.diff(plane * weights[..., None], 2, axis=1), axis=2).max(axis=1)
     pull = np.linalg.norm(plane, axis=2).max(axis=1) * np.abs(np.diff(weights, 2, axis=1)).max(axis=1)
     bound = degree * (degree - 1) / 8 * (bend + pull) / weights.min(axis=1)
-    return np.clip(np.ceil(np.sqrt(bound)), 1, LONGEST).astype(int)
+    return np.asarray(np.clip(np.ceil(np.sqrt(bound)), 1, LONGEST).astype(int))
 
 
 def _polygons(points: Array, counts: Array) -> tuple[Array, Array]:
@@ -228,4 +228,4 @@ def _gathered(chords: Array, owners: Array, loops: list[list[int]], periods: Arr
     widest, finite = (high - low).prod(axis=1).argmax(), np.isfinite(periods)
     moves, middle = np.zeros_like(low), 0.5 * (low + high)
     moves[:, finite] = (np.round((middle[widest] - middle) / periods) * np.where(finite, periods, 0.0))[:, finite]
-    return chords + moves[of][:, None]
+    return np.asarray(chords + moves[of][:, None])

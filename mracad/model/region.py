@@ -56,7 +56,7 @@ def supported(net: Net, cells: Array) -> Array:
     total = np.zeros((wide.shape[0] + 1, wide.shape[1] + 1), dtype=np.int64)
     total[1:, 1:] = wide.cumsum(0).cumsum(1)
     rows = total[last_u] - total[first_u]
-    return (rows[:, last_v] - rows[:, first_v]) > 0
+    return np.asarray((rows[:, last_v] - rows[:, first_v]) > 0)
 
 
 def _supports(knots: KnotVector) -> tuple[Array, Array]:

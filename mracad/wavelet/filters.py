@@ -197,4 +197,4 @@ def _dense(p: Rows, g: Gram) -> Array:
     matrix = g.apply(p.toarray()).T * scale
     q = np.linalg.svd(matrix)[2][p.columns :] * scale
     q *= np.where(q[:, :1] < 0, -1.0, 1.0)
-    return q / np.sqrt((q * g.apply(q, axis=1)).sum(axis=1))[:, None]
+    return np.asarray(q / np.sqrt((q * g.apply(q, axis=1)).sum(axis=1))[:, None])

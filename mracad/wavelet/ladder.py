@@ -154,7 +154,7 @@ def arc_lengths(net: Net, direction: int) -> Array:
     others = low + across.period * (np.arange(_POSITIONS) + 0.5) / _POSITIONS
     us, vs = (places, others) if direction == 0 else (others, places)
     speed = np.linalg.norm(net.tangents(us, vs, direction), axis=2).mean(axis=1 - direction)
-    return (speed.reshape(weight.shape) * weight).sum(axis=1)
+    return np.asarray((speed.reshape(weight.shape) * weight).sum(axis=1))
 
 
 class _Ladder:
@@ -202,7 +202,7 @@ class _Ladder:
         before, after = np.append(self.spans[0], self.spans), np.append(self.spans, self.spans[-1])
         if self.kv.periodic:
             before[0], after[-1] = self.spans[-1], self.spans[0]
-        return before + after
+        return np.asarray(before + after)
 
     def drop(self, candidate: Array) -> bool:
         """Remove alternate clusters of each run of candidates; say whether any went."""

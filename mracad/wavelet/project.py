@@ -116,7 +116,7 @@ class Projection:
         if self.coarse_knots == self.fine_knots:
             return c
         middle = c.mean(axis=axis, keepdims=True)
-        return self._solved(c - middle, axis) + middle
+        return np.asarray(self._solved(c - middle, axis) + middle)
 
     def apply(self, c: Array, axis: int = 0) -> Array:
         """Poles, over the fine knots, of the projection of poles ``c`` along ``axis``."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -47,7 +48,7 @@ def assembly(ref: Subject, new: Subject) -> Layer:
 
 def _numbered(contents: Contents) -> Iterator[tuple[Occurrence, int]]:
     """Everything placed, and how many of the same path and product came before it."""
-    seen: Counter = Counter()
+    seen: Counter[tuple[tuple[str, ...], str]] = Counter()
     for placed in contents.tree:
         yield placed, seen[placed.path, placed.product]
         seen[placed.path, placed.product] += 1
@@ -107,7 +108,7 @@ def _marked(name: str, ref: Subject, new: Subject, groups: Sequence[Group]) -> l
     return _differences(name, old, fresh)
 
 
-def _key(name: str, mark: tuple, numbers: Mapping[int, int] | None) -> _Key:
+def _key(name: str, mark: tuple[Any, ...], numbers: Mapping[int, int] | None) -> _Key:
     place: Carrier = mark[0]
     face = None if place.face < 0 else place.face if numbers is None else numbers.get(place.face)
     inside = place.inside or (place.face >= 0 and face is None)

@@ -148,7 +148,7 @@ def _sized(area: float, other: float) -> bool:
 def _probes(subject: Subject, face: int) -> Array:
     """A few points inside a face."""
     points = subject.gauge.sample(face, (0, 0))
-    return points[np.linspace(0, len(points) - 1, min(_PROBES, len(points))).astype(int)]
+    return np.asarray(points[np.linspace(0, len(points) - 1, min(_PROBES, len(points))).astype(int)])
 
 
 def _hosts(subject: Subject, points: Array, slack: float) -> Iterable[int]:
