@@ -9,12 +9,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from mracad.constraint.trace import EVENLY, Trace, trace_of
 from mracad.edit.feature.detail import Feature
 from mracad.edit.feature.ground import SIDEWAYS, Feet, Ground, axes
 from mracad.edit.feature.locate import MOST_PLACES, Place, numbers, place, standing, table, whole
+from mracad.edit.feature.patch import Patch
 from mracad.errors import EditError, UsageError
-from mracad.model.brep import Model
-from mracad.model.sampling import shares
+from mracad.model.brep import Face
 from mracad.spec.quantity import length
 from mracad.spec.steps import Repeat
 
@@ -173,61 +174,34 @@ def along(ground: Ground, text: str) -> list[Place]:
     side = next((s for s in edge.sides if s.face in ground.chosen and s.uv is not None), None)
     if side is None or edge.degenerate:
         raise EditError(f"along: edge#{number} bounds no face to edit", "select one of its faces with --faces")
-    points, tangents = _even(edge.points, edge.tangents, count)
     face = model.faces[side.face]
-    way = ground.patches[face.surface].frame @ np.linalg.inv(face.frame)  # type: ignore[index]  # it is a NURBS face
-    points, tangents = points @ way[:3, :3].T + way[:3, 3], tangents @ way[:3, :3].T
-    inward = _inward(model, ground, edge.index, points, tangents) if offset else np.zeros_like(points)
-    return [
-        Place(f"place {k + 1} along edge#{number}", points[k] + offset * inward[k], direction=tangents[k])
-        for k in range(count)
-    ]
+    assert face.surface is not None
+    trace = trace_of(model, face, next(trim for trim in face.trims if trim.edge == edge.index))
+    points, tangents = _even(ground.patches[face.surface], trace, count)
+    if offset:
+        points = points + offset * _inward(ground, face, points, tangents)
+    return [Place(f"place {k + 1} along edge#{number}", points[k], direction=tangents[k]) for k in range(count)]
 
 
-def _even(points: Array, tangents: Array, count: int) -> tuple[Array, Array]:
-    """Points and unit tangents in the middles of equal parts of a curve, from Hermite arcs between its samples."""
-    chord = np.linalg.norm(np.diff(points, axis=0), axis=1)
-    t = np.linspace(0, 1, 33)
-    h = [2 * t**3 - 3 * t**2 + 1, t**3 - 2 * t**2 + t, -2 * t**3 + 3 * t**2, t**3 - t**2]
-    fine = np.concatenate(
-        [
-            h[0][:, None] * p + h[1][:, None] * c * v + h[2][:, None] * q + h[3][:, None] * c * w
-            for p, q, v, w, c in zip(points[:-1], points[1:], tangents[:-1], tangents[1:], chord, strict=True)
-        ]
-    )
-    # the samples of an edge stop short of its ends
-    ends = _ends(points, tangents)
-    fine = np.concatenate([ends[:1], fine, ends[1:]])
-    length = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(fine, axis=0), axis=1)))
-    at = length[-1] * (np.arange(count) + 0.5) / count
-    found = np.stack([np.interp(at, length, fine[:, k]) for k in range(3)], axis=1)
-    step = 1e-3 * length[-1]
-    ahead, behind = (np.stack([np.interp(at + s, length, fine[:, k]) for k in range(3)], axis=1) for s in (step, -step))
-    way = ahead - behind
-    return found, way / np.linalg.norm(way, axis=1, keepdims=True)
+def _even(patch: Patch, trace: Trace, count: int) -> tuple[Array, Array]:
+    """Points and unit tangents in the middles of equal parts of a boundary curve."""
+    points = np.asarray(patch.net.evaluate(trace.places(EVENLY)))
+    length = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
+    share = np.interp(length[-1] * (np.arange(count) + 0.5) / count, length, EVENLY)
+    found, su, sv, _ = patch.evaluate(trace.places(share))
+    way = trace.way(share)
+    tangents = su * way[:, :1] + sv * way[:, 1:]
+    return found, tangents / np.linalg.norm(tangents, axis=1, keepdims=True)
 
 
-def _ends(points: Array, tangents: Array) -> Array:
-    """The ends of an edge, a little beyond its first and last (Chebyshev) samples."""
-    place = shares(len(points))
-    share = place[0] / (place[1] - place[0])
-    first = points[0] - share * np.linalg.norm(points[1] - points[0]) * tangents[0]
-    last = points[-1] + share * np.linalg.norm(points[-1] - points[-2]) * tangents[-1]
-    return np.stack([first, last])
-
-
-def _inward(model: Model, ground: Ground, edge: int, points: Array, tangents: Array) -> Array:
-    """Directions into the first selected face at an edge: the side of the tangent on which a small step stays on it."""
-    feet = ground.feet(points)
-    way = np.cross(feet.normals, tangents)
-    own = next(s.face for s in model.edges[edge].sides if s.face in ground.chosen)
-    surface = model.faces[own].surface
+def _inward(ground: Ground, face: Face, points: Array, tangents: Array) -> Array:
+    """Directions into a face at points of an edge: the side of the tangent on which a small step stays on it."""
+    way = np.cross(ground.feet(points).normals, tangents)
     size = 1e-2 * float(np.linalg.norm(np.ptp(points, axis=0)) or 1.0)
-    middle = len(points) // 2
+    middle = slice(len(points) // 2, len(points) // 2 + 1)
     for sign in (1.0, -1.0):
-        at = ground.feet(points[middle : middle + 1] + sign * size * way[middle : middle + 1])
-        face = ground.faces(at.surface, at.uv)[0]
-        if face == own and surface == at.surface[0] and at.apart[0] < 0.2 * size:
+        at = ground.feet(points[middle] + sign * size * way[middle])
+        if ground.faces(at.surface, at.uv)[0] == face.index and at.apart[0] < 0.2 * size:
             return sign * way
     return way
 
