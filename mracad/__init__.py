@@ -35,23 +35,15 @@ if TYPE_CHECKING:
 _HOMES = {
     "Displacement": "model.displacement",
     "Model": "model.brep",
-    "Move": "spec.steps",
     "MracadError": "errors",
-    "Repeat": "spec.steps",
-    "Smooth": "spec.steps",
-    "Transfer": "spec.steps",
     "apply": "occ.apply",
     "check": "occ.check",
     "deviations": "inspect.deviation",
-    "move": "edit.feature.edits",
     "read": "occ.files",
     "read_back": "job.produce",
-    "repeat": "edit.feature.edits",
     "run": "job.document",
     "seams": "inspect.seams",
-    "smooth": "edit.smooth",
     "snapshot": "occ.view:view",
-    "transfer": "edit.feature.edits",
     "write": "occ.files",
 }
 
@@ -81,9 +73,24 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    if name not in _HOMES:
-        raise AttributeError(f"module 'mracad' has no attribute {name!r}")
-    module, _, attribute = _HOMES[name].partition(":")
-    value = getattr(import_module(f"mracad.{module}"), attribute or name)
+    value = _step(name)
+    if value is None:
+        if name not in _HOMES:
+            raise AttributeError(f"module 'mracad' has no attribute {name!r}")
+        module, _, attribute = _HOMES[name].partition(":")
+        value = getattr(import_module(f"mracad.{module}"), attribute or name)
     globals()[name] = value
     return value
+
+
+def _step(name: str) -> Any:
+    """The options of an edit, or its function."""
+    from mracad.spec.steps import STEPS, Selection
+
+    struct = STEPS.get(name.lower())
+    if struct is None or not issubclass(struct, Selection):
+        return None
+    if name == struct.__name__:
+        return struct
+    module, _, function = struct.function.partition(":")
+    return getattr(import_module(module), function)

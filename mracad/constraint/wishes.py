@@ -32,6 +32,8 @@ class Wishes:
         Edges that must not move.
     bend : float
         Jump of the curvature, 1/mm, that counts for nothing beside :data:`BENT` of the curvature itself.
+    open : bool
+        Whether free edges and poles move with their faces.
     """
 
     keep: str = "g1"
@@ -39,6 +41,7 @@ class Wishes:
     close_gaps: bool = False
     hold: frozenset[int] = frozenset()
     bend: float = 1e-9
+    open: bool = False
 
     def order(self, angles: Array, one: Array, other: Array) -> int:
         """Derivatives across an edge that are kept, from what there is along it.

@@ -124,7 +124,7 @@ class Moved:
         whole, most = self.offset / self.amount, np.array([self.amount])
         (amount,), (changes,), (limits,) = amounts(self._watch(), [self.net], [whole], most, tolerances)
         found = replace(self, offset=amount * whole, amount=amount, changes=changes, limits=limits or self.limits)
-        return found if gained(changes) else replace(found.undone(), limits=found.limits)
+        return found if gained(changes, tolerances) else replace(found.undone(), limits=found.limits)
 
     def _watch(self) -> Watch:
         return Watch.of([(self.net, self.sheet.faces)], self.sheet.wavelength, self.sheet.reach, CLOSER)
@@ -167,6 +167,7 @@ def drive(scene: Scene, wish: Wish, progress: Callable[[int, int], None] | None 
                 loose += joined.loose
                 result |= part
                 rest -= part.keys()
+        result |= {i: _by_itself(scene, wish, i) for i in group if i not in result}
     result = {i: result[i].confirmed(scene.tolerances) if i in rest else result[i] for i in scene.sheets}
     moving = {i for i, moved in result.items() if moved.amount > 0}
     exact += [seam for seam in scene.joints.exact if seam.a.surface == seam.b.surface and seam.a.surface in moving]
@@ -189,22 +190,31 @@ def _dropped(wanted: Joints, used: Joints, result: Mapping[int, Moved]) -> dict[
 def _alone(
     scene: Scene, wish: Wish, group: Sequence[int]
 ) -> tuple[dict[int, Moved], dict[tuple[int, ...], dict[int, Moved]]]:
-    """What becomes of surfaces that seams join, each by itself; of the first only, where together all go through."""
+    """What becomes of surfaces that seams join, each by itself; of the first only, where together all go through.
+
+    Of none, where they need not get fairer: between held neighbours they could hardly move at all.
+    """
+    if not scene.tolerances.fairer:
+        return {}, {}
     alone: dict[int, Moved] = {}
     tried: dict[tuple[int, ...], dict[int, Moved]] = {}
     for i in group:
         if len(alone) == FIRST and _through(alone):
-            whole = tried[tuple(group)] = _attempt(scene, wish, group, scene.joints.among(group), _finer(group, alone))
+            whole = tried[tuple(group)] = _attempt(
+                scene, wish, group, scene.joints.among(group), _finer(scene, group, alone)
+            )
             if _through(whole) and not _less(whole, alone):
                 break
         alone[i] = _by_itself(scene, wish, i)
     return alone, tried
 
 
-def _finer(group: Iterable[int], alone: Mapping[int, Moved]) -> set[int]:
-    """Surfaces for which more control points pay, as far as that is known; of others, where it does for any."""
+def _finer(scene: Scene, group: Iterable[int], alone: Mapping[int, Moved]) -> set[int]:
+    """Surfaces for which more control points pay, as far as that is known; of others, where it does for any, or where
+    nothing is known."""
     known = {i for i, moved in alone.items() if moved.finer}
-    return {i for i in group if i in known or (known and i not in alone)}
+    more = scene.refine and (known or not alone)
+    return {i for i in group if i in known or (more and i not in alone)}
 
 
 def _through(moved: Mapping[int, Moved]) -> bool:
@@ -236,7 +246,7 @@ def _together(
         joined = scene.joints.among(part)
         if len(part) < 2 or not rounds:
             continue
-        found = tried.get(tuple(part)) or _attempt(scene, wish, part, joined, _finer(part, alone))
+        found = tried.get(tuple(part)) or _attempt(scene, wish, part, joined, _finer(scene, part, alone))
         good = [i for i, moved in found.items() if moved.amount >= LEAST]
         if len(good) < len(part):
             waiting += [(each, rounds - 1) for each in groups(good, scene.joints.among(good))]
@@ -326,7 +336,7 @@ def _attempt(
         if max(found, key=worth) is now:
             break
     done = max(found, key=worth)
-    fairer = [True] * len(members) if done.least else trial.fairer(target)
+    fairer = [True] * len(members) if done.least or not scene.tolerances.fairer else trial.fairer(target)
     wished = float((target * (trial.problem.mass @ target)).sum())
     return {
         i: Moved(

@@ -52,6 +52,7 @@ class Filter:
 
     scale: float
     spread: ClassVar[float] = 1.0
+    fairs: ClassVar[bool] = True
 
     def wavelength(self, net: Net, creases: Creases) -> float:
         """The scale, for every surface."""

@@ -56,6 +56,7 @@ class Level:
     """
 
     level: float
+    fairs: ClassVar[bool] = True
     spread: ClassVar[float] = math.inf  # waves beside what goes are part of a projection
 
     def wavelength(self, net: Net, creases: Creases) -> float:

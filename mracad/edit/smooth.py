@@ -2,24 +2,16 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Collection
-from dataclasses import replace
+from collections.abc import Callable
 
-from mracad.constraint.cause import Cause, Still
-from mracad.constraint.seam import Treatment
-from mracad.constraint.wishes import Wishes
-from mracad.edit.driver import Moved, Result
-from mracad.edit.fair import Filter, faired
+from mracad.edit.fair import Filter
 from mracad.edit.level import Level
-from mracad.edit.result import Edit, FaceOutcome, Reason, Status, spared
+from mracad.edit.result import Edit
 from mracad.edit.target import Wish
-from mracad.edit.tolerances import tolerances
-from mracad.inspect.roughness import Worse
-from mracad.model.brep import Face, Model
+from mracad.edit.whole import edited
+from mracad.model.brep import Model
 from mracad.spec.quantity import length
 from mracad.spec.select import Scope
-from mracad.spec.select import scope as scope_of
 from mracad.spec.steps import Smooth
 
 
@@ -30,38 +22,8 @@ def smooth(
     scope: Scope | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Edit:
-    """Smooth the NURBS faces of a model.
-
-    Parameters
-    ----------
-    model : Model
-    options : Smooth
-    scope : Scope, optional
-        Faces to smooth, faces and edges to hold; by default those that the options name.
-    progress : callable, optional
-        Called with surfaces done and surfaces in all.
-
-    Raises
-    ------
-    UsageError
-        For options that this model does not have or that need the document.
-    """
-    scope = scope or scope_of(model, options)
-    movable = {i for i in scope.chosen if model.faces[i].surface is not None}
-    held = scope.edges if options.edges == "coupled" else frozenset(edge.index for edge in model.edges)
-    result = faired(
-        model,
-        movable,
-        wish(model, options),
-        Wishes(options.keep, math.radians(options.fit_g1 or 0.0), options.close_gaps, held),
-        tolerances(model, options),
-        refine=options.refine == "auto",
-        progress=progress,
-    )
-    amounts = {i: moved.scaled(options.amount * moved.amount) for i, moved in result.moved.items()}
-    result = replace(result, moved=amounts)
-    outcomes = tuple(_outcome(face, result, movable, scope, options) for face in model.faces)
-    return Edit(result.displacement(), outcomes, edges=treatments(model, movable, result, options))
+    """Smooth the NURBS faces of a model; parameters and errors as for :func:`mracad.edit.whole.edited`."""
+    return edited(model, options, wish(model, options), scope, progress)
 
 
 def wish(model: Model, options: Smooth) -> Wish:
@@ -70,77 +32,3 @@ def wish(model: Model, options: Smooth) -> Wish:
         return Filter(length(options.scale, model.diagonal, "scale"))
     assert options.level is not None
     return Level(options.level)
-
-
-def _outcome(face: Face, result: Result, movable: Collection[int], scope: Scope, options: Smooth) -> FaceOutcome:
-    """What became of one face."""
-    outcome = spared(face, scope, movable)
-    if outcome:
-        return outcome
-    assert face.surface is not None
-    sheet, moved = result.sheets[face.surface], result.moved.get(face.surface)
-    known = FaceOutcome(
-        face.index,
-        "unchanged",
-        Reason.FAIR,
-        detail=sheet.detail,
-        points=sheet.origin.u.count * sheet.origin.v.count,
-        creases=sum(map(len, sheet.creases)),
-    )
-    if moved is None:
-        return known
-    change = moved.changes[face.index]
-    known = replace(known, free=moved.free, roughness=(change.before, change.after))
-    if moved.amount:
-        offset = moved.displacement()
-        return replace(
-            known,
-            status="edited",
-            reason=None,
-            said=_figures(moved.limits),
-            moved=moved.motion,
-            amount=moved.amount,
-            points=math.prod(offset.poles.shape[:2]),
-            inserted=len(offset.u_knots) + len(offset.v_knots),
-        )
-    status, reason, said = _left(moved, options)
-    return replace(known, status=status, reason=reason, said=said)
-
-
-def _left(moved: Moved, options: Smooth) -> tuple[Status, Reason, str]:
-    """Why a face with detail stays."""
-    if options.amount == 0:
-        return "unchanged", Reason.AMOUNT, ""
-    if not moved.rough:
-        return "unchanged", Reason.FAIR, ""
-    if not moved.free:
-        return "left", Reason.NO_FREE, ""
-    if moved.limits:
-        return "left", Reason.ROUGHER, _figures(moved.limits)
-    return "left", Reason.RIM, ""
-
-
-def _figures(limits: Collection[Worse]) -> str:
-    """In what a face would get rougher."""
-    return ", ".join(dict.fromkeys(limit.what.value for limit in limits))
-
-
-def treatments(model: Model, movable: set[int], result: Result, options: Smooth) -> tuple[Treatment, ...]:
-    """What was done about each edge of a face that could move, in edge order."""
-    joints, frozen = result.joints, dict(result.joints.frozen)
-    if options.edges == "frozen":
-        frozen = {e: Cause(Still.FROZEN) if why.still is Still.HELD else why for e, why in frozen.items()}
-    how = dict.fromkeys(joints.moving, "coupled")
-    how |= {edge: "to tolerance" for seam in joints.loose for edge in (seam.edge, seam.twin)}
-    how |= dict.fromkeys(result.mended, "mended")
-    moved = {i for i, each in result.moved.items() if each.amount}
-    still = {e for e in how if moved.isdisjoint(model.faces[side.face].surface for side in model.edges[e].sides)}
-    how = {edge: way for edge, way in how.items() if edge not in still}
-    frozen |= dict.fromkeys(still, Cause(Still.STAYS))
-    found = []
-    for edge in model.edges:
-        faces = tuple(side.face for side in edge.sides)
-        if not movable.isdisjoint(faces):
-            why = None if edge.index in how else frozen.get(edge.index, Cause(Still.IDLE))
-            found.append(Treatment(edge.index, faces, how.get(edge.index, "frozen"), why))
-    return tuple(found)

@@ -36,10 +36,15 @@ class Wish(Protocol):
     ----------
     spread : float
         Within how many wavelengths what it takes from a place spreads; infinite where that is no fault.
+    fairs : bool
+        Whether it makes faces fairer; else it changes what they are, and takes free edges and poles with them.
     """
 
     @property
     def spread(self) -> float: ...
+
+    @property
+    def fairs(self) -> bool: ...
 
     def wavelength(self, net: Net, creases: Creases) -> float:
         """Wavelength below which it takes waves from a surface, mm: within it, it fades beside what is held."""

@@ -16,6 +16,9 @@ GROWTH = Growth(0.005, 0.005, 0.005, 0.02, 30.0, 0.25)
 """What the judge lets pass by default: a quarter of the 2 % that count as worse where faces are compared, and waves
 at a place of an eighth more than about it."""
 
+RESHAPED = Growth(1e9, 1e9, 1e9, 180.0, 30.0, 1e9)
+"""What the judge lets pass where an edit changes what faces are: they must not fold."""
+
 MORE = 0.02
 """Share by which an edge may gape more that gapes as far as it may."""
 
@@ -38,6 +41,8 @@ class Tolerances:
         Of roughness.
     deviation : float
         Largest deviation along the normal, mm.
+    fairer : bool
+        Whether faces must get fairer to be touched.
     """
 
     gap: float = 1e-4
@@ -47,6 +52,7 @@ class Tolerances:
     jump: float = 1e-2
     growth: Growth = GROWTH
     deviation: float = np.inf
+    fairer: bool = True
 
     def contact(self, width: float) -> tuple[float, float, float]:
         """Gap (mm), angle and curvature (1/mm) of a seam along a trim curve, for an edit of a wavelength (mm)."""

@@ -111,7 +111,7 @@ class Trial:
         nets = [space.net for space in problem.spaces.values()]
         shares, found, limits = amounts(self.watch, nets, parts, ceiling, self.tolerances)
         for i, faces in enumerate(found):
-            if not gained(faces):
+            if not gained(faces, self.tolerances):
                 shares[i], found[i] = 0.0, {face: change.undone() for face, change in faces.items()}
         gains = problem.gains(delta, target, shares)
         gain = sum(problem.gains(delta, target, [min(shares)] * len(parts)))
@@ -173,9 +173,9 @@ class Trial:
         return np.array(list(ceiling.values()))
 
 
-def gained(faces: Mapping[int, Change]) -> bool:
+def gained(faces: Mapping[int, Change], tolerances: Tolerances) -> bool:
     """Whether one of the faces of a surface gained enough to be touched."""
-    return any(better(change, *GAIN) for change in faces.values())
+    return not tolerances.fairer or any(better(change, *GAIN) for change in faces.values())
 
 
 def worth(verdict: Verdict) -> float:

@@ -158,7 +158,7 @@ def worse(change: Change, allowed: Growth) -> tuple[Worse, ...]:
         found.append(Worse(Rougher.KINK, before.kink, after.kink))
     if change.turn > allowed.fold:
         found.append(Worse(Rougher.FOLD, 0.0, change.turn))
-    if change.unsettled > SETTLED:
+    if change.unsettled > max(SETTLED, allowed.curvature):
         found.append(Worse(Rougher.SINGULAR, 0.0, change.unsettled))
     if change.spread > allowed.spread:
         found.append(Worse(Rougher.SPREAD, 1.0, 1.0 + change.spread))
@@ -171,8 +171,8 @@ def places(change: Change, allowed: Growth) -> Array:
     assert found is not None
     most = change.before.curvature * (1 + allowed.curvature) + change.noise.curvature
     steep = (found.turn > np.radians(allowed.fold)) | (found.opened > np.radians(allowed.kink + change.noise.kink))
-    rough = (found.spread > allowed.spread) | (found.curvature > most) | (found.unsettled > SETTLED)
-    return np.asarray(steep | rough)
+    rough = (found.spread > allowed.spread) | (found.curvature > most)
+    return np.asarray(steep | rough | (found.unsettled > max(SETTLED, allowed.curvature)))
 
 
 def better(change: Change, share: float, local: float = np.inf, mean: float = 0.0) -> bool:

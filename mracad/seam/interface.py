@@ -56,6 +56,8 @@ class Joints:
         How edges meet what lies beyond them; where they stay, they keep that.
     jumps : bool
         Whether jumps of curvature along them must not grow.
+    open : frozenset of int
+        Free edges and poles that move with their faces.
     """
 
     exact: tuple[Seam, ...] = ()
@@ -64,13 +66,14 @@ class Joints:
     frozen: Mapping[int, Cause] = field(default_factory=dict)
     meetings: Mapping[int, Meeting] = field(default_factory=dict)
     jumps: bool = False
+    open: frozenset[int] = frozenset()
 
     @property
     def moving(self) -> frozenset[int]:
         """Edges that move."""
         exact = (edge for seam in self.exact for edge in (seam.edge, seam.twin))
         loose = (edge for seam in self.loose for edge in (seam.edge, seam.twin))
-        return frozenset(self.closing).union(exact, loose)
+        return self.open.union(self.closing, exact, loose)
 
     @property
     def orders(self) -> dict[int, int]:
@@ -117,7 +120,10 @@ def joints(model: Model, movable: Collection[int], wishes: Wishes) -> Joints:
         elif not seam.joint.order:
             exact.remove(seam)
             frozen |= dict.fromkeys((seam.edge, seam.twin), rest)
-    return Joints(tuple(exact), tuple(loose), known.closing, frozen, known.meetings, wishes.keep not in CONTINUITY)
+    ends = frozenset(edge for edge, why in frozen.items() if wishes.open and why.still in (Still.FREE, Still.POLE))
+    frozen = {edge: why for edge, why in frozen.items() if edge not in ends}
+    jumps = wishes.keep not in CONTINUITY and not wishes.open
+    return Joints(tuple(exact), tuple(loose), known.closing, frozen, known.meetings, jumps, ends)
 
 
 def contact(seam: TrimmedSeam) -> Contact:

@@ -44,7 +44,7 @@ def move(
     scope: Scope | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Edit:
-    """Move a feature; parameters as for :func:`mracad.edit.smooth.smooth`.
+    """Move a feature; parameters as for :func:`mracad.edit.whole.edited`.
 
     Raises
     ------

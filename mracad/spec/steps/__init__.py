@@ -1,11 +1,12 @@
 """The options of every step, declared once: command line, recipes, schemas and documentation come from here.
 
-A ``Struct`` per edit or check, listed in ``STEPS``; a field's ``Meta`` carries its help.  This package imports no
-numerical library, so that the command line can show its help at once.
+A ``Struct`` per edit or check, which names its function and so becomes one of ``STEPS``; a field's ``Meta`` carries its
+help.  This package imports no numerical library, so that the command line can show its help at once.
 """
 
 from __future__ import annotations
 
+from mracad.spec.steps import checks, features, smooth
 from mracad.spec.steps.base import Options, Selection
 from mracad.spec.steps.checks import Check, Compare
 from mracad.spec.steps.features import Featured, Move, Repeat, Single, Transfer
@@ -17,11 +18,9 @@ __all__ = [
 ]  # fmt: skip
 
 STEPS: dict[str, type[Options]] = {
-    "smooth": Smooth,
-    "move": Move,
-    "repeat": Repeat,
-    "transfer": Transfer,
-    "check": Check,
-    "compare": Compare,
+    name.lower(): struct
+    for module in (smooth, features, checks)
+    for name, struct in vars(module).items()
+    if isinstance(struct, type) and issubclass(struct, Options) and "function" in vars(struct)
 }
 """Every step by the name of its command: edits (subclasses of ``Selection``) and checks."""
