@@ -24,8 +24,9 @@ sys.path.insert(0, str(ROOT))
 
 from mracad.job.batch.find import find  # noqa: E402
 from mracad.job.batch.manifest import Manifest  # noqa: E402
-from mracad.job.batch.pool import Limits, Pool  # noqa: E402
-from mracad.job.batch.run import Settings, run  # noqa: E402
+from mracad.job.batch.pool import Pool  # noqa: E402
+from mracad.job.batch.run import run  # noqa: E402
+from mracad.job.batch.settings import Limits, Settings  # noqa: E402
 from mracad.job.batch.work import warm  # noqa: E402
 from mracad.spec.recipe import load  # noqa: E402
 from tests.batch.runs import batch, environment, kills, outputs, recipe, shams  # noqa: E402

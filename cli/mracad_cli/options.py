@@ -1,58 +1,116 @@
-"""Options that commands share, and options made from the structs of :mod:`mracad.spec.steps`."""
+"""Options that commands share, and options made from the structs of :mod:`mracad.spec.steps`; parsed once, by click."""
 
 from __future__ import annotations
 
-import typing
-from collections.abc import Callable
-from typing import Any, Literal
+import dataclasses
+import functools
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any
 
 import click
-from msgspec import Meta, Struct, structs
+import msgspec
+from msgspec import Struct, structs
 
 from mracad.formats import FORMATS
-from mracad.spec.quantity import Length, duration
-from mracad.spec.steps.base import dashed, plain_types
+from mracad.spec.fields import Field, dashed, fields
+from mracad.spec.quantity import ANGLE, LENGTH, MEMORY, TIME, Kind
 
 Command = Callable[..., Any]
 
-SHORT = {"faces": "SEL", "instance": "PATH", "hold": "SEL", "max_angle": "DEG", "kink": "DEG", "fit_g1": "DEG"}
-"""Placeholders in the help."""
+SHORT = {LENGTH: "LENGTH", ANGLE: "DEG", TIME: "TIME", MEMORY: "SIZE"}
+"""Placeholders of quantities in the help."""
+
+METAVARS = {"faces": "SEL", "instance": "PATH", "hold": "SEL"}
+"""Placeholders of other options."""
 
 
-def of(struct: type[Struct], without: str = "") -> Callable[[Command], Command]:
-    """Add one option for each field of a struct, its own before the inherited ones, under the same names; not for
-    those whose names stand, between blanks, in ``without``."""
+class Quantity(click.ParamType):
+    """A quantity: its value; a length stays a text, for it may be a share of the model."""
+
+    def __init__(self, kind: Kind) -> None:
+        self.kind, self.name = kind, SHORT.get(kind, "")
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        if not isinstance(value, str):
+            return value
+        found = self.kind.read(value, dashed(param.name or "") if param else "", 1.0 if self.kind is LENGTH else None)
+        return value if self.kind is LENGTH else found
+
+
+class Declared(click.ParamType):
+    """A value of a field of a struct of options."""
+
+    def __init__(self, field: Field) -> None:
+        self.field, self.name = field, "text"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        return self.field.one(value)
+
+
+def of(
+    struct: type[Struct], name: str, without: str = "", arguments: Mapping[str, str] = MappingProxyType({})
+) -> Callable[[Command], Command]:
+    """Add one option for each field of a struct, its own before the inherited ones; the command gets the struct.
+
+    Parameters
+    ----------
+    struct : type
+    name : str
+        Of the command's parameter.
+    without : str
+        Fields, between blanks, that get no option.
+    arguments : mapping
+        Placeholders of the fields that are arguments.
+    """
+    known = {name: field for name, field in fields(struct).items() if name not in without.split()}
+    base = struct.__base__
+    shared = len(structs.fields(base)) if base is not None and base is not Struct else 0
+    inherited = list(fields(struct))[:shared]
 
     def decorate(command: Command) -> Command:
-        hints, kinds = typing.get_type_hints(struct, include_extras=True), plain_types(struct)
-        base = struct.__base__
-        shared = len(structs.fields(base)) if base is not None and base is not Struct else 0
-        fields = structs.fields(struct)
-        for field in reversed(fields[shared:] + fields[:shared]):
-            if field.name in without.split():
-                continue
-            meta = next(m for m in hints[field.name].__metadata__ if isinstance(m, Meta) and m.description)
-            command = _option(field.name, meta.description or "", kinds[field.name], field.default)(command)
-        return command
+        @functools.wraps(command)
+        def collected(*args: Any, **given: Any) -> Any:
+            values = {field: given.pop(field) for field in known}
+            return command(*args, **given, **{name: struct(**{k: v for k, v in values.items() if v is not None})})
+
+        own = [_option(known[field]) for field in known if field not in inherited and field not in arguments]
+        rest = [_option(known[field]) for field in known if field in inherited]
+        placed = [click.argument(field, metavar=metavar) for field, metavar in arguments.items()]
+        return apply(*placed, *own, *rest)(collected)
 
     return decorate
 
 
-def _option(name: str, help: str, kind: Any, default: Any) -> Callable[[Command], Command]:
-    flag = f"--{dashed(name)}"
-    settings: dict[str, Any] = {"help": help, "metavar": SHORT.get(name), "default": default}
-    if kind is bool:
-        return click.option(name, flag, is_flag=True, help=help, default=default)
-    if kind is Length:
-        settings |= {"metavar": "LENGTH"}
-    if typing.get_origin(kind) is tuple:
-        settings |= {"multiple": True}
-        kind = typing.get_args(kind)[0]
-    if typing.get_origin(kind) is Literal:
-        settings |= {"type": click.Choice(typing.get_args(kind))}
-    else:
-        settings |= {"type": kind if kind in (int, float) else str}
-    return click.option(name, flag, **settings, show_default=default not in (None, (), ""))
+def gathered(name: str, kind: type, *options: Callable[[Command], Command]) -> Callable[[Command], Command]:
+    """Options that the command gets as one parameter: a dataclass whose fields have their names."""
+
+    def decorate(command: Command) -> Command:
+        @functools.wraps(command)
+        def collected(*args: Any, **given: Any) -> Any:
+            own = {field.name: given.pop(field.name) for field in dataclasses.fields(kind) if field.name in given}
+            return command(*args, **given, **{name: kind(**own)})
+
+        return apply(*options)(collected)
+
+    return decorate
+
+
+def _option(field: Field) -> Callable[[Command], Command]:
+    flag, missing = f"--{dashed(field.name)}", field.default is msgspec.NODEFAULT
+    default = None if missing else field.default
+    if field.type is bool:
+        return click.option(field.name, flag, is_flag=True, help=field.help, default=default)
+    kind: Any = click.Choice(field.choices) if field.choices else Declared(field)
+    metavar = SHORT.get(field.quantity) if field.quantity else METAVARS.get(field.name)
+    if metavar is None and not field.choices:
+        metavar = {float: "FLOAT", int: "INTEGER"}.get(field.type, "TEXT")
+    shown = default not in (None, (), "")
+    return click.option(
+        field.name, flag, help=field.help, metavar=metavar, default=default, required=missing, multiple=field.many,
+        type=kind, show_default=shown,
+    )  # fmt: skip
 
 
 def apply(*decorators: Callable[[Command], Command]) -> Callable[[Command], Command]:
@@ -66,17 +124,52 @@ def apply(*decorators: Callable[[Command], Command]) -> Callable[[Command], Comm
     return decorate
 
 
-source = click.argument("source", metavar="IN", type=click.Path(allow_dash=True))
-outputs = click.option(
-    "-o",
-    "--output",
-    "outputs",
-    metavar="OUT",
-    multiple=True,
-    type=click.Path(allow_dash=True),
-    help="File to write; its ending says the format (" + " ".join(f.endings[0] for f in FORMATS.values()) + "); "
-    "repeatable; - for standard output.",
-)
+@dataclass(frozen=True)
+class Reading:
+    """How a model is read; ``-`` is standard input."""
+
+    file: str
+    input_unit: str | None = None
+    encoding: str | None = None
+
+
+@dataclass(frozen=True)
+class Writing:
+    """How models are written; ``-`` is standard output."""
+
+    outputs: tuple[str, ...]
+    format: str
+    schema: str | None
+    chord: str
+    angle: float
+    ascii_stl: bool
+    verify: bool
+    overwrite: bool
+    if_changed: bool
+
+
+@dataclass(frozen=True)
+class Editing:
+    """What is written beside the models."""
+
+    report: str | None
+    depfile: str | None
+    dry_run: bool
+    as_json: bool
+    record: bool = False
+
+
+@dataclass(frozen=True)
+class Reports:
+    """Where a verdict is written."""
+
+    junit: str | None
+    sarif: str | None
+    overwrite: bool
+    as_json: bool
+
+
+path = click.Path()
 input_unit = click.option(
     "--input-unit",
     metavar="UNIT",
@@ -88,34 +181,11 @@ encoding = click.option(
     help="Character set of the file's texts: utf-8, gb18030, cp932, latin-1 …  [default: UTF-8 where that fits, else "
     "the most likely one]",
 )
-format = click.option(
-    "--format",
-    type=click.Choice(list(FORMATS)),
-    default="step",
-    show_default=True,
-    help="Format of what goes to standard output.",
-)
 schema = click.option(
     "--schema",
     type=click.Choice(["AP203", "AP214", "AP242"], case_sensitive=False),
     help="STEP schema to write.  [default: AP242 for a file in AP242, else AP214]",
 )
-chord = click.option(
-    "--chord",
-    metavar="LENGTH",
-    default="0.02%",
-    show_default=True,
-    help="Meshes: largest distance of triangles from the surface.",
-)
-angle = click.option(
-    "--angle",
-    type=float,
-    default=12.0,
-    show_default=True,
-    metavar="DEG",
-    help="Meshes: largest turn along a triangle's edge.",
-)
-ascii_stl = click.option("--ascii", "ascii_stl", is_flag=True, help="STL: write text instead of binary.")
 overwrite = click.option("--overwrite", is_flag=True, help="Replace an existing output.")
 if_changed = click.option(
     "--if-changed", is_flag=True, help="Replace an existing output only where its content changes, as make likes it."
@@ -125,34 +195,12 @@ verify = click.option(
     type=click.Choice(["on", "off"]),
     default="on",
     show_default=True,
+    callback=lambda ctx, param, value: value == "on",
     help="Read outputs back before they take their place, and judge them; off: write them as they come.",
 )
-as_json = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
-debug = click.option("--debug", is_flag=True, expose_value=False, help="Show the traceback of an error.")
-
-limiting = apply(
-    click.option(
-        "--time-limit",
-        metavar="TIME",
-        expose_value=False,
-        help="End the command after this time (90s, 10min): exit code 5.",
-    ),
-    click.option(
-        "--memory-limit", metavar="SIZE", expose_value=False, help="Memory that the command may hold: 500MB, 2GB."
-    ),
-)
-reading = apply(source, input_unit, encoding)
-writing = apply(outputs, format, schema, chord, angle, ascii_stl, verify, overwrite, if_changed)
-printing = apply(as_json, limiting, debug)
-reports = apply(
-    click.option("--junit", metavar="F.xml", type=click.Path(), help="Write the verdict as JUnit, a case a layer."),
-    click.option("--sarif", metavar="F.sarif", type=click.Path(), help="Write the findings as SARIF."),
-    click.option("--overwrite", is_flag=True, help="Replace existing reports."),
-)
-editing = apply(
-    click.option("--report", metavar="F.json", type=click.Path(), help="Write the full report (JSON) to a file."),
-    click.option("--depfile", metavar="F.d", type=click.Path(), help="Write what the outputs depend on, for make."),
-    click.option("--dry-run", is_flag=True, help="Say what would be done; write nothing but the report."),
+depfile = click.option("--depfile", metavar="F.d", type=path, help="Write what the outputs depend on, for make.")
+record = click.option(
+    "--record", is_flag=True, help="Write the recipe with all its options and versions beside the output (OUT.toml)."
 )
 assignments = click.option(
     "--set",
@@ -161,26 +209,93 @@ assignments = click.option(
     multiple=True,
     help="Set an option of a step, named by its id or its command; repeatable.",
 )
-record = click.option(
-    "--record", is_flag=True, help="Write the recipe with all its options and versions beside the output (OUT.toml)."
+
+
+def reading(metavar: str = "IN") -> Callable[[Command], Command]:
+    """The model that a command reads, as ``reading``."""
+    argument = click.argument("file", metavar=metavar, type=click.Path(allow_dash=True))
+    return gathered("reading", Reading, argument, input_unit, encoding)
+
+
+writing = gathered(
+    "writing",
+    Writing,
+    click.option(
+        "-o",
+        "--output",
+        "outputs",
+        metavar="OUT",
+        multiple=True,
+        type=click.Path(allow_dash=True),
+        help="File to write; its ending says the format (" + " ".join(f.endings[0] for f in FORMATS.values()) + "); "
+        "repeatable; - for standard output.",
+    ),
+    click.option(
+        "--format",
+        type=click.Choice(list(FORMATS)),
+        default="step",
+        show_default=True,
+        help="Format of what goes to standard output.",
+    ),
+    schema,
+    click.option(
+        "--chord",
+        type=Quantity(LENGTH),
+        default="0.02%",
+        show_default=True,
+        help="Meshes: largest distance of triangles from the surface.",
+    ),
+    click.option(
+        "--angle",
+        type=Quantity(ANGLE),
+        default=12.0,
+        show_default=True,
+        help="Meshes: largest turn along a triangle's edge.",
+    ),
+    click.option("--ascii", "ascii_stl", is_flag=True, help="STL: write text instead of binary."),
+    verify,
+    overwrite,
+    if_changed,
+)
+editing = gathered(
+    "editing",
+    Editing,
+    click.option("--report", metavar="F.json", type=path, help="Write the full report (JSON) to a file."),
+    depfile,
+    click.option("--dry-run", is_flag=True, help="Say what would be done; write nothing but the report."),
+)
+reports = gathered(
+    "reports",
+    Reports,
+    click.option("--junit", metavar="F.xml", type=path, help="Write the verdict as JUnit, a case a layer."),
+    click.option("--sarif", metavar="F.sarif", type=path, help="Write the findings as SARIF."),
+    click.option("--overwrite", is_flag=True, help="Replace existing reports."),
 )
 
 
-def limits(arguments: list[str]) -> tuple[float | None, int | None]:
-    """Seconds and bytes that ``--time-limit`` and ``--memory-limit`` allow: needed before the command itself runs."""
-    from mracad.job.guard import size
-
-    time, memory = (_given(arguments, flag) for flag in ("--time-limit", "--memory-limit"))
-    seconds = None if time is None else duration(time, "time-limit")
-    return seconds, None if memory is None else size(memory)
+def _kept(ctx: click.Context, param: click.Parameter, value: Any) -> None:
+    """Keep what decides how the command is run (see :mod:`mracad_cli.command`)."""
+    ctx.meta[f"mracad.{param.name}"] = value
 
 
-def _given(arguments: list[str], flag: str) -> str | None:
-    """The last value of an option."""
-    value = None
-    for i, word in enumerate(arguments):
-        if word == flag and i + 1 < len(arguments):
-            value = arguments[i + 1]
-        elif word.startswith(flag + "="):
-            value = word.partition("=")[2]
-    return value
+debug = click.option(
+    "--debug", is_flag=True, expose_value=False, callback=_kept, help="Show the traceback of an error."
+)
+printing = apply(
+    click.option("--json", "as_json", is_flag=True, help="Print the result as JSON."),
+    click.option(
+        "--time-limit",
+        type=Quantity(TIME),
+        expose_value=False,
+        callback=_kept,
+        help="End the command after this time (90s, 10min): exit code 5.",
+    ),
+    click.option(
+        "--memory-limit",
+        type=Quantity(MEMORY),
+        expose_value=False,
+        callback=_kept,
+        help="Memory that the command may hold: 500MB, 2GB.",
+    ),
+    debug,
+)

@@ -9,14 +9,16 @@ from typing import TYPE_CHECKING, Any
 import click
 from msgspec import structs
 
-from mracad.spec.steps import STEPS, Selection
+from mracad.spec.steps import STEPS, Options, Selection
 from mracad_cli import options
-from mracad_cli.files import Outputs, depfile_text, load, read
+from mracad_cli.command import Command
+from mracad_cli.options import Editing, Reading, Writing
+from mracad_cli.outputs import check_outputs, deliver_models, depfile_text, load, read
 from mracad_cli.progress import Progress
 
 if TYPE_CHECKING:
-    from mracad.job.document import Report
-    from mracad.job.judge import Judged
+    from mracad.job.produce import Production, Target
+    from mracad.occ.document import Document
     from mracad.spec.recipe import Recipe, Step
 
 
@@ -29,99 +31,97 @@ def edit_command(use: str) -> click.Command:
     """The command of an edit, from its declaration."""
     struct = STEPS[use]
 
-    @click.command(use, help=struct.__doc__)
-    @options.apply(options.reading, options.of(struct), options.writing, options.editing, options.printing)
-    def command(source: str, **given: Any) -> int:
-        from mracad.spec.recipe import Step
-        from mracad.spec.text import options as options_of
-
-        values = {name: given.pop(name) for name in struct.__struct_fields__}
-        return run_steps([Step(use, use, options_of(struct, values))], source, **given)
+    @click.command(use, cls=Command, help=struct.__doc__)
+    @options.apply(options.reading(), options.of(struct, "chosen"), options.writing, options.editing, options.printing)
+    def command(chosen: Options, **how: Any) -> int:
+        return run_edit(use, chosen, **how)
 
     return command
 
 
-def run_recipe(recipe: Recipe, source: str, *, assignments: tuple[str, ...] = (), **given: Any) -> int:
-    """Take one file through a recipe; see :mod:`mracad_cli.options` for the parameters."""
-    return run_steps(recipe.with_values(assignments).steps(source), source, recipe=recipe, **given)
+def run_edit(use: str, chosen: Options, reading: Reading, writing: Writing, editing: Editing) -> int:
+    """Do one edit on one file."""
+    from mracad.spec.recipe import Step
+
+    return run_steps([Step(use, use, chosen)], reading, writing, editing)
+
+
+def run_recipe(
+    recipe: Recipe, reading: Reading, writing: Writing, editing: Editing, assignments: Sequence[str] = ()
+) -> int:
+    """Take one file through a recipe."""
+    return run_steps(recipe.with_values(assignments).steps(reading.file), reading, writing, editing, recipe)
 
 
 def run_steps(
-    steps: Sequence[Step],
-    source: str,
-    *,
-    recipe: Recipe | None = None,
-    input_unit: str | None,
-    encoding: str | None,
-    outputs: tuple[str, ...],
-    report: str | None,
-    depfile: str | None,
-    record: bool = False,
-    dry_run: bool,
-    as_json: bool,
-    **formats: Any,
+    steps: Sequence[Step], reading: Reading, writing: Writing, editing: Editing, recipe: Recipe | None = None
 ) -> int:
     """Take one file through steps; without a recipe they are the one edit of a command."""
     from mracad.spec.recipe import record_of, title
-    from mracad_cli import render
+    from mracad_cli.render import json
 
     start = time.perf_counter()
-    places = [f"{path}.toml" for path in outputs if record and path != "-"]
-    targets = Outputs(outputs, needed=not dry_run, beside=(report, depfile, *places), **formats)
+    places = [f"{path}.toml" for path in writing.outputs if editing.record and path != "-"]
+    targets = check_outputs(writing, (editing.report, editing.depfile, *places), needed=not editing.dry_run)
     records = {place: record_of(steps, place) for place in places}
-    with Progress() as progress:
-        progress("reading", 0, 1)
-        text = load(source)
-        document = read(text, input_unit, encoding)
-        from mracad.job.produce import produce
-        from mracad.occ.files import read as read_again
-
-        done = produce(
-            document,
-            lambda: read_again(text, input_unit, encoding),
-            steps,
-            () if dry_run else targets.targets(),
-            title=title(steps),
-            verify=targets.verify,
-            progress=progress,
-        )
-    targets.take(done.made)
-    body = _body(document.name, steps, done.results, recipe)
-    body |= {"warnings": document.warnings, **targets.body()}
-    files: dict[str, str | None] = {report: render.json_text(body, 1) + "\n"} if report else {}
+    document, done = produced(reading, writing, [] if editing.dry_run else targets, steps, title(steps))
+    body = _body(document.name, steps, done, recipe) | {"warnings": document.warnings, **json.written(done.made)}
+    files: dict[str, str | None] = {editing.report: json.json_text(body, 1) + "\n"} if editing.report else {}
     if done.made:
         files |= records
-        needs = [source] * (source != "-") + needed(steps, recipe)
-        files |= {depfile: depfile_text(targets.files(), needs)} if depfile else {}
-    end = f"wrote {targets.sizes()}" if done.made else f"{'dry run, ' if dry_run else ''}nothing written"
-    end += "" if dry_run else f", {time.perf_counter() - start:.1f} s"
-    found = render.found(done.made)
-    if as_json:
-        lines = [render.json_text(body)]
-    elif recipe:
-        told = [
-            line for step, result in zip(steps, done.results, strict=False) for line in render.step_lines(step, result)
-        ]
-        lines = [*(plan(steps) if dry_run else []), *told, f"valid: {found.words}; {end}" if found else end]
-    else:
-        lines = render.edit_lines(done.results[0], steps[0].options, end, found)  # type: ignore[arg-type]  # it is an edit
-    targets.deliver(files, lines)
+        needs = [reading.file, *needed(steps, recipe)]
+        files |= {editing.depfile: depfile_text(writing.outputs, needs)} if editing.depfile else {}
+    seconds = None if editing.dry_run else time.perf_counter() - start
+    lines = [json.json_text(body)] if editing.as_json else _lines(steps, done, recipe, seconds)
+    deliver_models(writing, done.made, files, lines)
     return 0 if done.passed else 1
 
 
-def _body(
-    name: str, steps: Sequence[Step], results: Sequence[Report | Judged], recipe: Recipe | None
-) -> dict[str, Any]:
-    """The full report: that of an edit, or with a recipe that of each step."""
-    from mracad_cli import render
+def produced(
+    reading: Reading, writing: Writing, targets: Sequence[Target], steps: Sequence[Step], title: str
+) -> tuple[Document, Production]:
+    """A document, read, and what came of it."""
+    with Progress() as progress:
+        progress("reading", 0, 1)
+        text = load(reading.file)
+        document = read(reading, text)
+        from mracad.job.produce import produce
+        from mracad.occ.files import read as read_again
 
-    parts = [
-        {**render.result(result), "options": structs.asdict(step.options)}
-        for step, result in zip(steps, results, strict=False)
-    ]
+        return document, produce(
+            document,
+            lambda: read_again(text, reading.input_unit, reading.encoding),
+            steps,
+            targets,
+            title=title,
+            verify=writing.verify,
+            progress=progress,
+        )
+
+
+def _lines(steps: Sequence[Step], done: Production, recipe: Recipe | None, seconds: float | None) -> list[str]:
+    """What is said of steps; ``seconds`` is None for a dry run."""
+    from mracad_cli.render import text
+
+    end = f"wrote {text.sizes(done.made)}" if done.made else "dry run, nothing written"
+    if seconds is not None:
+        end = f"{end if done.made else 'nothing written'}, {seconds:.1f} s"
+    found = text.found(done.made)
+    if not recipe:
+        return text.edit_lines(done.results[0], steps[0].options, end, found)  # type: ignore[arg-type]  # it is an edit
+    told = [line for step, result in zip(steps, done.results, strict=False) for line in text.step_lines(step, result)]
+    return [*(plan(steps) if seconds is None else []), *told, f"valid: {found.words}; {end}" if found else end]
+
+
+def _body(name: str, steps: Sequence[Step], done: Production, recipe: Recipe | None) -> dict[str, Any]:
+    """The full report: that of an edit, or with a recipe that of each step."""
+    from mracad_cli.render import json
+
+    each = list(zip(steps, done.results, strict=False))
+    parts = [{**json.result(result), "options": structs.asdict(step.options)} for step, result in each]
     if not recipe:
         return parts[0]
-    named = [{"step": s.id, "use": s.use, **part} for s, part in zip(steps, parts, strict=False)]
+    named = [{"step": step.id, "use": step.use, **part} for (step, _), part in zip(each, parts, strict=True)]
     return {"file": name, "steps": named}
 
 

@@ -12,6 +12,12 @@ def words(finding: Finding) -> str:
     return _SENTENCES.get(finding.rule, _failure)(finding)
 
 
+def placed(finding: Finding) -> str:
+    """The same with its place."""
+    at = "" if finding.where is None else " at " + " ".join(f"{x:.6g}" for x in finding.where)
+    return words(finding) + at
+
+
 def _faces(faces: Sequence[int]) -> str:
     return " and ".join(f"#{face + 1}" for face in dict.fromkeys(faces))
 

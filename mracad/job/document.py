@@ -63,6 +63,16 @@ class Report:
     tolerances: Tolerances
     seconds: float
 
+    @property
+    def control_points(self) -> tuple[int, int]:
+        """Control points of all NURBS faces before and after."""
+        before = after = 0
+        for surface in self.model.surfaces:
+            net, offset = surface.net, self.edit.displacement.offsets.get(surface.index)
+            before += net.u.count * net.v.count
+            after += net.u.count * net.v.count if offset is None else offset.poles.shape[0] * offset.poles.shape[1]
+        return before, after
+
     def gaps(self) -> dict[tuple[int, ...], float]:
         """How wide seams may gape of faces that moved, each by itself or to a tolerance, mm, by their faces."""
         return gaps(self.model, self.before, self.edit, self.tolerances)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import ctypes
 import os
-import re
 import select
 import signal
 import sys
@@ -21,17 +20,7 @@ Result = TypeVar("Result")
 
 _GRACE = 1.0  # seconds for a child to put its files in order once its time is over
 _ENDING = 10.0  # seconds more for one whose files are already taking their places
-_SIZES = {"": 1, "k": 1e3, "m": 1e6, "g": 1e9, "ki": 2**10, "mi": 2**20, "gi": 2**30}
 _DEATH_SIGNAL = 1  # PR_SET_PDEATHSIG
-
-
-def size(text: str) -> int:
-    """Bytes from ``"500MB"``, ``"2G"`` or ``"1.5GiB"``; raises UsageError."""
-    match = re.fullmatch(r"(\d+\.?\d*)\s*([kmg]i?|)b?", text.strip().lower())
-    found = float(match[1]) * _SIZES[match[2]] if match else 0.0
-    if not 1 <= found < 2**60:
-        raise UsageError(f"memory-limit: {text!r} is not an amount of memory", "write it as 500MB or 2GB")
-    return int(found)
 
 
 class TimeLimitError(LimitError):

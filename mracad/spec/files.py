@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-import typing
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache
-from typing import Annotated, Any
-
-from msgspec import Struct
+from typing import Annotated
 
 
 @dataclass(frozen=True)
@@ -42,15 +38,3 @@ CountText = Annotated[str, Naming(or_number=True)]
 
 PlaceText = Annotated[str, Naming(prefix="@")]
 """The type of a field that is a place, or names a file of places."""
-
-
-@cache
-def namings(struct: type[Struct]) -> dict[str, Naming]:
-    """The fields of a struct that name files, and how."""
-    hints = typing.get_type_hints(struct, include_extras=True)
-    found = ((name, _naming(hints[name])) for name in struct.__struct_fields__)
-    return {name: naming for name, naming in found if naming}
-
-
-def _naming(hint: Any) -> Naming | None:
-    return hint if isinstance(hint, Naming) else next(filter(None, map(_naming, typing.get_args(hint))), None)

@@ -1,9 +1,11 @@
-"""Lengths, times and bands of wavelengths as texts: their units, and what reads them."""
+"""Quantities as texts: one table of units and one parser for lengths, times, amounts of memory, angles and shares."""
 
 from __future__ import annotations
 
 import math
 import re
+from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Annotated
 
 from msgspec import Meta
@@ -13,7 +15,99 @@ from mracad.errors import UsageError
 MILLIMETRES = {"um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4, "ft": 304.8, "yd": 914.4, "mi": 1609344.0}
 """Length units by name, in millimetres."""
 
-_QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([a-zA-Z]*|%)\s*")
+NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+"""A number in a text, as a regular expression."""
+
+_QUANTITY = re.compile(rf"\s*({NUMBER})\s*([a-zA-Z]*|%|°)\s*")
+
+
+@dataclass(frozen=True, eq=False)
+class Kind:
+    """A kind of quantity.
+
+    Attributes
+    ----------
+    noun : str
+        What it is in messages, as ``"a length"``.
+    example : str
+        How to write it.
+    units : mapping
+        What each unit is worth; ``""`` stands for a number alone.
+    positive : bool
+        Whether it must be greater than zero.
+    most : float
+        The largest value.
+    folded : bool
+        Whether units may be in small or capital letters.
+    """
+
+    noun: str
+    example: str
+    units: Mapping[str, float]
+    positive: bool = True
+    most: float = 1e300
+    folded: bool = False
+
+    def read(self, text: str, name: str, percent: float | None = None) -> float:
+        """The value of a text in the unit that counts 1.
+
+        Parameters
+        ----------
+        text : str
+        name : str
+            Of the option, for messages.
+        percent : float, optional
+            What one hundredth of the whole is worth: then ``%`` is a unit, too.
+
+        Raises
+        ------
+        UsageError
+            For another text, and for a value out of bounds.
+        """
+        units = self.units if percent is None else {**self.units, "%": percent}
+        match = _QUANTITY.fullmatch(text)
+        unit = "" if match is None else match[2].lower() if self.folded else match[2]
+        hint = f"write {name} as {self.example}"
+        value = float(match[1]) * units[unit] if match and unit in units else math.nan
+        if not abs(value) <= self.most:
+            raise UsageError(f"{name}: {text!r} is not {self.noun}", hint)
+        if self.positive and not value > 0:
+            raise UsageError(f"{name}: {text!r} is not greater than zero", hint)
+        return value
+
+
+LENGTH = Kind("a length", "5mm, 0.2in or 2% (of the model's diagonal)", {"": 1.0, **MILLIMETRES})
+TIME = Kind("a time", "90s, 10min or 2h", {"": 1.0, "s": 1.0, "min": 60.0, "h": 3600.0}, most=1e8)
+"""In seconds, up to three years."""
+_BYTES = {"": 1.0, "k": 1e3, "m": 1e6, "g": 1e9, "ki": 2.0**10, "mi": 2.0**20, "gi": 2.0**30}
+MEMORY = Kind(
+    "an amount of memory",
+    "500MB or 2GB",
+    {**_BYTES, **{f"{unit}b": factor for unit, factor in _BYTES.items()}},
+    most=2.0**60,
+    folded=True,
+)
+"""In bytes."""
+ANGLE = Kind("an angle", "0.5 or 0.5deg", {"": 1.0, "deg": 1.0, "°": 1.0, "rad": math.degrees(1.0)}, positive=False)
+"""In degrees."""
+SHARE = Kind("a percentage", "1%", {"": 1.0, "%": 1.0}, positive=False)
+"""In hundredths."""
+
+Length = Annotated[
+    str,
+    LENGTH,
+    Meta(extra_json_schema={"pattern": rf"^\s*\+?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?\s*({'|'.join(MILLIMETRES)}|%)?\s*$"}),
+]
+"""The type of a field that :func:`length` reads; it stays a text, for it may be a share of the model."""
+
+Angle = Annotated[float, ANGLE]
+"""The type of a field that is an angle, degrees."""
+
+Time = Annotated[float, TIME]
+"""The type of a field that is a time, seconds."""
+
+Share = Annotated[float, SHARE]
+"""The type of a field that is a share of a hundred."""
 
 
 def length(text: str, diagonal: float, name: str) -> float:
@@ -24,39 +118,7 @@ def length(text: str, diagonal: float, name: str) -> float:
     UsageError
         When it is not a positive finite length.
     """
-    match = _QUANTITY.fullmatch(str(text))
-    hint = f"write {name} as 5mm, 0.2in or 2% (of the model's diagonal)"
-    if not match or (match[2] not in {"", "%"} and match[2] not in MILLIMETRES):
-        raise UsageError(f"{name}: {text!r} is not a length", hint)
-    value = float(match[1]) * (diagonal / 100 if match[2] == "%" else MILLIMETRES[match[2] or "mm"])
-    if not (math.isfinite(value) and value > 0):
-        raise UsageError(f"{name}: {text!r} is not greater than zero", hint)
-    return value
-
-
-SECONDS = {"s": 1.0, "min": 60.0, "h": 3600.0}
-"""Units of time by name, in seconds."""
-
-
-LONGEST = 1e8
-"""The longest time that can be given, in seconds: three years."""
-
-
-def duration(text: str, name: str) -> float:
-    """Seconds from ``"90"``, ``"90s"``, ``"10min"`` or ``"2h"``; raises UsageError."""
-    match = _QUANTITY.fullmatch(text)
-    units = {"": 1.0, **SECONDS}
-    found = float(match[1]) * units.get(match[2], 0.0) if match else 0.0
-    if not 0 < found <= LONGEST:
-        raise UsageError(f"{name}: {text!r} is not a time", "write it as 90s, 10min or 2h")
-    return found
-
-
-Length = Annotated[
-    str,
-    Meta(extra_json_schema={"pattern": rf"^\s*\+?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?\s*({'|'.join(MILLIMETRES)}|%)?\s*$"}),
-]
-"""The type of a field that :func:`length` reads."""
+    return LENGTH.read(text, name, diagonal / 100)
 
 
 def band_of(text: str, diagonal: float) -> tuple[float, float]:

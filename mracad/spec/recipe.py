@@ -17,7 +17,6 @@ from __future__ import annotations
 import os
 import re
 import shlex
-import typing
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
@@ -27,9 +26,9 @@ from typing import Any
 from msgspec import structs
 
 from mracad.errors import FileError, UsageError
+from mracad.spec.fields import dashed, fields, named, nearest
 from mracad.spec.steps import STEPS, Options
-from mracad.spec.steps.base import dashed, plain_types
-from mracad.spec.text import braced, filled, nearest, options, place_of, places_of_steps, toml, toml_value
+from mracad.spec.text import braced, filled, options, place_of, places_of_steps, toml, toml_value
 from mracad.version import __version__
 
 OWN = ("use", "id")
@@ -246,21 +245,21 @@ def _table(words: list[str], place: str) -> _Table:
         raise UsageError(f"pipeline, {place}: the step is empty", "write steps as 'smooth --scale 5mm ! check'")
     use, *rest = words
     values: dict[str, Any] = {"use": use}
-    kinds = plain_types(STEPS[use]) if use in STEPS else {}
+    known = fields(STEPS[use]) if use in STEPS else {}
     while rest:
         flag, equals, value = rest.pop(0).partition("=")
         if not flag.startswith("--"):
             raise UsageError(f"pipeline, {place}: {flag!r} is not an option", f"see mracad {use} --help")
         key = dashed(flag[2:])
-        kind = kinds.get(key.replace("-", "_"))
-        if kind is bool and not equals:
+        field = named(known, key)
+        if field and field.type is bool and not equals:
             values[key] = True
             continue
         if not equals:
             if not rest:
                 raise UsageError(f"pipeline, {place}: {flag} needs a value", f"see mracad {use} --help")
             value = rest.pop(0)
-        values[key] = [*values.get(key, []), value] if typing.get_origin(kind) is tuple else value
+        values[key] = [*values.get(key, []), value] if field and field.many else value
     return _Table(values, {"": f"pipeline, {place}"})
 
 

@@ -7,9 +7,10 @@ from typing import Any
 
 import msgspec
 
+from mracad.spec.fields import dashed, fields
+from mracad.spec.quantity import Kind
 from mracad.spec.recipe import OWN
 from mracad.spec.steps import STEPS, Options
-from mracad.spec.steps.base import dashed, lengths
 
 
 def schema() -> dict[str, Any]:
@@ -38,7 +39,9 @@ def _step_schema(use: str, struct: type[Options]) -> dict[str, Any]:
         "id": {"type": "string", "description": "The step's name, for --set and reports."},
     }
     body = msgspec.json.schema(struct)["$defs"][struct.__name__]
-    properties = {dashed(name): _property(part, name in lengths(struct)) for name, part in body["properties"].items()}
+    properties = {
+        dashed(name): _property(part, fields(struct)[name].quantity) for name, part in body["properties"].items()
+    }
     return {
         "description": body["description"],
         "type": "object",
@@ -48,12 +51,12 @@ def _step_schema(use: str, struct: type[Options]) -> dict[str, Any]:
     }
 
 
-def _property(part: dict[str, Any], is_length: bool) -> dict[str, Any]:
-    """An option's schema: without null, which TOML lacks; a length may be a number, a list one text."""
+def _property(part: dict[str, Any], quantity: Kind | None) -> dict[str, Any]:
+    """An option's schema: without null, which TOML lacks; a quantity may be a number or a text, a list one text."""
     kinds = [kind for kind in part.get("anyOf", []) if kind != {"type": "null"}]
     found = {key: value for key, value in part.items() if key != "anyOf" and value is not None}
     found |= kinds[0] if len(kinds) == 1 else {"anyOf": kinds} if kinds else {}
-    if is_length:
+    if quantity:
         found["type"] = ["string", "number"]
     elif found.get("type") == "array":
         extra = {key: found.pop(key) for key in ("type", "items")}

@@ -5,15 +5,14 @@ from __future__ import annotations
 import json
 import math
 import re
-import typing
-from collections.abc import Callable, Iterable, Mapping
-from typing import Any, Literal, TypeVar
+from collections.abc import Callable, Mapping
+from typing import Any, TypeVar
 
 import msgspec
 
 from mracad.errors import UsageError
+from mracad.spec.fields import dashed, fields, named, nearest
 from mracad.spec.steps import Options
-from mracad.spec.steps.base import dashed, lengths, plain_types
 
 Given = TypeVar("Given", bound=Options)
 
@@ -34,50 +33,22 @@ def options(struct: type[Given], values: Mapping[str, Any], place: Callable[[str
     UsageError
         For a value that an option does not take.
     """
-    kinds, in_mm = plain_types(struct), lengths(struct)
-    plain: dict[str, Any] = {}
-    for key, value in values.items():
-        name = key.replace("-", "_")
-        name = f"{name}_" if f"{name}_" in kinds else name
-        if typing.get_origin(kinds.get(name)) is tuple and isinstance(value, str):
-            value = [value]
-        elif name in in_mm and isinstance(value, int | float) and not isinstance(value, bool):
-            value = str(value)
-        plain[name] = value
+    known, plain = fields(struct), {}
     try:
-        return msgspec.convert(plain, struct, strict=False)
-    except msgspec.ValidationError as error:
-        where = re.search(r"`\$\.(\w+)", str(error))
-        cause = error.__cause__ if isinstance(error.__cause__, UsageError) else None
-        name = where[1] if where else cause.message.partition(":")[0].replace("-", "_") if cause else ""
-        at = f"{place(dashed(name))}: " if place else ""
-        if cause:
-            raise UsageError(f"{at}{cause.message}", cause.hint) from error
-        raise _refused(at, struct, name, plain.get(name), kinds.get(name), str(error)) from error
-
-
-def _refused(at: str, struct: type[Options], name: str, value: Any, kind: Any, reason: str) -> UsageError:
-    """The error for a value that is not of its option's type."""
-    if typing.get_origin(kind) is tuple:
-        kind = typing.get_args(kind)[0]
-    if typing.get_origin(kind) is Literal:
-        choices = [str(choice) for choice in typing.get_args(kind)]
-        wrong = next((v for v in (value if isinstance(value, list) else [value]) if v not in choices), value)
-        hint = nearest(str(wrong), choices, "use one of " + ", ".join(choices))
-        return UsageError(f"{at}{dashed(name)}: {wrong!r} is not known", hint)
-    said = reason.split(" - at")[0].replace("`", "").replace(" | null", "").lower()
-    return UsageError(
-        f"{at}{dashed(name)}: {value!r} is not right, {said}", f"see mracad {struct.__name__.lower()} --help"
-    )
-
-
-def nearest(word: str, known: Iterable[str], otherwise: str = "") -> str:
-    """``did you mean 'scale'?``, or what else to do."""
-    import difflib
-
-    names = list(known)
-    near = difflib.get_close_matches(word, names, n=1)
-    return f"did you mean {near[0]!r}?" if near else otherwise or "use one of " + ", ".join(names)
+        for key, value in values.items():
+            field = named(known, key)
+            if field is None:
+                hint = nearest(key, map(dashed, known))
+                raise UsageError(f"{key}: {struct.__name__} has no such option", hint)
+            plain[field.name] = field.read(value)
+        for name, field in known.items():
+            if field.default is msgspec.NODEFAULT and name not in plain:
+                raise UsageError(f"{dashed(name)}: it is missing", f"give --{dashed(name)}")
+        return struct(**plain)
+    except UsageError as error:
+        if not place:
+            raise
+        raise UsageError(f"{place(error.message.partition(':')[0])}: {error.message}", error.hint) from error
 
 
 def filled(value: Any, variables: Mapping[str, str], place: str) -> Any:

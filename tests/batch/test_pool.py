@@ -9,7 +9,8 @@ import time
 import pytest
 
 from mracad.errors import CrashError, LimitError, UsageError
-from mracad.job.batch.pool import Limits, Pool
+from mracad.job.batch.pool import Pool
+from mracad.job.batch.settings import Limits
 from mracad.job.batch.work import Product
 from tests.batch.tasks import MB, made, work
 

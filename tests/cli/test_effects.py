@@ -283,7 +283,7 @@ def test_an_option_has_an_effect(case, first, mracad, folder, tmp_path, monkeypa
     if not (first or pytestconfig.getoption("--long")):
         pytest.skip("declared once for several commands: pytest --long tries it on each")
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("mracad_cli.batches.Pool", declared.Here)
+    monkeypatch.setattr("mracad.job.batch.pool.Pool", declared.Here)
     base, changed, old = words(case)
     without = once(mracad, folder, tmp_path / "without", base, old)
     given = observed(mracad, folder, tmp_path / "with", changed, old)

@@ -6,7 +6,7 @@ from importlib import import_module
 
 import pytest
 
-from mracad.job import guard
+from mracad import note
 from mracad.occ.step import write_step
 from tests.edit import panels
 
@@ -36,7 +36,7 @@ def test_a_time_limit_names_the_phase(place, phase, mracad, panel, tmp_path, mon
 
 def test_every_phase_of_an_edit_is_noted_in_its_turn(mracad, panel, tmp_path, monkeypatch):
     noted = []
-    monkeypatch.setattr(guard, "doing", lambda stage="", subject="": stage in noted or noted.append(stage))
+    monkeypatch.setattr(note, "doing", lambda stage="", subject="": stage in noted or noted.append(stage))
     assert mracad("smooth", panel, "--scale", "60mm", "-o", tmp_path / "out.step").code == 0
     phases = [
         "reading",
@@ -54,6 +54,6 @@ def test_every_phase_of_an_edit_is_noted_in_its_turn(mracad, panel, tmp_path, mo
 
 def test_every_phase_of_info_is_noted_in_its_turn(mracad, panel, monkeypatch):
     noted = []
-    monkeypatch.setattr(guard, "doing", lambda stage="", subject="": stage in noted or noted.append(stage))
+    monkeypatch.setattr(note, "doing", lambda stage="", subject="": stage in noted or noted.append(stage))
     assert mracad("info", panel).code == 0
     assert noted == ["reading", "looking at faces", "looking at scales", "measuring seams", "checking"]

@@ -4,7 +4,7 @@ import json
 
 import msgspec
 import pytest
-from mracad_cli import render, verdicts
+from mracad_cli.render import json as render
 from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
 
 from mracad.edit.smooth import smooth
@@ -53,7 +53,7 @@ def test_a_comparison_is_plain_data(panels, samples, tmp_path):
     for ref, new in pairs:
         judged = compare.compare(new, strict, lambda ref=ref: ref)
         assert odd(raw(judged.verdict)) == []
-        body = verdicts.as_data(judged.verdict, judged.failed)
+        body = render.verdict(judged.verdict, judged.failed)
         assert odd(body) == [] and json.loads(json.dumps(body, allow_nan=True))
         assert all(words(finding) for layer in judged.verdict.layers for finding in (*layer.findings, *layer.notes))
 
@@ -63,7 +63,7 @@ def test_a_check_is_plain_data(panels, samples):
     strict = Check(max_gap="1e-12mm", max_angle=1e-12, max_tolerance="1e-12mm", expect="99", min_wall="1m")
     judged = check.check(panels[1], strict, text=text)
     assert {"shells", "seams", "tolerances"} <= {layer.name for layer in judged.verdict.layers if layer.findings}
-    assert odd(raw(judged.verdict)) == [] and odd(verdicts.as_data(judged.verdict, judged.failed)) == []
+    assert odd(raw(judged.verdict)) == [] and odd(render.verdict(judged.verdict, judged.failed)) == []
 
 
 def test_an_edit_is_plain_data(panels):

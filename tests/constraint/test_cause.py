@@ -3,7 +3,8 @@
 import json
 
 import pytest
-from mracad_cli.render import edge_words, treatment
+from mracad_cli.render.json import treatment
+from mracad_cli.render.text import edge_words
 
 from mracad.constraint.cause import Cause, Still
 from mracad.constraint.seam import Treatment

@@ -1,14 +1,13 @@
 """Surfaces of higher degree: the same in memory and in the file, and what moves is what was asked."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
-from mracad_cli.render import control_points
 
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
+from mracad.edit.result import Edit
 from mracad.errors import UsageError
+from mracad.job.document import Report
 from mracad.model.displacement import Displacement, Offset
 from mracad.occ.apply import apply, restore
 from mracad.occ.check import check
@@ -211,9 +210,9 @@ def test_offsets_keep_their_degrees_and_are_counted():
     assert change.scaled(0.5).offsets[0].degrees == (4, 5)
     net = model.surfaces[0].net
     assert Offset(np.zeros(net.poles.shape), degrees=(2, 1)).over(net) is net
-    report = SimpleNamespace(model=model, edit=SimpleNamespace(displacement=change))
+    report = Report(model, Edit(change, ()), [], [], [], *[None] * 3, 0.0)
     # six spans of degree 3 and one of 1 become degrees 4 and 5 with a knot more each way
-    assert control_points(report) == (9 * 2, (5 + 5 * 2 + 1) * (6 + 1))
+    assert report.control_points == (9 * 2, (5 + 5 * 2 + 1) * (6 + 1))
 
 
 def test_a_degree_beyond_the_kernel_is_refused_before_anything_moves():

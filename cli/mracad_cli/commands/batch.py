@@ -6,30 +6,88 @@ its worker, hangs or takes too much memory fails alone. Exit code 1 when any fil
 
 from __future__ import annotations
 
-from typing import Any
+import os
+import sys
+import time
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from contextlib import closing, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 
+from mracad.errors import Code, MracadError
 from mracad.formats import FORMATS
+from mracad.job.batch.settings import Limits, Settings
+from mracad.spec.quantity import MEMORY, TIME
 from mracad_cli import options
+from mracad_cli.command import Unguarded
+from mracad_cli.outputs import check_reports, deliver, depfile_text
+from mracad_cli.progress import Progress
+from mracad_cli.steps import needed, plan
+
+if TYPE_CHECKING:
+    from mracad.job.batch.find import Item
+    from mracad.job.batch.run import Outcome, Workers
+    from mracad.spec.recipe import Recipe
 
 
-@click.command(help=__doc__)
-@click.argument("recipe", metavar="RECIPE", type=click.Path())
-@click.argument("sources", metavar="IN...", nargs=-1, required=True)
-@options.apply(
-    click.option("-O", "--folder", metavar="DIR", required=True, type=click.Path(), help="Folder to write into."),
-    options.assignments,
+@dataclass(frozen=True)
+class Place:
+    """Where files are put, and where the work is done."""
+
+    folder: str
+    format: str | None
+    jobs: int | None
+    cluster: str | None
+    time_limit: float
+    memory_limit: float | None
+
+
+@dataclass(frozen=True)
+class Reports:
+    """What is said, and what is written beside the outputs."""
+
+    report: str | None
+    junit: str | None
+    depfile: str | None
+    dry_run: bool
+    as_json: bool
+
+
+_placing = options.gathered(
+    "place",
+    Place,
+    click.option("-O", "--folder", metavar="DIR", required=True, type=options.path, help="Folder to write into."),
     click.option("-j", "--jobs", type=click.IntRange(min=1), metavar="N", help="Workers.  [default: one a core]"),
     click.option(
         "--cluster",
         metavar="ADDRESS",
         help="Work on a Dask cluster: tcp://HOST:8786, or local to start one here. Needs mracad[cluster].",
     ),
-    click.option("--time-limit", metavar="TIME", default="10min", show_default=True, help="For each file: 90s, 2h."),
     click.option(
-        "--memory-limit", metavar="SIZE", help="For each worker: 500MB, 2GB.  [default: its share of the machine]"
+        "--time-limit",
+        type=options.Quantity(TIME),
+        default="10min",
+        show_default=True,
+        help="For each file: 90s, 2h.",
     ),
+    click.option(
+        "--memory-limit",
+        type=options.Quantity(MEMORY),
+        help="For each worker: 500MB, 2GB.  [default: its share of the machine]",
+    ),
+    click.option(
+        "--format",
+        type=click.Choice(list(FORMATS)),
+        help="Format of the outputs, and their ending.  [default: that of each input]",
+    ),
+)
+_settings = options.gathered(
+    "settings",
+    Settings,
     click.option(
         "--keep-going/--fail-fast", default=True, show_default=True, help="What to do after a file has failed."
     ),
@@ -43,25 +101,124 @@ from mracad_cli import options
     ),
     options.input_unit,
     options.encoding,
-    click.option(
-        "--format",
-        type=click.Choice(list(FORMATS)),
-        help="Format of the outputs, and their ending.  [default: that of each input]",
-    ),
     options.schema,
     options.verify,
     options.overwrite,
     options.if_changed,
     options.record,
-    click.option("--report", metavar="F.json", type=click.Path(), help="Write the summary as JSON."),
-    click.option("--junit", metavar="F.xml", type=click.Path(), help="Write the summary as JUnit XML, for CI."),
-    click.option("--depfile", metavar="F.d", type=click.Path(), help="Write what the outputs depend on, for make."),
+)
+_reports = options.gathered(
+    "reports",
+    Reports,
+    click.option("--report", metavar="F.json", type=options.path, help="Write the summary as JSON."),
+    click.option("--junit", metavar="F.xml", type=options.path, help="Write the summary as JUnit XML, for CI."),
+    options.depfile,
     click.option("--dry-run", is_flag=True, help="List the steps and the files; do nothing."),
     click.option("--json", "as_json", is_flag=True, help="Print each result as a JSON line when it is there."),
-    options.debug,
 )
-def command(recipe: str, sources: tuple[str, ...], assignments: tuple[str, ...], **given: Any) -> int:
-    from mracad.spec.recipe import load
-    from mracad_cli.batches import run_batch
 
-    return run_batch(load(recipe).with_values(assignments), sources, **given)
+
+@click.command(cls=Unguarded, help=__doc__)
+@click.argument("recipe", metavar="RECIPE", type=options.path)
+@click.argument("sources", metavar="IN...", nargs=-1, required=True)
+@options.apply(_placing, options.assignments, _settings, _reports, options.debug)
+def command(
+    recipe: str, sources: Sequence[str], assignments: Sequence[str], place: Place, settings: Settings, reports: Reports
+) -> int:
+    from mracad.job.batch.find import find
+    from mracad.spec.recipe import load
+    from mracad_cli.render.json import json_text
+
+    steps = load(recipe).with_values(assignments)
+    steps.steps("model.step")  # what is wrong in it is said before anything is read
+    check_reports(reports.report, reports.junit, reports.depfile, overwrite=True)
+    words = [word for given in sources for word in (_listed() if given == "-" else [given])]
+    items = find(words, Path(place.folder), place.format or "")
+    if not reports.dry_run:
+        return _run(steps, items, place, settings, reports)
+    listed = {item.source: str(Path(place.folder, item.output)) for item in items}
+    planned = plan(steps.steps(items[0].source))
+    lines = [*planned, *(f"{source} -> {output}" for source, output in listed.items())]
+    deliver({}, [json_text({"plan": planned, "files": listed})] if reports.as_json else lines)
+    return 0
+
+
+def _listed() -> list[str]:
+    """The lines of standard input."""
+    return [os.fsdecode(line) for line in sys.stdin.buffer.read().splitlines() if line]
+
+
+def _run(recipe: Recipe, items: Sequence[Item], place: Place, settings: Settings, reports: Reports) -> int:
+    """Do a batch, say what becomes of each file, and at the end of all."""
+    from mracad_cli.render import json, junit, text
+
+    start = time.perf_counter()
+    outcomes = _outcomes(recipe, items, place, settings, reports.as_json)
+    seconds = time.perf_counter() - start
+    order = {item.output: number for number, item in enumerate(items)}
+    outcomes.sort(key=lambda outcome: order[outcome.output])
+    counts: Counter[str] = Counter(outcome.status for outcome in outcomes)
+    body: dict[str, Any] = {"recipe": recipe.name, "files": len(items), **counts, "seconds": seconds}
+    files: dict[str, str] = {}
+    if reports.report:
+        files[reports.report] = json.json_text({**body, "each": json.plain(outcomes)}, 1) + "\n"
+    if reports.junit:
+        files[reports.junit] = junit.batch(recipe.name, outcomes, seconds)
+    if reports.depfile:
+        files[reports.depfile] = _depfile(recipe, items, Path(place.folder))
+    said = [json.json_text({"summary": body})] if reports.as_json else text.batch_lines(outcomes, seconds)
+    deliver(files, said)
+    return 1 if counts["failed"] else 0
+
+
+def _outcomes(recipe: Recipe, items: Sequence[Item], place: Place, settings: Settings, as_json: bool) -> list[Outcome]:
+    """What became of the files, in the order in which they were done."""
+    from mracad.job.batch.manifest import Manifest
+    from mracad.job.batch.run import run
+    from mracad_cli.render.json import json_text, plain
+    from mracad_cli.render.text import say
+
+    outcomes: list[Outcome] = []
+    failed = 0
+    with (
+        Manifest(Path(place.folder)) as manifest,
+        _workers(place, len(items)) as executor,
+        closing(run(recipe, items, manifest, executor, settings)) as results,
+        Progress(rate=True) as progress,
+    ):
+        try:
+            progress(recipe.name, 0, len(items))
+            for outcome in results:
+                outcomes.append(outcome)
+                for warning in outcome.warnings:
+                    say(f"warning: {outcome.file}: {warning}", file=sys.stderr)
+                if as_json and outcome.status != "not tried":
+                    say(json_text(plain(outcome)))
+                    sys.stdout.flush()
+                failed += outcome.status == "failed"
+                progress(f"{recipe.name}, {failed} failed" if failed else recipe.name, len(outcomes), len(items))
+        except KeyboardInterrupt:
+            said = f"interrupted after {len(outcomes)} of {len(items)} files"
+            raise MracadError(said, "run it again to go on", Code.INTERRUPTED) from None
+    return outcomes
+
+
+@contextmanager
+def _workers(place: Place, files: int) -> Iterator[Workers]:
+    """The executor of a batch."""
+    from mracad.job.batch.cluster import Cluster
+    from mracad.job.batch.pool import Pool
+    from mracad.job.batch.work import warm
+
+    workers = min(place.jobs or os.cpu_count() or 1, files)
+    limits = Limits(place.time_limit, int(place.memory_limit or 0))
+    with Cluster(place.cluster, limits, workers) if place.cluster else Pool(workers, limits, warm) as executor:
+        yield executor
+
+
+def _depfile(recipe: Recipe, items: Sequence[Item], folder: Path) -> str:
+    """A rule for make for each output."""
+    return "".join(
+        depfile_text([str(folder / item.output)], [item.source, *needed(recipe.steps(item.source), recipe)])
+        for item in items
+    )

@@ -6,39 +6,26 @@ cross, tolerances, walls, the mesh. Valid is yes, no or unknown, never a guess.
 
 from __future__ import annotations
 
-from typing import Any
-
 import click
 
 from mracad.spec.steps import Check
 from mracad_cli import options
+from mracad_cli.command import Command
+from mracad_cli.options import Reading, Reports
+from mracad_cli.outputs import check_reports, deliver_verdict, load, read
 from mracad_cli.progress import Progress
 
 
-@click.command(help=__doc__)
-@options.apply(options.reading, options.of(Check), options.reports, options.printing)
-def command(
-    source: str,
-    input_unit: str | None,
-    encoding: str | None,
-    junit: str | None,
-    sarif: str | None,
-    overwrite: bool,
-    as_json: bool,
-    **given: Any,
-) -> int:
-    from mracad.spec.text import options as options_of
-    from mracad_cli.files import check_reports, load, read
-
-    check_reports(junit, sarif, overwrite=overwrite)
-    limits = options_of(Check, given)
+@click.command(cls=Command, help=__doc__)
+@options.apply(options.reading(), options.of(Check, "limits"), options.reports, options.printing)
+def command(reading: Reading, limits: Check, reports: Reports) -> int:
+    check_reports(reports.junit, reports.sarif, overwrite=reports.overwrite)
     from mracad.job import check
-    from mracad_cli.verdicts import emit
 
     with Progress() as progress:
         progress("reading", 0, 1)
-        text = load(source)
-        document = read(text, input_unit, encoding)
+        text = load(reading.file)
+        document = read(reading, text)
         progress("checking", 0, 1)
         judged = check.check(document, limits, text=text.getvalue())
-    return emit(judged.verdict, judged.failed, command="check", as_json=as_json, junit=junit, sarif=sarif)
+    return deliver_verdict(judged, "check", reports)

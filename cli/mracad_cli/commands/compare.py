@@ -6,48 +6,31 @@ became longer or shorter, its outline has moved. Lengths are compared in millime
 
 from __future__ import annotations
 
-from typing import Any
+from dataclasses import replace
 
 import click
 
 from mracad.spec.steps import Compare
 from mracad_cli import options
+from mracad_cli.command import Command
+from mracad_cli.options import Reading, Reports
+from mracad_cli.outputs import check_reports, deliver_verdict, read
 from mracad_cli.progress import Progress
 
 
-@click.command(help=__doc__)
+@click.command(cls=Command, help=__doc__)
+@click.argument("reference", metavar="REF", type=click.Path(allow_dash=True))
 @options.apply(
-    click.argument("reference", metavar="REF", type=click.Path(allow_dash=True)),
-    click.argument("source", metavar="NEW", type=click.Path(allow_dash=True)),
-    options.input_unit,
-    options.encoding,
-    options.of(Compare, without="reference"),
-    options.reports,
-    options.printing,
+    options.reading("NEW"), options.of(Compare, "limits", without="reference"), options.reports, options.printing
 )
-def command(
-    reference: str,
-    source: str,
-    input_unit: str | None,
-    encoding: str | None,
-    junit: str | None,
-    sarif: str | None,
-    overwrite: bool,
-    as_json: bool,
-    **given: Any,
-) -> int:
-    from mracad.spec.text import options as options_of
-    from mracad_cli.files import check_reports, read
-
-    check_reports(junit, sarif, overwrite=overwrite)
-    limits = options_of(Compare, given)
+def command(reference: str, reading: Reading, limits: Compare, reports: Reports) -> int:
+    check_reports(reports.junit, reports.sarif, overwrite=reports.overwrite)
     from mracad.job import compare
-    from mracad_cli.verdicts import emit
 
     with Progress() as progress:
         progress("reading", 0, 1)
-        old = read(reference, limits.reference_unit, encoding)
-        new = read(source, input_unit, encoding)
+        old = read(replace(reading, file=reference, input_unit=limits.reference_unit))
+        new = read(reading)
         progress("comparing", 0, 1)
         judged = compare.compare(new, limits, lambda: old)
-    return emit(judged.verdict, judged.failed, command="compare", as_json=as_json, junit=junit, sarif=sarif)
+    return deliver_verdict(judged, "compare", reports)

@@ -2,46 +2,28 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import click
 
 from mracad_cli import options
-from mracad_cli.progress import Progress
+from mracad_cli.command import Command
+from mracad_cli.options import Reading, Writing
+from mracad_cli.outputs import check_outputs, deliver_models
+from mracad_cli.steps import produced
 
 
-@click.command(help=__doc__)
-@options.apply(options.reading, options.writing, options.printing)
-def command(
-    source: str, input_unit: str | None, encoding: str | None, as_json: bool, outputs: tuple[str, ...], **formats: Any
-) -> int:
+@click.command(cls=Command, help=__doc__)
+@options.apply(options.reading(), options.writing, options.printing)
+def command(reading: Reading, writing: Writing, as_json: bool) -> int:
     import time
 
-    from mracad_cli import render
-    from mracad_cli.files import Outputs, load, read
+    from mracad_cli.render import json, text
 
     start = time.perf_counter()
-    targets = Outputs(outputs, **formats)
-    with Progress() as progress:
-        progress("reading", 0, 1)
-        text = load(source)
-        document = read(text, input_unit, encoding)
-        from mracad.job.produce import produce
-        from mracad.occ.files import read as read_again
-
-        done = produce(
-            document,
-            lambda: read_again(text, input_unit, encoding),
-            targets=targets.targets(),
-            title="convert",
-            verify=targets.verify,
-            progress=progress,
-        )
-    targets.take(done.made)
-    found = render.found(done.made)
+    document, done = produced(reading, writing, check_outputs(writing), (), "convert")
+    found = text.found(done.made)
     valid = f"valid: {found.words}; " if found else ""
-    line = f"{document.name}: {valid}wrote {targets.sizes()}, {time.perf_counter() - start:.1f} s"
+    line = f"{document.name}: {valid}wrote {text.sizes(done.made)}, {time.perf_counter() - start:.1f} s"
     if as_json:
-        line = render.json_text({"file": document.name, "warnings": document.warnings, **targets.body()})
-    targets.deliver({}, [line])
+        line = json.json_text({"file": document.name, "warnings": document.warnings, **json.written(done.made)})
+    deliver_models(writing, done.made, {}, [line])
     return 0

@@ -3,30 +3,35 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import click
 
 from mracad.errors import UsageError
-from mracad.spec.steps import Selection, Single
+from mracad.spec.steps import Extract, Selection
 from mracad_cli import options
-from mracad_cli.files import check_target, deliver, read
+from mracad_cli.command import Group
+from mracad_cli.options import Reading
+from mracad_cli.outputs import check_target, deliver, read
+
+OTHERS = "instance hold keep edges"
+"""Options of edits that nothing is edited with here."""
 
 
-@click.group(help=__doc__)
+@click.group(cls=Group, help=__doc__)
 def command() -> None:
     pass
 
 
 @command.command("list")
-@options.apply(options.reading, options.of(Selection, "instance hold keep edges"), options.printing)
-def list_(source: str, input_unit: str | None, encoding: str | None, faces: tuple[str, ...], as_json: bool) -> None:
+@options.apply(options.reading(), options.of(Selection, "chosen", OTHERS), options.printing)
+def list_(reading: Reading, chosen: Selection, as_json: bool) -> None:
     """Propose features: places where the detail of a face stands out, with size, height and scales."""
     from mracad.edit.feature.find import found
     from mracad.occ.look import looked_at
-    from mracad_cli.render import json_text, mm, plain, say
+    from mracad_cli.render.json import json_text, plain
+    from mracad_cli.render.text import mm, say
 
-    model, scope = looked_at(read(source, input_unit, encoding), Selection(faces=faces))
+    model, scope = looked_at(read(reading), chosen)
     features = found(model, scope.chosen)
     if as_json:
         body = [{**plain(f), "face": f.face + 1, "feature": f.text} for f in features]
@@ -39,41 +44,27 @@ def list_(source: str, input_unit: str | None, encoding: str | None, faces: tupl
         say(f"{model.name}: nothing stands out")
 
 
-@command.command()
+@command.command(help=Extract.__doc__)
 @options.apply(
-    options.reading,
-    click.option("--feature", required=True, help="near:X,Y,Z,radius:R (mm) or #3@u0:u1,v0:v1."),
-    options.of(Single, " ".join(f for f in Single.__struct_fields__ if f not in ("faces", "taper", "base", "band"))),
-    click.option(
-        "-o", "--output", "output", metavar="F.feature", required=True, type=click.Path(), help="File to write."
-    ),
+    options.reading(),
+    options.of(Extract, "chosen", OTHERS),
+    click.option("-o", "--output", metavar="F.feature", required=True, type=options.path, help="File to write."),
     options.overwrite,
     options.printing,
 )
-def extract(
-    source: str,
-    input_unit: str | None,
-    encoding: str | None,
-    feature: str,
-    output: str,
-    overwrite: bool,
-    as_json: bool,
-    **given: Any,
-) -> None:
-    """Save a feature to a file: a library of details that mracad repeat and mracad transfer lay elsewhere."""
+def extract(reading: Reading, chosen: Extract, output: str, overwrite: bool, as_json: bool) -> None:
     from mracad.edit.feature.detail import save
     from mracad.edit.feature.extract import feature_of
     from mracad.occ.look import looked_at
-    from mracad.spec.text import options as options_of
-    from mracad_cli.render import json_text, mm
+    from mracad_cli.render.json import json_text
+    from mracad_cli.render.text import mm
 
     path = Path(output)
     if path.suffix != ".feature":
         raise UsageError(f"cannot write {path}: unknown ending {path.suffix!r}", "end it in .feature")
     check_target(path, overwrite)
-    chosen_options = options_of(Single, {**given, "feature": feature})
-    model, scope = looked_at(read(source, input_unit, encoding), chosen_options)
-    found = feature_of(model, chosen_options, scope.chosen, feature)
+    model, scope = looked_at(read(reading), chosen)
+    found = feature_of(model, chosen, scope.chosen, chosen.feature)
     body = {
         "file": model.name,
         "radius": found.radius,

@@ -3,26 +3,39 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from mracad_cli import options, render
+from mracad.spec.quantity import LENGTH, length
+from mracad_cli import options
+from mracad_cli.command import Command
+from mracad_cli.options import Reading
 from mracad_cli.progress import Progress
+from mracad_cli.render import json, text
+from mracad_cli.render.text import say
 
 if TYPE_CHECKING:
     import numpy as np
 
     from mracad.inspect.scales import FaceScales
+    from mracad.inspect.seams import SeamMeasure
     from mracad.model.brep import Face, Model
+    from mracad.model.facts import Validity
+    from mracad.occ.document import Document
 
 
-@click.command(help=__doc__)
+@click.command(cls=Command, help=__doc__)
 @options.apply(
-    options.reading,
+    options.reading(),
     click.option(
-        "--scale", metavar="LENGTH", default="2%", show_default=True, help="Scale at which to look for detail."
+        "--scale",
+        type=options.Quantity(LENGTH),
+        default="2%",
+        show_default=True,
+        help="Scale at which to look for detail.",
     ),
     click.option(
         "--keep",
@@ -39,21 +52,16 @@ if TYPE_CHECKING:
     ),
     options.printing,
 )
-def command(
-    source: str, input_unit: str | None, encoding: str | None, scale: str, keep: Any, everything: bool, as_json: bool
-) -> int:
+def command(reading: Reading, scale: str, keep: Any, everything: bool, as_json: bool) -> None:
     from mracad.inspect.scales import scales
-    from mracad.inspect.seams import seams, summary
-    from mracad.occ.boxes import face_boxes
+    from mracad.inspect.seams import seams
     from mracad.occ.check import check
-    from mracad.occ.instance import instances
     from mracad.occ.view import view
-    from mracad.spec.quantity import length
-    from mracad_cli.files import read
+    from mracad_cli.outputs import read
 
     with Progress() as progress:
         progress("reading", 0, 1)
-        document = read(source, input_unit, encoding)
+        document = read(reading)
         progress("looking at faces", 0, 1)
         model = view(document)
         width = length(scale, model.diagonal, "scale")
@@ -62,56 +70,80 @@ def command(
         measures = seams(model)
         progress("checking", 0, 1)
         valid = check(document)
-    if as_json:
-        body = {
-            "file": model.name,
-            "unit": model.unit,
-            "schema": model.schema,
-            "products": list(model.products),
-            "instances": list(instances(document)),
-            "diagonal": model.diagonal,
-            "scale": width,
-            "faces": [
-                {**_facts(model, face, own), **_judged(face, found.get(face.index))}
-                for face, own in zip(model.faces, face_boxes(document, model), strict=True)
-            ],
-            "seams": {**render.plain(summary(measures)), "each": [render.seam(m) for m in measures]},
-            "valid": render.validity(valid),
-        }
-        render.say(render.json_text(body))
-        return 0
-    kinds = Counter(face.kind for face in model.faces)
-    render.say(
-        f"{model.name}: {model.schema or 'unknown schema'}, unit {model.unit}, diagonal {render.mm(model.diagonal)}"
-    )
+    seen = Seen(document, model, width, keep, found, measures, valid)
+    say(*([json.json_text(_body(seen))] if as_json else _lines(seen, everything)))
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What there is to say of a model."""
+
+    document: Document
+    model: Model
+    width: float
+    keep: str
+    scales: Mapping[int, FaceScales]
+    seams: list[SeamMeasure]
+    valid: Validity
+
+
+def _body(seen: Seen) -> dict[str, Any]:
+    from mracad.inspect.seams import summary
+    from mracad.occ.boxes import face_boxes
+    from mracad.occ.instance import instances
+
+    model = seen.model
+    return {
+        "file": model.name,
+        "unit": model.unit,
+        "schema": model.schema,
+        "products": list(model.products),
+        "instances": list(instances(seen.document)),
+        "diagonal": model.diagonal,
+        "scale": seen.width,
+        "faces": [
+            {**_facts(model, face, own), **_judged(face, seen.scales.get(face.index))}
+            for face, own in zip(model.faces, face_boxes(seen.document, model), strict=True)
+        ],
+        "seams": {**json.plain(summary(seen.seams)), "each": [json.seam(m) for m in seen.seams]},
+        "valid": json.validity(seen.valid),
+    }
+
+
+def _lines(seen: Seen, everything: bool) -> list[str]:
+    from mracad.inspect.seams import summary
+    from mracad.occ.instance import instances
+
+    model, kinds = seen.model, Counter(face.kind for face in seen.model.faces)
+    said = [f"{model.name}: {model.schema or 'unknown schema'}, unit {model.unit}, diagonal {text.mm(model.diagonal)}"]
     if model.products:
-        render.say(f"products: {len(model.products)}: {', '.join(name or '(no name)' for name in model.products)}")
+        said.append(f"products: {len(model.products)}: {', '.join(name or '(no name)' for name in model.products)}")
     if everything:
-        render.say(*(f"  {path}" for path in instances(document)))
-    render.say(f"faces: {len(model.faces)}: " + ", ".join(f"{n} {kind}" for kind, n in kinds.most_common()))
-    render.say(render.seam_line(summary(measures)))
-    render.say(f"valid: {render.verdict(valid.valid)}", *(f"  {failure}" for failure in valid.failures[:10]))
-    rows = [_row(model, face, found.get(face.index)) for face in model.faces if everything or face.surface is not None]
-    if rows:
-        render.say(f"detail below {render.mm(width)}, free with all edges held at {keep.upper()}")
-        _table(["face", "type", "degree", "net", "shape", "free", "spans mm", "at this scale", "from", "name"], rows)
-    if everything and measures:
-        _table(
-            ["edge", "faces", "gap mm", "angle °", "curvature jump 1/mm", "relative", "at"],
-            [
-                (
-                    f"edge#{m.edge + 1}" + ("" if m.sewn else " (not sewn)"),
-                    "#{} #{}".format(*(i + 1 for i in m.faces)),
-                    f"{m.gap:.2g}",
-                    f"{m.angle:.3g}",
-                    f"{m.bend:.2g}",
-                    f"{m.relative_bend:.2g}",
-                    " ".join(f"{x:.4g}" for x in m.where),
-                )
-                for m in measures
-            ],
-        )
-    return 0
+        said += [f"  {path}" for path in instances(seen.document)]
+    said.append(f"faces: {len(model.faces)}: " + ", ".join(f"{n} {kind}" for kind, n in kinds.most_common()))
+    said.append(text.seam_line(summary(seen.seams)))
+    said += [f"valid: {text.verdict(seen.valid.valid)}", *(f"  {failure}" for failure in seen.valid.failures[:10])]
+    shown = [face for face in model.faces if everything or face.surface is not None]
+    if shown:
+        said.append(f"detail below {text.mm(seen.width)}, free with all edges held at {seen.keep.upper()}")
+        head = ["face", "type", "degree", "net", "shape", "free", "spans mm", "at this scale", "from", "name"]
+        said += _table([head, *(_row(model, face, seen.scales.get(face.index)) for face in shown)])
+    if everything and seen.seams:
+        head = ["edge", "faces", "gap mm", "angle °", "curvature jump 1/mm", "relative", "at"]
+        said += _table([head, *map(_seam_row, seen.seams)])
+    return said
+
+
+def _seam_row(m: SeamMeasure) -> Sequence[str]:
+    return (
+        f"edge#{m.edge + 1}" + ("" if m.sewn else " (not sewn)"),
+        "#{} #{}".format(*(i + 1 for i in m.faces)),
+        f"{m.gap:.2g}",
+        f"{m.angle:.3g}",
+        f"{m.bend:.2g}",
+        f"{m.relative_bend:.2g}",
+        " ".join(f"{x:.4g}" for x in m.where),
+    )
 
 
 def _facts(model: Model, face: Face, box: np.ndarray) -> dict[str, Any]:
@@ -197,9 +229,7 @@ def _row(model: Model, face: Face, scales: FaceScales | None) -> Sequence[str]:
     )
 
 
-def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
-    """Print aligned columns."""
-    lines = [list(head), *map(list, rows)]
-    widths = [max(len(line[i]) for line in lines) for i in range(len(head))]
-    for line in lines:
-        render.say("  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip())
+def _table(rows: Sequence[Sequence[str]]) -> list[str]:
+    """Aligned columns."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]

@@ -7,13 +7,14 @@ from typing import Any
 import click
 
 from mracad_cli import options
+from mracad_cli.command import Command
 from mracad_cli.steps import run_recipe
 
 
-@click.command(help=__doc__)
+@click.command(cls=Command, help=__doc__)
 @click.argument("steps", metavar="STEPS")
-@options.apply(options.reading, options.writing, options.record, options.editing, options.printing)
-def command(steps: str, source: str, **given: Any) -> int:
+@options.apply(options.reading(), options.writing, options.record, options.editing, options.printing)
+def command(steps: str, **how: Any) -> int:
     from mracad.spec.recipe import pipeline
 
-    return run_recipe(pipeline(steps), source, **given)
+    return run_recipe(pipeline(steps), **how)

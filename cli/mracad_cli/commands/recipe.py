@@ -5,35 +5,34 @@ from __future__ import annotations
 import click
 
 from mracad_cli import options
-from mracad_cli.render import json_text, say
+from mracad_cli.command import Group
 from mracad_cli.steps import plan
 
 
-@click.group(help=__doc__)
+@click.group(cls=Group, help=__doc__)
 def command() -> None:
     pass
 
 
 @command.command()
-@click.argument("file", metavar="RECIPE", type=click.Path())
+@click.argument("file", metavar="RECIPE", type=options.path)
 @options.apply(options.assignments, options.printing)
 def check(file: str, assignments: tuple[str, ...], as_json: bool) -> None:
     """Say what a recipe would do; exit code 2 when something in it is wrong."""
     from mracad.spec.recipe import load
+    from mracad_cli.render.json import json_text
+    from mracad_cli.render.text import say
 
     found = load(file).with_values(assignments)
     steps = found.steps("model.step")
-    if as_json:
-        listed = [{"id": step.id, "use": step.use, "text": step.text()} for step in steps]
-        say(json_text({"recipe": found.name, "steps": listed}))
-    else:
-        for line in plan(steps):
-            say(line)
+    listed = [{"id": step.id, "use": step.use, "text": step.text()} for step in steps]
+    say(*([json_text({"recipe": found.name, "steps": listed})] if as_json else plan(steps)))
 
 
 @command.command()
 def schema() -> None:
     """Print the JSON schema of recipes, for editors and validators."""
     from mracad.spec import schema
+    from mracad_cli.render.json import json_text
 
     print(json_text(schema.schema(), 1))

@@ -7,13 +7,16 @@ from typing import Any
 import click
 
 from mracad_cli import options
+from mracad_cli.command import Command
 from mracad_cli.steps import run_recipe
 
 
-@click.command(help=__doc__)
-@click.argument("recipe", metavar="RECIPE", type=click.Path())
-@options.apply(options.reading, options.assignments, options.writing, options.record, options.editing, options.printing)
-def command(recipe: str, source: str, **given: Any) -> int:
+@click.command(cls=Command, help=__doc__)
+@click.argument("recipe", metavar="RECIPE", type=options.path)
+@options.apply(
+    options.reading(), options.assignments, options.writing, options.record, options.editing, options.printing
+)
+def command(recipe: str, **how: Any) -> int:
     from mracad.spec.recipe import load
 
-    return run_recipe(load(recipe), source, **given)
+    return run_recipe(load(recipe), **how)

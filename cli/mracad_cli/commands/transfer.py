@@ -8,24 +8,17 @@ import click
 
 from mracad.spec.steps import Transfer
 from mracad_cli import options
-from mracad_cli.steps import run_steps
+from mracad_cli.command import Command
+from mracad_cli.steps import run_edit
 
 
-@click.command("transfer", help=__doc__)
-@click.argument("source", metavar="SRC", type=click.Path())
-@click.argument("target", metavar="DST", type=click.Path(allow_dash=True))
+@click.command("transfer", cls=Command, help=__doc__)
 @options.apply(
-    options.input_unit,
-    options.encoding,
-    options.of(Transfer, "source"),
+    options.of(Transfer, "chosen", arguments={"source": "SRC"}),
+    options.reading("DST"),
     options.writing,
     options.editing,
     options.printing,
 )
-def command(source: str, target: str, **given: Any) -> int:
-    from mracad.spec.recipe import Step
-    from mracad.spec.text import options as options_of
-
-    values = {name: given.pop(name) for name in Transfer.__struct_fields__ if name != "source"}
-    step = Step("transfer", "transfer", options_of(Transfer, {**values, "source": source}))
-    return run_steps([step], target, **given)
+def command(chosen: Transfer, **how: Any) -> int:
+    return run_edit("transfer", chosen, **how)

@@ -30,7 +30,7 @@ from mracad.model.displacement import Displacement
 from mracad.spec.quantity import band_of, length
 from mracad.spec.select import Scope
 from mracad.spec.select import scope as scope_of
-from mracad.spec.steps import Featured, Move, Repeat, Transfer
+from mracad.spec.steps import Copied, Move, Repeat, Transfer
 
 Array = np.ndarray
 
@@ -109,7 +109,7 @@ def _movable(model: Model, scope: Scope) -> set[int]:
     return {i for i in scope.chosen if model.faces[i].surface is not None}
 
 
-def _target(ground: Ground, text: str, options: Featured) -> Place:
+def _target(ground: Ground, text: str, options: Copied) -> Place:
     found = place(ground, text, "place")
     return replace(found, rotate=math.radians(options.rotate), size=options.size, height=options.height)
 
@@ -118,7 +118,7 @@ def _laid(
     ground: Ground,
     feature: Feature,
     found: Sequence[Place],
-    options: Featured,
+    options: Copied,
     scope: Scope,
     removed: Mapping[int, Array],
 ) -> Laid:

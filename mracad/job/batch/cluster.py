@@ -14,7 +14,8 @@ from concurrent.futures import CancelledError, Executor, Future
 from typing import Any
 
 from mracad.errors import CrashError, FileError, UsageError
-from mracad.job.batch.pool import Limits, Pool
+from mracad.job.batch.pool import Pool
+from mracad.job.batch.settings import Limits
 from mracad.job.batch.work import warm
 
 PATIENCE = 30

@@ -22,7 +22,6 @@ import threading
 import time
 from collections.abc import Callable
 from concurrent.futures import Executor, Future
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -31,6 +30,7 @@ import psutil
 
 from mracad.errors import CrashError, LimitError, MracadError
 from mracad.job import wire
+from mracad.job.batch.settings import Limits
 from mracad.job.guard import end_with_parent
 from mracad.note import Note, noting
 
@@ -44,21 +44,6 @@ _SIZE = struct.Struct(">Q")  # of an answer, before it
 
 READY = 120.0
 """Seconds in which a worker must have started."""
-
-
-@dataclass(frozen=True)
-class Limits:
-    """What one task may use.
-
-    Attributes
-    ----------
-    seconds : float
-    memory : int
-        Bytes that the worker may occupy; 0 for its share of four fifths of the machine's memory.
-    """
-
-    seconds: float = 600.0
-    memory: int = 0
 
 
 class Pool(Executor):
@@ -75,8 +60,9 @@ class Pool(Executor):
         Called once in each worker before its first task; must be importable.
     """
 
-    def __init__(self, workers: int, limits: Limits = Limits(), warm: Callable[[], object] | None = None) -> None:
+    def __init__(self, workers: int, limits: Limits | None = None, warm: Callable[[], object] | None = None) -> None:
         self.workers = workers
+        limits = limits or Limits()
         self._seconds = limits.seconds
         self._memory = limits.memory or int(0.8 * psutil.virtual_memory().total / workers)
         self._warm = warm

@@ -18,6 +18,7 @@ from mracad.inspect.faults import ReadBack
 from mracad.job.batch.cluster import lost
 from mracad.job.batch.find import Item
 from mracad.job.batch.manifest import Manifest, digest
+from mracad.job.batch.settings import Settings
 from mracad.job.batch.work import Product, Work, do
 from mracad.spec.recipe import Recipe, record_of
 
@@ -28,40 +29,6 @@ RETRIED = frozenset({Code.LIMIT, Code.INTERNAL})
 """What may go better the next time: limits and crashes."""
 
 Status = Literal["done", "unchanged", "failed", "not tried"]
-
-
-@dataclass(frozen=True)
-class Settings:
-    """How the files of a batch are read and written.
-
-    Attributes
-    ----------
-    input_unit, encoding : str or None
-    schema : str
-        Of STEP files; by default AP242 for a file in AP242, else AP214.
-    verify : bool
-        Read each output back and judge it.
-    overwrite : bool
-        Replace files in the output folder that no batch has made.
-    if_changed : bool
-        Leave outputs alone whose content would not change.
-    record : bool
-        Write the resolved recipe beside each output.
-    retry : int
-        How often a file is tried again after a crash or a limit.
-    fail_fast : bool
-        Stop at the first failure.
-    """
-
-    input_unit: str | None = None
-    encoding: str | None = None
-    schema: str = ""
-    verify: bool = True
-    overwrite: bool = False
-    if_changed: bool = False
-    record: bool = False
-    retry: int = 0
-    fail_fast: bool = False
 
 
 @dataclass(frozen=True)
@@ -139,12 +106,12 @@ def run(
                     break
                 if outcome := batch.start(item):
                     yield outcome
-                    stopped = settings.fail_fast and outcome.status == "failed"
+                    stopped = not settings.keep_going and outcome.status == "failed"
             if stopped or not batch.pending:
                 break
             for outcome in batch.finished():
                 yield outcome
-                stopped = stopped or (settings.fail_fast and outcome.status == "failed")
+                stopped = stopped or (not settings.keep_going and outcome.status == "failed")
         left = [task.item for task in batch.pending.values()] + (list(waiting) if stopped else [])
         yield from (Outcome(item.source, item.output, "not tried") for item in left)
     finally:
@@ -187,7 +154,7 @@ class _Batch:
             self.settings.input_unit,
             self.settings.encoding,
             item.format,
-            self.settings.schema,
+            self.settings.schema or "",
             self.settings.verify,
             files,
             self._epoch,

@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar, Literal
 from msgspec import Meta
 
 from mracad.spec.files import CountText, File
-from mracad.spec.quantity import Length
+from mracad.spec.quantity import Angle, Length, Share, Time
 from mracad.spec.steps.base import Options
 
 
@@ -18,10 +18,10 @@ class Check(Options, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
     max_gap: Annotated[Length | None, Meta(description="Largest gap along any seam.")] = None
     max_angle: Annotated[
-        Annotated[float, Meta(ge=0.0)] | None,
+        Annotated[Angle, Meta(ge=0.0)] | None,
         Meta(description="Largest angle (degrees) along seams that are meant to be smooth."),
     ] = None
-    kink: Annotated[float, Meta(description="A seam with a smaller angle (degrees) is meant to be smooth.", ge=0.0)] = (
+    kink: Annotated[Angle, Meta(description="A seam with a smaller angle (degrees) is meant to be smooth.", ge=0.0)] = (
         1.0
     )
     expect: Annotated[
@@ -33,8 +33,8 @@ class Check(Options, frozen=True, kw_only=True, forbid_unknown_fields=True):
     max_tolerance: Annotated[Length | None, Meta(description="Largest tolerance of edges and vertices.")] = None
     min_wall: Annotated[Length | None, Meta(description="Least thickness of the walls of solids.")] = None
     layer_limit: Annotated[
-        Annotated[float, Meta(gt=0.0)] | None,
-        Meta(description="Seconds for each layer; one that takes longer says nothing."),
+        Annotated[Time, Meta(gt=0.0)] | None,
+        Meta(description="Time for each layer (90s, 2min); one that takes longer says nothing."),
     ] = None
     fail_on: Annotated[
         tuple[
@@ -61,11 +61,11 @@ class Compare(Options, frozen=True, kw_only=True, forbid_unknown_fields=True):
     )
     max_gap_growth: Annotated[Length | None, Meta(description="How much wider the gap of any seam may become.")] = None
     max_angle_growth: Annotated[
-        Annotated[float, Meta(ge=0.0)] | None,
+        Annotated[Angle, Meta(ge=0.0)] | None,
         Meta(description="How much larger the angle (degrees) of any seam may become."),
     ] = None
     max_volume_change: Annotated[
-        Annotated[float, Meta(ge=0.0)] | None, Meta(description="How much of the volume (percent) may come or go.")
+        Annotated[Share, Meta(ge=0.0)] | None, Meta(description="How much of the volume (percent) may come or go.")
     ] = None
     ignore: Annotated[
         tuple[

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from typing import Annotated, ClassVar, Literal
 
@@ -10,20 +9,21 @@ from msgspec import Meta
 
 from mracad.errors import UsageError
 from mracad.spec.files import FeatureText, File, PlaceText
-from mracad.spec.quantity import Length, band_of
-from mracad.spec.steps.base import Selection, dashed
+from mracad.spec.quantity import Angle, Length, band_of
+from mracad.spec.steps.base import Selection
+
+_Feature = Annotated[
+    FeatureText,
+    Meta(
+        description="The feature: near:X,Y,Z,radius:R (a disc, mm), #3@u0:u1,v0:v1 (a rectangle of parameters) or "
+        "a file made by mracad feature extract."
+    ),
+]
 
 
 class Featured(Selection, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What edits that carry a feature share."""
+    """What it takes to tell a feature from its surroundings."""
 
-    edges: Annotated[
-        Literal["frozen", "coupled"],
-        Meta(
-            description="Edges between two edited faces: coupled, they move with a copy that lies over them and stay "
-            "as smooth as they were, where that is possible; frozen, none moves."
-        ),
-    ] = "coupled"
     taper: Annotated[
         Length | None,
         Meta(
@@ -44,15 +44,6 @@ class Featured(Selection, frozen=True, kw_only=True, forbid_unknown_fields=True)
             description="Wavelengths that belong to a feature above a level: 0.5mm:20mm; 0mm:20mm for all up to 20 mm."
         ),
     ] = None
-    rotate: Annotated[float, Meta(description="Turn of each copy about the outward normal (degrees).")] = 0.0
-    size: Annotated[
-        float, Meta(description="Factor on the size of each copy along the face; its height stays.", gt=0.0)
-    ] = 1.0
-    height: Annotated[float, Meta(description="Factor on the height of each copy; negative makes a dent of it.")] = 1.0
-    mirror: Annotated[bool, Meta(description="Mirror each copy.")] = False
-    clip: Annotated[
-        bool, Meta(description="Let edges and holes that do not move take parts of copies, instead of refusing them.")
-    ] = False
 
     @property
     def quiet(self) -> str:
@@ -64,27 +55,44 @@ class Featured(Selection, frozen=True, kw_only=True, forbid_unknown_fields=True)
             band_of(self.band, 1.0)
         if self.base == "level" and self.band is None:
             raise UsageError("base: a level needs a band", "give --band 0.5mm:20mm")
-        if not (math.isfinite(self.size) and self.size > 0):
-            raise UsageError(f"size: {self.size} is not greater than zero", "give --size 1.5")
-        if not (math.isfinite(self.height) and self.height != 0 and math.isfinite(self.rotate)):
-            raise UsageError(f"height: {self.height} makes nothing of a feature", "give --height 0.5")
 
 
-class Single(Featured, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What edits with a feature of the model itself share."""
+class Extract(Featured, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Save a feature to a file: a library of details that mracad repeat and mracad transfer lay elsewhere."""
 
-    feature: Annotated[
-        FeatureText,
+    feature: _Feature
+
+
+class Copied(Featured, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What edits that lay copies of a feature share."""
+
+    edges: Annotated[
+        Literal["frozen", "coupled"],
         Meta(
-            description="The feature: near:X,Y,Z,radius:R (a disc, mm), #3@u0:u1,v0:v1 (a rectangle of parameters) or "
-            "a file made by mracad feature extract."
+            description="Edges between two edited faces: coupled, they move with a copy that lies over them and stay "
+            "as smooth as they were, where that is possible; frozen, none moves."
         ),
-    ] = ""
+    ] = "coupled"
+    rotate: Annotated[Angle, Meta(description="Turn of each copy about the outward normal (degrees).")] = 0.0
+    size: Annotated[
+        float, Meta(description="Factor on the size of each copy along the face; its height stays.", gt=0.0)
+    ] = 1.0
+    height: Annotated[float, Meta(description="Factor on the height of each copy; negative makes a dent of it.")] = 1.0
+    mirror: Annotated[bool, Meta(description="Mirror each copy.")] = False
+    clip: Annotated[
+        bool, Meta(description="Let edges and holes that do not move take parts of copies, instead of refusing them.")
+    ] = False
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not self.feature:
-            raise UsageError("feature: it is not said which", "give --feature near:X,Y,Z,radius:R")
+        if self.height == 0:
+            raise UsageError("height: a copy of height 0 is none", "give --height 0.5, or a negative one for a dent")
+
+
+class Single(Copied, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What edits that lay copies of a feature of the model itself share."""
+
+    feature: _Feature
 
 
 class Move(Single, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -92,12 +100,10 @@ class Move(Single, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
     function: ClassVar[str] = "mracad.edit.feature.edits:move"
 
-    to: Annotated[str, Meta(description="Where to: X,Y,Z (mm) or #face@u,v.")] = ""
+    to: Annotated[str, Meta(description="Where to: X,Y,Z (mm) or #face@u,v.")]
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not self.to:
-            raise UsageError("to: it is not said where the feature is to go", "give --to X,Y,Z or --to '#3@u,v'")
         if self.feature.endswith(".feature"):
             raise UsageError(f"feature: a file cannot be moved: {self.feature}", "lay copies of it with mracad repeat")
 
@@ -147,7 +153,7 @@ class Repeat(Single, frozen=True, kw_only=True, forbid_unknown_fields=True):
         Length | None, Meta(description="Move each copy at random by up to this length along the face.")
     ] = None
     spin: Annotated[
-        float, Meta(description="Turn each copy at random by up to so many degrees either way.", ge=0.0)
+        Angle, Meta(description="Turn each copy at random by up to so many degrees either way.", ge=0.0, le=360.0)
     ] = 0.0
     seed: Annotated[int, Meta(description="Of the random numbers.", ge=0)] = 0
 
@@ -157,28 +163,26 @@ class Repeat(Single, frozen=True, kw_only=True, forbid_unknown_fields=True):
             raise UsageError("at: it is not said where the copies are to go", "give --at, --grid, --polar or --along")
         if sum(x is not None for x in (self.grid, self.polar, self.along)) > 1:
             raise UsageError("grid, polar and along exclude each other", "give one of them")
-        if not math.isfinite(self.spin):
-            raise UsageError(f"spin: {self.spin} is not an angle", "give --spin 180 for any turn")
 
     @property
     def done(self) -> str:
         return "edited with copies"
 
 
-class Transfer(Featured, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class Transfer(Copied, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Carry the detail of a face, or a feature, of another file onto this one; units may differ."""
 
     function: ClassVar[str] = "mracad.edit.feature.edits:transfer"
 
-    source: Annotated[File, Meta(description="The file that the detail is taken from.")] = ""
+    source: Annotated[File, Meta(description="The file that the detail is taken from.")]
     from_: Annotated[
         FeatureText,
         Meta(
             description="What to take: a face (#3 or its name) with all its detail in --band, or a feature as for "
             "mracad repeat."
         ),
-    ] = ""
-    to: Annotated[str, Meta(description="Where to: a face for the detail of a face; a place for a feature.")] = ""
+    ]
+    to: Annotated[str, Meta(description="Where to: a face for the detail of a face; a place for a feature.")]
     mode: Annotated[
         str,
         Meta(
@@ -189,9 +193,6 @@ class Transfer(Featured, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for name in ("source", "from_", "to"):
-            if not getattr(self, name):
-                raise UsageError(f"{dashed(name)}: it is missing", f"give {dashed(name)}, see mracad transfer --help")
         self.share()
 
     def share(self) -> tuple[float, float]:

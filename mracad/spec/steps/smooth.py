@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from typing import Annotated, ClassVar, Literal
 
 from msgspec import Meta
 
 from mracad.errors import UsageError
-from mracad.spec.quantity import Length
+from mracad.spec.quantity import Angle, Length
 from mracad.spec.steps.base import Selection
 
 
@@ -16,7 +15,7 @@ class Fitting(Selection, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """How an edit that changes whole faces goes about it."""
 
     fit_g1: Annotated[
-        Annotated[float, Meta(ge=0.0, le=45.0)] | None,
+        Annotated[Angle, Meta(ge=0.0, le=45.0)] | None,
         Meta(description="Make seams tangent that are meant to be: those between edited faces under this angle (°)."),
     ] = None
     close_gaps: Annotated[
@@ -80,7 +79,3 @@ class Smooth(Fitting, frozen=True, kw_only=True, forbid_unknown_fields=True):
         super().__post_init__()
         if (self.scale is None) == (self.level is None):
             raise UsageError("smooth needs either a scale or a level", "give --scale 5mm, --scale 2% or --level 2.5")
-        if self.level is not None and not (math.isfinite(self.level) and self.level > 0):
-            raise UsageError(f"level: {self.level} is not greater than zero", "give --level 1, 2 or 2.5")
-        if not (math.isfinite(self.amount) and 0 <= self.amount <= 1):
-            raise UsageError(f"amount: {self.amount} is not between 0 and 1", "give --amount 0.5")

@@ -1,33 +1,32 @@
-"""Reports as text and as JSON-ready dictionaries."""
+"""Reports as lines of text."""
 
 from __future__ import annotations
 
-import json
-import math
 import re
-import sys
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import TYPE_CHECKING, TextIO
 
-import msgspec
-
+from mracad.inspect.words import placed
 from mracad.spec.steps import Selection
 
 if TYPE_CHECKING:
     from mracad.constraint.seam import Treatment
     from mracad.edit.result import FaceOutcome
-    from mracad.inspect.faults import Fault, ReadBack
-    from mracad.inspect.seams import SeamMeasure, SeamSummary
+    from mracad.inspect.seams import SeamSummary
+    from mracad.inspect.verdict import Layer, Verdict
+    from mracad.job.batch.run import Outcome
     from mracad.job.document import Report
     from mracad.job.judge import Judged
     from mracad.job.produce import Made
-    from mracad.model.facts import Validity
     from mracad.spec.recipe import Step
 
 SHOWN = 6
 """Most faces named in one line."""
+
+FINDINGS = 8
+"""Most findings of one layer."""
 
 REASONS = 3
 """Most reasons named in one line."""
@@ -53,8 +52,8 @@ def numbers(faces: list[int]) -> str:
     return " ".join(f"#{i + 1}" for i in faces[:SHOWN]) + (" …" if len(faces) > SHOWN else "")
 
 
-def verdict(valid: bool) -> str:
-    return "yes" if valid else "no"
+def verdict(valid: bool | None) -> str:
+    return {True: "yes", False: "no", None: "unknown"}[valid]
 
 
 def step_lines(step: Step, result: Report | Judged) -> list[str]:
@@ -114,7 +113,7 @@ def edit_lines(report: Report, options: Selection, end: str, found: Found | None
         mean = sum(d.mean for d in report.deviations) / len(report.deviations)
         lines.append(f"deviation: max {mm(worst.largest)} on #{worst.face + 1}, mean {mm(mean)}")
         lines[-1] += roughness_words(edit.faces("edited"))
-        before, after = control_points(report)
+        before, after = report.control_points
         lines[-1] += f"; control points: {after} (were {before})" if after != before and not edit.copies else ""
     else:
         lines.append("deviation: none")
@@ -161,7 +160,7 @@ def roughness_words(edited: Sequence[FaceOutcome]) -> str:
 
 def copies_line(report: Report) -> str:
     """What became of the copies of a feature."""
-    copies, (before, after) = report.edit.copies, control_points(report)
+    copies, (before, after) = report.edit.copies, report.control_points
     worst = max(copies, key=lambda c: c.deviation)
     exact = sum(c.exact for c in copies)
     text = f"copies: {len(copies)}" + (f", {exact} exact" if exact else "")
@@ -170,16 +169,6 @@ def copies_line(report: Report) -> str:
     if lost.lost > 1e-9:
         text += f"; constraints took ≤ {mm(lost.lost)} ({lost.place})"
     return f"{text}; control points: {after}" + (f" (were {before})" if after != before else "")
-
-
-def control_points(report: Report) -> tuple[int, int]:
-    """Control points of all NURBS faces before and after."""
-    before = after = 0
-    for surface in report.model.surfaces:
-        net, offset = surface.net, report.edit.displacement.offsets.get(surface.index)
-        before += net.u.count * net.v.count
-        after += net.u.count * net.v.count if offset is None else offset.poles.shape[0] * offset.poles.shape[1]
-    return before, after
 
 
 def edge_words(edges: tuple[Treatment, ...]) -> str:
@@ -217,105 +206,35 @@ def say(*lines: str, file: TextIO | None = None) -> None:
         print(printable(line), file=file)
 
 
-def json_text(value: Any, indent: int | None = None) -> str:
-    """JSON that any reader takes: what is not finite is null, signs that cannot be written as they are, escaped."""
-    body = _finite(value)
-    text = json.dumps(body, indent=indent, ensure_ascii=False)
-    try:
-        for encoding in {"utf-8", sys.stdout.encoding or "utf-8"}:
-            text.encode(encoding)
-    except UnicodeEncodeError:
-        return json.dumps(body, indent=indent)
-    return text
+def verdict_lines(found: Verdict, failed: Sequence[Layer]) -> list[str]:
+    """A verdict, layer by layer."""
+    width = max(len(layer.name) for layer in found.layers)
+    lines = [f"{found.subject}: valid: {verdict(found.valid)}"]
+    for layer in found.layers:
+        lines.append(f"{layer.name.ljust(width)}  {layer.status.ljust(7)}  {layer.text}".rstrip())
+        lines += [f"  {placed(finding)}" for finding in layer.findings[:FINDINGS]]
+        if len(layer.findings) > FINDINGS:
+            lines.append(f"  and {len(layer.findings) - FINDINGS} more")
+        lines += [f"  note: {placed(note)}" for note in layer.notes[:FINDINGS]]
+        if len(layer.notes) > FINDINGS:
+            lines.append(f"  and {len(layer.notes) - FINDINGS} more notes")
+    lines.append("failed: " + ", ".join(layer.name for layer in failed) if failed else "passed")
+    return lines
 
 
-def _finite(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _finite(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(item) for item in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+def batch_lines(outcomes: Sequence[Outcome], seconds: float) -> list[str]:
+    """The batch in a line, and one for each file that failed."""
+    counts = Counter(outcome.status for outcome in outcomes)
+    parts = [f"{counts[status]} {status}" for status in ("done", "unchanged", "failed", "not tried") if counts[status]]
+    lines = [f"{len(outcomes)} file{'s' * (len(outcomes) != 1)}: {', '.join(parts)}; {seconds:.1f} s"]
+    failed = [outcome for outcome in outcomes if outcome.status == "failed"]
+    return lines + [f"failed: {o.file}: {o.message}" + (f"; {o.hint}" if o.hint else "") for o in failed]
 
 
-def plain(value: Any) -> Any:
-    """Dataclasses and structs as JSON-ready values; face and edge indices count from 1 as on the command line."""
-    return msgspec.to_builtins(value)
+def sizes(made: Sequence[Made]) -> str:
+    """What was made: names, sizes, and the faces that are in parts."""
+    return ", ".join(", ".join([m.target.name, _size(len(m.data)), *map(str, m.written.cut)]) for m in made)
 
 
-def outcome(value: FaceOutcome) -> dict[str, Any]:
-    """One face's outcome; lengths in millimetres."""
-    return {**plain(value), "face": value.face + 1}
-
-
-def treatment(value: Treatment) -> dict[str, Any]:
-    """What was done about an edge; the edge and its faces by number."""
-    faces, reason = [i + 1 for i in value.faces], "" if value.reason is None else str(value.reason)
-    return {**plain(value), "edge": value.edge + 1, "faces": faces, "reason": reason}
-
-
-def seam(value: SeamMeasure) -> dict[str, Any]:
-    """One seam; its faces by number."""
-    return {
-        **plain(value),
-        "edge": value.edge + 1,
-        "faces": [i + 1 for i in value.faces],
-        "smooth": value.smooth,
-    }
-
-
-def result(value: Report | Judged) -> dict[str, Any]:
-    """What a step did, in full."""
-    from mracad.job.document import Report
-
-    if isinstance(value, Report):
-        return report(value)
-    from mracad_cli.verdicts import as_data
-
-    return as_data(value.verdict, value.failed)
-
-
-def report(value: Report) -> dict[str, Any]:
-    """The full report of an edit."""
-    from mracad.inspect.seams import key, summary
-
-    smooth = value.smooth_seams()
-    after = {key(m): m for m in value.after}
-    return {
-        "file": value.model.name,
-        "diagonal": value.model.diagonal,
-        "counts": dict(Counter(o.status for o in value.edit.outcomes)),
-        "faces": [outcome(o) for o in value.edit.outcomes],
-        "edges": [treatment(e) for e in value.edit.edges],
-        "copies": [{**plain(c), "faces": [i + 1 for i in c.faces]} for c in value.edit.copies],
-        "control_points": dict(zip(("before", "after"), control_points(value), strict=True)),
-        "notes": list(value.edit.notes),
-        "deviation": [{**plain(d), "face": d.face + 1} for d in value.deviations],
-        "seams": {
-            "before": plain(summary(value.before, smooth)),
-            "after": plain(summary(value.after, smooth)),
-            "each": [
-                {
-                    **seam(m),
-                    "after": {k: v for k, v in seam(after[key(m)]).items() if k not in ("edge", "faces", "sewn")},
-                }
-                for m in value.before
-            ],
-        },
-        "valid": {"before": validity(value.valid_before), "after": validity(value.valid_after)},
-    }
-
-
-def read_back(value: ReadBack | None) -> dict[str, Any] | None:
-    """What an output is as read back; None where it was not."""
-    if value is None:
-        return None
-    return {**plain(value), "faults": _faults(value.faults), "forgiven": _faults(value.forgiven)}
-
-
-def _faults(faults: Sequence[Fault]) -> list[dict[str, Any]]:
-    return [{**plain(fault), "faces": [face + 1 for face in fault.faces]} for fault in faults]
-
-
-def validity(value: Validity) -> dict[str, Any]:
-    """The kernel's verdict."""
-    return dict(plain(value))
+def _size(count: int) -> str:
+    return f"{count / 1e6:.1f} MB" if count >= 1e5 else f"{count / 1e3:.1f} kB"

@@ -1,0 +1,155 @@
+"""Files in and out of a command: checked before the work starts, written whole or not at all."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from mracad import note
+from mracad.errors import FileError, UsageError
+from mracad.formats import FORMATS, by_ending
+from mracad_cli.options import Reading, Reports, Writing
+from mracad_cli.render.text import say
+
+if TYPE_CHECKING:
+    from mracad.job.judge import Judged
+    from mracad.job.produce import Made, Target
+    from mracad.occ.document import Document
+    from mracad.occ.load import Text
+
+
+def load(source: str) -> Text:
+    """The bytes of a file, or of standard input for ``-``."""
+    from mracad.occ.load import load as load_file
+
+    return load_file(sys.stdin.buffer if source == "-" else source)
+
+
+def read(reading: Reading, text: Text | None = None) -> Document:
+    """Read a model, from its ``text`` where that is there already; say what is lost on the way."""
+    from mracad.occ.files import read as read_file
+
+    text = text or load(reading.file)
+    note.doing("reading", text.name)
+    document = read_file(text, reading.input_unit, reading.encoding)
+    for warning in document.warnings:
+        say(f"warning: {warning}", file=sys.stderr)
+    return document
+
+
+def check_outputs(writing: Writing, beside: Iterable[str | None] = (), *, needed: bool = True) -> list[Target]:
+    """How each output is written; refuses those that could not be, and texts beside them that could not.
+
+    Raises
+    ------
+    UsageError
+        Where none is named though one is ``needed``, or a file is named twice or exists.
+    FileError
+        For an unknown ending, or a folder that cannot be written to.
+    """
+    from mracad.job.produce import Target
+
+    paths = writing.outputs
+    if needed and not paths:
+        raise UsageError("no output is named", "name a file with -o OUT.step, or - for standard output")
+    if paths.count("-") > 1:
+        raise UsageError("- is named twice", "give each -o once")
+    formats = {path: FORMATS[writing.format] if path == "-" else by_ending(path) for path in paths}
+    files = [path for path in paths if path != "-"]
+    check_reports(*files, *beside, overwrite=writing.overwrite or writing.if_changed)
+    how = (writing.schema or "").upper(), writing.chord, writing.angle, writing.ascii_stl
+    return [
+        Target("standard output" if path == "-" else Path(path).name, format.name, *how)
+        for path, format in formats.items()
+    ]
+
+
+def check_reports(*paths: str | None, overwrite: bool) -> None:
+    """Refuse reports that could not be written, and two that would be the same file."""
+    given = [Path(path) for path in paths if path]
+    for number, path in enumerate(given):
+        if path.resolve() in [other.resolve() for other in given[:number]]:
+            raise UsageError(f"{path} is named twice", "give each file that is written a name of its own")
+        check_target(path, overwrite)
+
+
+def check_target(path: Path, overwrite: bool) -> None:
+    """Refuse an output that could not be written, or that exists already."""
+    if path.is_dir():
+        raise FileError(f"cannot write {path}: it is a directory", "name a file in it")
+    if not path.parent.is_dir():
+        raise FileError(f"cannot write {path}: there is no folder {path.parent}", "create it first")
+    if not os.access(path.parent, os.W_OK):
+        raise FileError(f"cannot write {path}: the folder is not writable", "choose another one")
+    if path.exists() and not overwrite:
+        raise UsageError(f"{path} exists", "give --overwrite to replace it")
+
+
+def deliver(files: Mapping[str, str | bytes | None], lines: Iterable[str], *, stream: bytes | None = None) -> None:
+    """End a command: print what it says, and let its files take their places; all of this or nothing.
+
+    Parameters
+    ----------
+    files : mapping
+        Contents by path; texts are written as UTF-8, what is None is left out.
+    lines : iterable of str
+        What is printed.
+    stream : bytes, optional
+        A model for standard output; the lines go to standard error then.
+
+    Raises
+    ------
+    FileError
+        When a file cannot be written.
+    """
+    from mracad.output import put_all
+
+    said = list(lines)
+
+    def tell() -> None:
+        if stream is not None:
+            sys.stdout.buffer.write(stream)
+        say(*said, file=sys.stdout if stream is None else sys.stderr)
+        sys.stdout.flush()
+
+    contents = {path: content for path, content in files.items() if content is not None}
+    put_all({p: c.encode(errors="surrogateescape") if isinstance(c, str) else c for p, c in contents.items()}, tell)
+
+
+def deliver_models(
+    writing: Writing, made: Sequence[Made], files: Mapping[str, str | None], lines: Iterable[str]
+) -> None:
+    """End a command that made models, one for each output or none: like :func:`deliver`."""
+    from mracad.output import holds
+
+    for each in made:
+        if each.written.lost:
+            say(f"warning: {each.target.name} lacks {', '.join(map(str, each.written.lost))}", file=sys.stderr)
+    data = {path: each.data for path, each in zip(writing.outputs, made, strict=False)}
+    stream = data.pop("-", b"" if "-" in writing.outputs else None)
+    changed = {p: d for p, d in data.items() if not (writing.if_changed and holds(Path(p), d))}
+    deliver({**changed, **files}, lines, stream=stream)
+
+
+def deliver_verdict(judged: Judged, command: str, reports: Reports) -> int:
+    """End a command that judges: print the verdict, write its reports; the exit code."""
+    from mracad_cli.render import json, junit, sarif, text
+
+    found = judged.verdict, judged.failed
+    files = {reports.junit: junit.verdict(*found, command)} if reports.junit else {}
+    files |= {reports.sarif: json.json_text(sarif.verdict(*found, command), 1) + "\n"} if reports.sarif else {}
+    deliver(files, [json.json_text(json.verdict(*found))] if reports.as_json else text.verdict_lines(*found))
+    return 0 if judged.passed else 1
+
+
+def depfile_text(outputs: Iterable[str], inputs: Iterable[str]) -> str:
+    """A rule for make: what the outputs depend on; and one for each input, so that make bears with its absence."""
+    targets, needs = ([_for_make(path) for path in paths if path != "-"] for paths in (outputs, inputs))
+    return f"{' '.join(targets)}: {' '.join(needs)}\n" + "".join(f"\n{need}:\n" for need in needs)
+
+
+def _for_make(path: str) -> str:
+    return path.replace("$", "$$").replace("#", "\\#").replace(" ", "\\ ")

@@ -1,0 +1,1 @@
+"""What commands say, made of their reports: one module a form."""

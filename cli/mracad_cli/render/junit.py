@@ -1,0 +1,102 @@
+"""JUnit reports: one writer."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+from xml.etree import ElementTree as Xml
+
+from mracad.inspect.verdict import Layer, Verdict
+from mracad.inspect.words import placed
+from mracad.job.batch.run import Outcome
+
+_CONTROL = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")  # what XML cannot hold
+
+
+@dataclass(frozen=True)
+class Case:
+    """A test case: what became of it, in a line and in more.
+
+    Attributes
+    ----------
+    kind : str
+        The exit code or status of a failure or an error.
+    seconds : float or None
+    """
+
+    group: str
+    name: str
+    became: Literal["passed", "failure", "error", "skipped"] = "passed"
+    line: str = ""
+    more: str = ""
+    kind: str = ""
+    seconds: float | None = None
+
+
+def text(name: str, cases: Sequence[Case], seconds: float | None = None) -> str:
+    """A report of one suite."""
+    counts = Counter(case.became for case in cases)
+    figures = {
+        "tests": len(cases),
+        "failures": counts["failure"],
+        "errors": counts["error"],
+        "skipped": counts["skipped"],
+    }
+    shared = {**{key: str(value) for key, value in figures.items()}, **_time(seconds)}
+    suite = root = Xml.Element("testsuite", {"name": _clean(name), **shared})
+    for case in cases:
+        found = Xml.SubElement(
+            suite, "testcase", {"classname": _clean(case.group), "name": _clean(case.name), **_time(case.seconds)}
+        )
+        if case.became in ("failure", "error"):
+            said = Xml.SubElement(found, case.became, {"message": _clean(case.line), "type": case.kind})
+            said.text = _clean(case.more)
+        elif case.became == "skipped":
+            Xml.SubElement(found, "skipped", {"message": _clean(case.line)})
+        elif case.line:
+            Xml.SubElement(found, "system-out").text = _clean(case.line)
+    Xml.indent(root)
+    return '<?xml version="1.0" encoding="utf-8"?>\n' + Xml.tostring(root, encoding="unicode") + "\n"
+
+
+def verdict(found: Verdict, failed: Sequence[Layer], command: str) -> str:
+    """A verdict as a report with a case a layer."""
+    return text(f"mracad {command} {found.subject}", [_layer(found.subject, x, x in failed) for x in found.layers])
+
+
+def _layer(subject: str, layer: Layer, failed: bool) -> Case:
+    if failed:
+        return Case(
+            subject, layer.name, "failure", layer.text, "\n".join(map(placed, layer.findings)), kind=layer.status
+        )
+    if layer.status in ("skipped", "time limit"):
+        return Case(subject, layer.name, "skipped", f"{layer.status}: {layer.text}")
+    return Case(subject, layer.name, line=layer.text)
+
+
+def batch(name: str, outcomes: Sequence[Outcome], seconds: float) -> str:
+    """A batch as a report: a failure is a check that did not hold, an error anything else."""
+    return text(name, [_outcome(name, outcome) for outcome in outcomes], seconds)
+
+
+def _outcome(name: str, outcome: Outcome) -> Case:
+    if outcome.status == "failed":
+        became: Literal["failure", "error"] = "failure" if outcome.code == 1 else "error"
+        words = became, outcome.message, outcome.hint, str(outcome.code)
+        return Case(name, outcome.file, *words, seconds=outcome.seconds)
+    if outcome.status == "not tried":
+        return Case(name, outcome.file, "skipped", "the batch stopped before", seconds=outcome.seconds)
+    said = "unchanged" if outcome.status == "unchanged" else ""
+    return Case(name, outcome.file, line=said, seconds=outcome.seconds)
+
+
+def _time(seconds: float | None) -> dict[str, str]:
+    return {} if seconds is None else {"time": f"{seconds:.3f}"}
+
+
+def _clean(text: str) -> str:
+    """A text without the characters that XML cannot hold."""
+    return _CONTROL.sub("\N{REPLACEMENT CHARACTER}", text)

@@ -1,0 +1,54 @@
+"""How a batch is done; no numerical library is loaded for it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What one task may use.
+
+    Attributes
+    ----------
+    seconds : float
+    memory : int
+        Bytes that the worker may occupy; 0 for its share of four fifths of the machine's memory.
+    """
+
+    seconds: float = 600.0
+    memory: int = 0
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How the files of a batch are read and written.
+
+    Attributes
+    ----------
+    input_unit, encoding : str or None
+    schema : str or None
+        Of STEP files; by default AP242 for a file in AP242, else AP214.
+    verify : bool
+        Read each output back and judge it.
+    overwrite : bool
+        Replace files in the output folder that no batch has made.
+    if_changed : bool
+        Leave outputs alone whose content would not change.
+    record : bool
+        Write the resolved recipe beside each output.
+    retry : int
+        How often a file is tried again after a crash or a limit.
+    keep_going : bool
+        Go on after a file has failed.
+    """
+
+    input_unit: str | None = None
+    encoding: str | None = None
+    schema: str | None = None
+    verify: bool = True
+    overwrite: bool = False
+    if_changed: bool = False
+    record: bool = False
+    retry: int = 0
+    keep_going: bool = True
