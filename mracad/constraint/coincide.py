@@ -142,7 +142,7 @@ def _carried(points: Array, edge: Edge) -> tuple[Array, Array | None]:
 
 def _slopes(edge: Edge) -> Array:
     """Derivatives of the edge's curve per sample step, ``(k, 3)``."""
-    return edge.tangents * np.linalg.norm(np.gradient(edge.points, axis=0), axis=1, keepdims=True)
+    return np.asarray(edge.tangents * np.linalg.norm(np.gradient(edge.points, axis=0), axis=1, keepdims=True))
 
 
 def _between(samples: int) -> tuple[Array, Array]:
@@ -155,7 +155,9 @@ def _between(samples: int) -> tuple[Array, Array]:
 def _hermite(values: Array, slopes: Array, segment: Array, s: Array) -> Array:
     """Cubic Hermite interpolation of samples at fraction ``s`` (k, 1) of ``segment`` (k,); slopes are per step."""
     p, q, m, n = values[segment], values[segment + 1], slopes[segment], slopes[segment + 1]
-    return (1 + 2 * s) * (1 - s) ** 2 * p + s * (1 - s) ** 2 * m + s * s * (3 - 2 * s) * q + s * s * (s - 1) * n
+    return np.asarray(
+        (1 + 2 * s) * (1 - s) ** 2 * p + s * (1 - s) ** 2 * m + s * s * (3 - 2 * s) * q + s * s * (s - 1) * n
+    )
 
 
 def _baked(points: Array, other: Edge) -> Side:

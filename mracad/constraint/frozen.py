@@ -56,7 +56,7 @@ class Separation:
     @property
     def free(self) -> Array:
         """Points that an edit may move: visible and not frozen."""
-        return self.visible & ~self.frozen
+        return np.asarray(self.visible & ~self.frozen)
 
 
 def reached(net: Net, faces: Sequence[Face]) -> dict[int, Array]:
@@ -130,7 +130,7 @@ def frozen_along(net: Net, curves: Sequence[Curve], region: Region, orders: Sequ
                 break
         else:
             trimmed |= crossed
-    return frozen | supported(net, trimmed)
+    return np.asarray(frozen | supported(net, trimmed))
 
 
 @kept(4096)

@@ -62,13 +62,13 @@ def _net(model: Model, face: Face) -> Net:
 
 def between(one: Array, two: Array) -> Array:
     """Angles between vectors ``(q, 3)``."""
-    return np.arctan2(np.linalg.norm(cross(one, two), axis=1), (one * two).sum(axis=1))
+    return np.asarray(np.arctan2(np.linalg.norm(cross(one, two), axis=1), (one * two).sum(axis=1)))
 
 
 def across(vectors: Array, along: Array) -> Array:
     """The part of vectors ``(q, 3)`` across directions ``along``."""
     along = along / np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-300)
-    return vectors - (vectors * along).sum(axis=1, keepdims=True) * along
+    return np.asarray(vectors - (vectors * along).sum(axis=1, keepdims=True) * along)
 
 
 def from_inside(face: Face, net: Net, edge: int, uv: Array) -> tuple[Array, tuple[Limit, Limit]]:

@@ -62,7 +62,7 @@ class Trace:
         uv = self.curve.evaluate(self._at(share))[0]
         if self.line is not None:
             uv[:, self.line[0]] = self.line[1]
-        return uv
+        return np.asarray(uv)
 
     def on(self, net: Net, share: Array, derivatives: int) -> tuple[Array, ...]:
         """A surface and its derivatives at fractions of the seam, seen from inside the face."""
@@ -92,7 +92,7 @@ class Trace:
         """Derivative of the curve by its own fraction, in the sense of the seam, ``(q, 2)``."""
         start, stop = self.curve.knots.domain
         back = self.law is not None and self.law[1][-1] < self.law[1][0]
-        return self.curve.evaluate(self._at(share), 1)[1] * (start - stop if back else stop - start)
+        return np.asarray(self.curve.evaluate(self._at(share), 1)[1] * (start - stop if back else stop - start))
 
     def _at(self, share: Array) -> Array:
         start, stop = self.curve.knots.domain
@@ -130,7 +130,7 @@ def crossings(trace: Trace, spaces: tuple[KnotVector, KnotVector]) -> Array:
         inside = (line - x[step]) / (x[step + 1] - x[step])
         found.append(share[step] + inside * (share[1] - share[0]))
     every = np.sort(np.concatenate(found))
-    return every[np.append(True, np.diff(every) > NEAR)]
+    return np.asarray(every[np.append(True, np.diff(every) > NEAR)])
 
 
 def derived(table: Sequence[Array], way: Array, bend: Array, order: int) -> Array:
@@ -152,9 +152,9 @@ def derived(table: Sequence[Array], way: Array, bend: Array, order: int) -> Arra
     if order == 0:
         return table[0]
     if order == 1:
-        return x * table[1] + y * table[2]
+        return np.asarray(x * table[1] + y * table[2])
     twice = x * x * table[3] + 2 * x * y * table[4] + y * y * table[5]
-    return twice + bend[:, :1] * table[1] + bend[:, 1:] * table[2]
+    return np.asarray(twice + bend[:, :1] * table[1] + bend[:, 1:] * table[2])
 
 
 def directions(ground: Mapping[int, Net], a: Trace, b: Trace, share: Array) -> list[tuple[Array, Array, Array]]:
@@ -173,17 +173,17 @@ def directions(ground: Mapping[int, Net], a: Trace, b: Trace, share: Array) -> l
 
 
 def _unit(vectors: Array) -> Array:
-    return vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-300)
+    return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-300))
 
 
 def _twice(way: Array, second: Sequence[Array]) -> Array:
     """Second derivative in a direction, from those along u and v."""
     x, y = way[:, :1], way[:, 1:]
-    return x * x * second[0] + 2 * x * y * second[1] + y * y * second[2]
+    return np.asarray(x * x * second[0] + 2 * x * y * second[1] + y * y * second[2])
 
 
 def _components(su: Array, sv: Array, vector: Array) -> Array:
     """``(x, y)`` with x S_u + y S_v the part of ``vector`` in the tangent plane."""
     e, f, g, p, q = ((x * y).sum(axis=1) for x, y in ((su, su), (su, sv), (sv, sv), (su, vector), (sv, vector)))
     determinant = np.maximum(e * g - f * f, 1e-300)
-    return np.stack([p * g - q * f, q * e - p * f], axis=1) / determinant[:, None]
+    return np.asarray(np.stack([p * g - q * f, q * e - p * f], axis=1) / determinant[:, None])

@@ -229,7 +229,7 @@ def _less(together: Mapping[int, Moved], alone: Mapping[int, Moved]) -> bool:
     """
     every = next(iter(together.values()))
     gain, wanted = (sum(getattr(alone[i], name) for i in together if i in alone) for name in ("gain", "wanted"))
-    return PROMISE * every.gain * wanted < gain * every.wanted
+    return bool(PROMISE * every.gain * wanted < gain * every.wanted)
 
 
 def _together(

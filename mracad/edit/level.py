@@ -87,7 +87,7 @@ class Level:
                     for i, s in problem.spaces.items()
                 }
                 total += weight * projected(problem, coarse, smooth)
-        return total
+        return np.asarray(total)
 
     def ways(self, problem: Problem, target: Array, width: float) -> Iterable[Iterable[Array]]:
         """What is nearest to the target, and smoother ways from it to what is held."""
@@ -118,7 +118,7 @@ def projected(problem: Problem, coarse: Coarse, seams: Sequence[Seam]) -> Array:
     p, y = block_diag(refinements, format="csr"), np.concatenate(alone)
     if seams:
         y = y + _joined(problem, coarse, seams, (p, block_diag(grams, format="csr"), y))
-    return np.asarray(p @ y) - problem.f
+    return np.asarray(np.asarray(p @ y) - problem.f)
 
 
 def _joined(problem: Problem, coarse: Coarse, seams: Sequence[Seam], system: tuple[Any, Any, Array]) -> Array:

@@ -203,12 +203,12 @@ def bounded(net: Net, offset: Array, bound: float, width: float) -> Array:
     far = np.abs((np.asarray(net.with_poles(offset).grid(us, vs)) * normals).sum(axis=-1))
     far = maximum_filter(far, 2 * FINER + 1, mode="nearest")[::FINER, ::FINER]
     share = bound / np.maximum(far, bound)
-    return offset * eased(net, share, width)[..., None]
+    return np.asarray(offset * eased(net, share, width)[..., None])
 
 
 def _between(places: Array) -> Array:
     """Parameters with more between each and the next."""
-    return np.interp(np.arange(FINER * (len(places) - 1) + 1) / FINER, np.arange(len(places)), places)
+    return np.asarray(np.interp(np.arange(FINER * (len(places) - 1) + 1) / FINER, np.arange(len(places)), places))
 
 
 def displaced(net: Net, offset: Array) -> Net:

@@ -223,7 +223,7 @@ def _terms(joint: Joint, order: int, share: Array, sides: Sequence[Any]) -> tupl
 
 def _law(coefficients: Array, share: Array) -> Array:
     """A polynomial of the joint at fractions of the seam, ``(q, 1)``."""
-    return np.polynomial.polynomial.polyval(share, np.append(coefficients, 0.0))[:, None]
+    return np.asarray(np.polynomial.polynomial.polyval(share, np.append(coefficients, 0.0))[:, None])
 
 
 def _asked(spaces: Mapping[int, tuple[KnotVector, KnotVector]], seam: Seam, order: int) -> KnotVector:

@@ -117,4 +117,4 @@ class Constrained:
 
 def _lengths(rows: Any) -> Array:
     """Euclidean norms of the rows of a sparse matrix."""
-    return np.sqrt(np.asarray(rows.multiply(rows).sum(axis=1)).ravel())
+    return np.asarray(np.sqrt(np.asarray(rows.multiply(rows).sum(axis=1)).ravel()))

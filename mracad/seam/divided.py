@@ -194,7 +194,9 @@ class Divided:
         if not len(self.there):
             return x
         scaled = self._scaled(x)
-        return x + self.scale[:, None] * self._met(-(self.rows @ scaled), float(np.abs(scaled).max(initial=0.0)))
+        return np.asarray(
+            x + self.scale[:, None] * self._met(-(self.rows @ scaled), float(np.abs(scaled).max(initial=0.0)))
+        )
 
     def _scaled(self, x: Array) -> Array:
         return x / np.where(self.scale > 0, self.scale, np.inf)[:, None]

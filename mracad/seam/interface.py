@@ -221,7 +221,7 @@ def mended_ends(
     firm, _ = rims(model, net, faces, movable, joined, free)
     points = np.asarray(net.grid(net.u.greville(), net.v.greville())).reshape(-1, 3)
     near = KDTree(np.concatenate(ends)).query(points)[0] <= within
-    return ~firm & near.reshape(firm.shape)
+    return np.asarray(~firm & near.reshape(firm.shape))
 
 
 def away(model: Model, net: Net, faces: Iterable[Face], moving: Collection[int]) -> Array:

@@ -54,7 +54,7 @@ def _expansion() -> Array:
     """Chebyshev coefficients of p((t + 1) / 2), with the least error of (1 − c) p(c), which is the gain."""
     t = np.cos(np.pi * (np.arange(200) + 0.5) / 200)
     weighted = chebvander(t, TERMS) * (1 - t)[:, None]
-    return np.linalg.lstsq(weighted, (1 - t) ** 2 / (1 + t * t), rcond=None)[0]
+    return np.asarray(np.linalg.lstsq(weighted, (1 - t) ** 2 / (1 + t * t), rcond=None)[0])
 
 
 _EXPANSION = _expansion()
@@ -198,11 +198,11 @@ class Problem:
             pull = pull - self.soft @ kept
         if self.pull is not None:
             pull = pull + self.pull
-        return kept + self._solver(stiffness, self.free)(pull, start=kept, goal=self.goal)
+        return np.asarray(kept + self._solver(stiffness, self.free)(pull, start=kept, goal=self.goal))
 
     def settled(self, delta: Array, stiffness: float = 0.0) -> Array:
         """A displacement ``(points, 3)`` with what it misses of the conditions put right as smoothly as can be."""
-        return delta + self._solver(stiffness, self.free)(np.zeros_like(delta), start=delta, goal=self.goal)
+        return np.asarray(delta + self._solver(stiffness, self.free)(np.zeros_like(delta), start=delta, goal=self.goal))
 
     def _solver(self, stiffness: float, free: Array) -> Constrained | Divided:
         """The solver of the form M + stiffness · K and the contacts."""
@@ -246,7 +246,7 @@ class Problem:
         every = [np.full(s.free.shape, np.inf) if s.away is None else s.away for s in self.spaces.values()]
         away = np.concatenate([each.ravel() for each in every])
         share = np.minimum(away / width, 1.0)[:, None]
-        return share**3 * (10 - 15 * share + 6 * share**2)
+        return np.asarray(share**3 * (10 - 15 * share + 6 * share**2))
 
     def gains(self, delta: Array, target: Array, amounts: Sequence[float]) -> list[float]:
         """By how much amounts of a displacement bring each surface nearer to a target, as a squared norm."""
@@ -284,4 +284,4 @@ def _chebyshev(power: Callable[[Array], Array], first: Array) -> Array:
         now += _EXPANSION[k] * first
         now -= before
         last, before = now, last
-    return last
+    return np.asarray(last)

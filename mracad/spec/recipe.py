@@ -169,7 +169,7 @@ class Recipe:
                 raise UsageError(f"{place}: another step has the id {name!r}", "give it another")
 
 
-def load(path: str | os.PathLike) -> Recipe:
+def load(path: str | os.PathLike[str]) -> Recipe:
     """Read a recipe from a TOML file.
 
     Raises
@@ -268,7 +268,7 @@ def title(steps: Iterable[Step]) -> str:
     return " ! ".join(step.text() for step in steps)
 
 
-def record_of(steps: Iterable[Step], place: str | os.PathLike) -> str:
+def record_of(steps: Iterable[Step], place: str | os.PathLike[str]) -> str:
     """The steps as a recipe with every option resolved and the versions of what did them.
 
     Parameters

@@ -96,17 +96,17 @@ class Charts:
 
     def local(self, points: Array, which: Array) -> Array:
         """a, b and height (mm) of points ``(q, 3)``, each in one of the charts."""
-        return np.einsum("qij,qj->qi", self.axes[which], points - self.origin[which])
+        return np.asarray(np.einsum("qij,qj->qi", self.axes[which], points - self.origin[which]))
 
     def coordinates(self, local: Array, which: Array) -> Array:
         """Normal coordinates x, y (mm) of points given by a and b."""
         reach = self.reach[which]
-        return reach[:, None] * self._sums(local[:, :2].T / reach, which, self.log)
+        return np.asarray(reach[:, None] * self._sums(local[:, :2].T / reach, which, self.log))
 
     def places(self, xy: Array, which: Array) -> Array:
         """a and b (mm) of normal coordinates."""
         reach = self.reach[which]
-        return reach[:, None] * self._sums(xy.T / reach, which, self.exp)
+        return np.asarray(reach[:, None] * self._sums(xy.T / reach, which, self.exp))
 
     @staticmethod
     def _sums(at: Array, which: Array, coefficients: Array) -> Array:
@@ -147,7 +147,7 @@ def _products(at: Array) -> Array:
     for k in range(1, DEGREE + 2):
         np.multiply(powers[:, k - 1], at, out=powers[:, k])
     i, j = _powers(DEGREE + 1)
-    return powers[0, i] * powers[1, j]
+    return np.asarray(powers[0, i] * powers[1, j])
 
 
 @kept(16)

@@ -112,7 +112,7 @@ def save(feature: Feature) -> bytes:
     return msgspec.json.encode(content) + b"\n"
 
 
-def load(path: str | os.PathLike) -> Feature:
+def load(path: str | os.PathLike[str]) -> Feature:
     """A feature from a file; raises FileError."""
     file = Path(path)
     hint = "make one with mracad feature extract"

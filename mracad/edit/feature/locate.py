@@ -239,7 +239,7 @@ def _beyond(net: Net, box: Array) -> Array:
         length = np.zeros(len(line))
         length[order] = np.append(0.0, np.cumsum(steps))
         apart.append(np.maximum(np.maximum(length[-2] - length[:-2], length[:-2] - length[-1]), 0.0))
-    return np.hypot(apart[0][:, None], apart[1]).ravel()
+    return np.asarray(np.hypot(apart[0][:, None], apart[1]).ravel())
 
 
 def window(ground: Ground, text: str, width: float | None) -> Window:

@@ -90,7 +90,7 @@ class Patch:
         signs = np.array([float(face.outward) for face in self.faces])
         if (signs == signs[0]).all():
             return np.full(len(uv), signs[0])
-        return signs[np.argmin([self._off(face, uv) for face in self.faces], axis=0)]
+        return np.asarray(signs[np.argmin([self._off(face, uv) for face in self.faces], axis=0)])
 
     def evaluate(self, uv: Array) -> tuple[Array, Array, Array, Array]:
         """Points, derivatives and unit normals (outward) at parameters ``(q, 2)``."""

@@ -86,7 +86,7 @@ class Character:
 
     def local(self, uv: Array) -> Array:
         """The detail at parameters, in those frames."""
-        return np.einsum("qij,qj->qi", self.frames(uv), np.asarray(self.detail.evaluate(uv)))
+        return np.asarray(np.einsum("qij,qj->qi", self.frames(uv), np.asarray(self.detail.evaluate(uv))))
 
 
 def _lengths(net: Net, axis: int, low: Array, high: Array) -> tuple[Array, Array]:
@@ -114,7 +114,7 @@ class Carried:
         """The displacement ``(q, 3)`` at parameters of the target, in the part's frame."""
         there = self.other.parameters(self.way.back(self.own.lengths(uv)))
         moved = self.way.on(self.other.local(there))
-        return self.share * np.einsum("qij,qi->qj", self.own.frames(uv), moved)
+        return np.asarray(self.share * np.einsum("qij,qi->qj", self.own.frames(uv), moved))
 
 
 def laid_on(
@@ -188,7 +188,7 @@ def _poles(target: Patch, ideal: Carried, knots: Knots) -> Array:
 def _middles(target: Patch, u: KnotVector, v: KnotVector) -> Array:
     """Parameters on a patch half-way between neighbouring Greville points of both directions."""
     uv = pairs(*((x[1:] + x[:-1]) / 2 for x in (np.sort(k.greville()) for k in (u, v))))
-    return uv[target.covers(uv)]
+    return np.asarray(uv[target.covers(uv)])
 
 
 def _window(net: Net, free: Array, width: float) -> Array:
