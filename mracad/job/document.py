@@ -164,9 +164,9 @@ def run(
         When faces were asked for one by one and none can move, or the result would be less valid than the input,
         whatever faces are left.  The document must then not be written.
     """
+    from mracad.job.look import looked_at
     from mracad.occ.check import check
     from mracad.occ.files import read
-    from mracad.occ.look import looked_at
     from mracad.occ.view import view
 
     stage = partial(_told, progress)

@@ -21,7 +21,7 @@ def panel(tmp_path):
 @pytest.mark.parametrize(
     ("place", "phase"),
     [
-        ("mracad.occ.look:view", "looking at faces"),
+        ("mracad.job.look:view", "looking at faces"),
         ("mracad.edit.fair:drive", "editing"),
     ],
 )

@@ -27,7 +27,7 @@ def command() -> None:
 def list_(reading: Reading, chosen: Selection, as_json: bool) -> None:
     """Propose features: places where the detail of a face stands out, with size, height and scales."""
     from mracad.edit.feature.find import found
-    from mracad.occ.look import looked_at
+    from mracad.job.look import looked_at
     from mracad_cli.render.json import json_text, plain
     from mracad_cli.render.text import mm, say
 
@@ -55,7 +55,7 @@ def list_(reading: Reading, chosen: Selection, as_json: bool) -> None:
 def extract(reading: Reading, chosen: Extract, output: str, overwrite: bool, as_json: bool) -> None:
     from mracad.edit.feature.detail import save
     from mracad.edit.feature.extract import feature_of
-    from mracad.occ.look import looked_at
+    from mracad.job.look import looked_at
     from mracad_cli.render.json import json_text
     from mracad_cli.render.text import mm
 
