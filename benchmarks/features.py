@@ -25,15 +25,15 @@ def ground(x: np.ndarray, y: np.ndarray) -> np.ndarray:
 def make_face(path: Path) -> None:
     """A sheet of 1 mm bicubic spans with one bump."""
     from mracad.occ.step import write_step
-    from samples import make
+    from samples.models import documents, geometry, splines, topology
 
-    knots = make.clamped(np.linspace(0.0, SIDE, int(SIDE) + 1), 3)
-    x, y = np.meshgrid(make.greville(knots, 3), make.greville(knots, 3), indexing="ij")
+    knots = splines.clamped(np.linspace(0.0, SIDE, int(SIDE) + 1), 3)
+    x, y = np.meshgrid(splines.greville(knots, 3), splines.greville(knots, 3), indexing="ij")
     bump = 0.8 * np.exp(-((x - PLACE) ** 2 + (y - PLACE) ** 2) / (2 * 2.0**2))
-    surface = make.surface(np.stack([x, y, ground(x, y) + bump], axis=-1), knots, knots)
+    surface = geometry.surface(np.stack([x, y, ground(x, y) + bump], axis=-1), knots, knots)
     from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeFace
 
-    write_step(make.single(BRepBuilderAPI_MakeFace(surface, make.TOL).Face(), "sheet"), path)
+    write_step(documents.single(BRepBuilderAPI_MakeFace(surface, topology.TOL).Face(), "sheet"), path)
 
 
 def peak() -> float:

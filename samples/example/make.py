@@ -14,7 +14,7 @@ from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeFace
 from OCP.TopoDS import TopoDS_Compound
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
-from samples import make
+from samples.models import documents, geometry, splines, topology
 
 SIDE, SPANS = 60.0, 40
 
@@ -33,14 +33,14 @@ def ripple(x: np.ndarray, y: np.ndarray) -> np.ndarray:
 def main(folder: Path) -> None:
     """Write the file."""
     breaks = np.linspace(0.0, SIDE, SPANS + 1)
-    knots = make.clamped(breaks, 3)
-    x, y = np.meshgrid(make.greville(knots, 3), make.greville(knots, 3), indexing="ij")
+    knots = splines.clamped(breaks, 3)
+    x, y = np.meshgrid(splines.greville(knots, 3), splines.greville(knots, 3), indexing="ij")
     plates, builder = TopoDS_Compound(), BRep_Builder()
     builder.MakeCompound(plates)
     for shape, shift in ((emboss, 0.0), (ripple, 100.0)):
-        poles = make.settle(np.stack([x + shift, y, shape(x, y)], axis=-1), make.FINE)
-        builder.Add(plates, BRepBuilderAPI_MakeFace(make.surface(poles, knots, knots), make.TOL).Face())
-    make.write(make.single(plates, "details"), folder / "details.step")
+        poles = splines.settle(np.stack([x + shift, y, shape(x, y)], axis=-1), geometry.FINE)
+        builder.Add(plates, BRepBuilderAPI_MakeFace(geometry.surface(poles, knots, knots), topology.TOL).Face())
+    documents.write(documents.single(plates, "details"), folder / "details.step")
 
 
 if __name__ == "__main__":

@@ -15,12 +15,13 @@ from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS_Shape
 from OCP.XCAFDoc import XCAFDoc_ColorSurf, XCAFDoc_DocumentTool
 
-from models.documents import blank, name
-from models.geometry import surface
-from models.parts import natural_rims, rough_top
-from models.topology import block
 from mracad.occ.document import Document
 from mracad.occ.units import Units
+
+from .documents import blank, name
+from .geometry import surface
+from .parts import natural_rims, rough_top
+from .topology import block
 
 INCH = 25.4
 

@@ -16,7 +16,7 @@ from OCP.gp import gp_Dir2d, gp_Pnt, gp_Pnt2d, gp_Vec, gp_Vec2d
 from OCP.TColgp import TColgp_Array1OfPnt, TColgp_Array1OfPnt2d, TColgp_Array2OfPnt
 from OCP.TColStd import TColStd_Array1OfInteger, TColStd_Array1OfReal, TColStd_Array2OfReal
 
-from models.splines import settle
+from .splines import settle
 
 FINE = 16  # bits after the point of what the kernel computed: 2e-5 mm
 

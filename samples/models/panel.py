@@ -8,11 +8,12 @@ from itertools import pairwise
 import numpy as np
 from OCP.TopoDS import TopoDS_Edge, TopoDS_Shell
 
-from models.documents import single
-from models.geometry import curve, line2d, surface
-from models.splines import breaks, clamped, greville, settle, split
-from models.topology import Side, edge, face, shell, vertex
 from mracad.occ.document import Document
+
+from .documents import single
+from .geometry import curve, line2d, surface
+from .splines import breaks, clamped, greville, settle, split
+from .topology import Side, edge, face, shell, vertex
 
 PANEL = (300.0, 200.0)
 PATCHES = (3, 2)

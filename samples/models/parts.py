@@ -16,11 +16,12 @@ from OCP.Geom2d import Geom2d_Circle, Geom2d_Curve
 from OCP.gp import gp_Ax2, gp_Ax2d, gp_Dir, gp_Dir2d, gp_Pnt, gp_Pnt2d
 from OCP.TopoDS import TopoDS_Edge, TopoDS_Face
 
-from models.documents import single
-from models.geometry import Path3, curve, line2d, on_surface, surface
-from models.splines import breaks, clamped, greville, insert, settle
-from models.topology import BUILD, Rim, Side, block, edge, face, solid, vertex
 from mracad.occ.document import Document
+
+from .documents import single
+from .geometry import Path3, curve, line2d, on_surface, surface
+from .splines import breaks, clamped, greville, insert, settle
+from .topology import BUILD, Rim, Side, block, edge, face, solid, vertex
 
 
 def rough_top(

@@ -25,8 +25,8 @@ from OCP.TopAbs import TopAbs_FORWARD, TopAbs_REVERSED
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS_Edge, TopoDS_Face, TopoDS_Shell, TopoDS_Solid, TopoDS_Vertex, TopoDS_Wire
 
-from models.geometry import FINE, Path3, curve, line2d
-from models.splines import greville, settle
+from .geometry import FINE, Path3, curve, line2d
+from .splines import greville, settle
 
 TOL = 1e-7
 BUILD = BRep_Builder()

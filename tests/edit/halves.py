@@ -4,7 +4,7 @@ import numpy as np
 
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
-from samples import make
+from samples.models import documents, geometry, topology
 from tests.edit import panels
 
 SIZE = 200.0
@@ -68,7 +68,7 @@ def document(left, right, sewn=True, beside=0.0):
 
     The vertices lie ``beside`` the ends of the seam, mm.
     """
-    grounds = [make.surface(net.poles, net.u.knots, net.v.knots, (3, 3)) for net in (left, right)]
+    grounds = [geometry.surface(net.poles, net.u.knots, net.v.knots, (3, 3)) for net in (left, right)]
     faces = []
     edge = None
     for net, ground, shear, far in zip(
@@ -77,25 +77,27 @@ def document(left, right, sewn=True, beside=0.0):
         row = 0 if far == net.u.domain[0] else -1
         back = not sewn and row == -1
         knots, path = _path(shear, back)
-        trace = make.curve(path, knots.knots, 3)
+        trace = geometry.curve(path, knots.knots, 3)
         if edge is None or not sewn:
-            curve = make.on_surface(ground, trace, 0.0, SIZE, 400)
+            curve = geometry.on_surface(ground, trace, 0.0, SIZE, 400)
             points = curve.poles[[-1, 0]] if back else curve.poles[[0, -1]]
-            ends = [make.vertex((x, y, z + beside), 1e-7 + 2 * beside) for x, y, z in points]
-            edge = make.edge(curve.geometry, tuple(ends[::-1] if back else ends), (0.0, SIZE), 1e-2)
-        corners = [make.vertex(net.poles[row, k]) for k in (0, -1)]
+            ends = [topology.vertex((x, y, z + beside), 1e-7 + 2 * beside) for x, y, z in points]
+            edge = topology.edge(curve.geometry, tuple(ends[::-1] if back else ends), (0.0, SIZE), 1e-2)
+        corners = [topology.vertex(net.poles[row, k]) for k in (0, -1)]
         rails = []
         for k, x in enumerate(sorted(path[[0, -1]].tolist(), key=lambda place: place[1])):
             low, high = sorted((far, x[0]))
-            rail = make.curve(net.poles[:, -k], net.u.knots, 3)
+            rail = geometry.curve(net.poles[:, -k], net.u.knots, 3)
             pair = (corners[k], ends[k]) if row == 0 else (ends[k], corners[k])
-            rails.append(make.Side(make.edge(rail, pair, (low, high)), make.line2d((0.0, SIZE * k), (1, 0)), k == 0))
-        side = make.edge(make.curve(net.poles[row], net.v.knots, 3), tuple(corners), (0.0, SIZE))
-        outer = make.Side(side, make.line2d((far, 0.0), (0, 1)), row == -1)
-        inner = make.Side(edge, trace, (row == 0) != back)
+            rails.append(
+                topology.Side(topology.edge(rail, pair, (low, high)), geometry.line2d((0.0, SIZE * k), (1, 0)), k == 0)
+            )
+        side = topology.edge(geometry.curve(net.poles[row], net.v.knots, 3), tuple(corners), (0.0, SIZE))
+        outer = topology.Side(side, geometry.line2d((far, 0.0), (0, 1)), row == -1)
+        inner = topology.Side(edge, trace, (row == 0) != back)
         loop = [rails[0], inner, rails[1], outer] if row == 0 else [rails[0], outer, rails[1], inner]
-        faces.append(make.face(ground, [loop]))
-    return make.single(make.shell(faces), "halves")
+        faces.append(topology.face(ground, [loop]))
+    return documents.single(topology.shell(faces), "halves")
 
 
 def _path(shear, back):

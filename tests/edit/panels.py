@@ -8,7 +8,7 @@ import numpy as np
 from mracad.bspline.basis import basis
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
-from samples import make
+from samples.models import documents, geometry, topology
 
 SIZE = 100.0
 
@@ -138,13 +138,13 @@ def document(patches, sewn=True):
         if (i, j) not in corners:
             patch = patches[min(i, grid[0] - 1), min(j, grid[1] - 1)]
             at = patch.place((SIZE * i, SIZE * j))
-            corners[i, j] = make.vertex(patch.net.evaluate([at])[0])
+            corners[i, j] = topology.vertex(patch.net.evaluate([at])[0])
         return corners[i, j]
 
     def edge(start, stop, patch):
         if (start, stop) not in edges:
             path = _boundary(patch, start, stop)
-            edges[start, stop] = make.edge(path, (corner(*start), corner(*stop)), (0.0, 1.0))
+            edges[start, stop] = topology.edge(path, (corner(*start), corner(*stop)), (0.0, 1.0))
         return edges[start, stop]
 
     faces = []
@@ -158,15 +158,15 @@ def document(patches, sewn=True):
             forward = start < stop
             low, high = (start, stop) if forward else (stop, start)
             ends = np.array([patch.place((SIZE * a, SIZE * b)) for a, b in (low, high)], float)
-            path = make.curve(ends, np.array([0.0, 0.0, 1.0, 1.0]), 1)
-            loop.append(make.Side(edge(low, high, patch), path, forward))
+            path = geometry.curve(ends, np.array([0.0, 0.0, 1.0, 1.0]), 1)
+            loop.append(topology.Side(edge(low, high, patch), path, forward))
         odd = len(patch.turns) % 2 == 1
         if odd:
             loop = [replace(side, forward=not side.forward) for side in loop[::-1]]
         net = patch.net
-        on = make.surface(net.poles, net.u.knots, net.v.knots, (net.u.degree, net.v.degree))
-        faces.append(make.face(on, [loop], outward=not odd))
-    return make.single(make.shell(faces), "panel")
+        on = geometry.surface(net.poles, net.u.knots, net.v.knots, (net.u.degree, net.v.degree))
+        faces.append(topology.face(on, [loop], outward=not odd))
+    return documents.single(topology.shell(faces), "panel")
 
 
 def _boundary(patch, start, stop):
@@ -181,7 +181,7 @@ def _boundary(patch, start, stop):
     knots = (along.knots - low) / (high - low)
     if ends[0, 1 - axis] > ends[1, 1 - axis]:
         knots, poles = (1.0 - knots)[::-1], poles[::-1]
-    return make.curve(poles, knots, along.degree)
+    return geometry.curve(poles, knots, along.degree)
 
 
 def rms(nets, patches, clean, count=40):
@@ -199,25 +199,25 @@ def rms(nets, patches, clean, count=40):
 
 def pair(left, right):
     """Two nets over the unit square, that share the curve u = 0, as a document."""
-    ends = [make.vertex(left.poles[0, 0]), make.vertex(left.poles[0, -1])]
-    common = make.edge(make.curve(right.poles[0], right.v.knots, right.v.degree), ends, (0.0, 1.0))
+    ends = [topology.vertex(left.poles[0, 0]), topology.vertex(left.poles[0, -1])]
+    common = topology.edge(geometry.curve(right.poles[0], right.v.knots, right.v.degree), ends, (0.0, 1.0))
     faces = []
     for net in (left, right):
-        far = [make.vertex(net.poles[-1, 0]), make.vertex(net.poles[-1, -1])]
+        far = [topology.vertex(net.poles[-1, 0]), topology.vertex(net.poles[-1, -1])]
         rails = [
-            make.edge(make.curve(net.poles[:, k], net.u.knots, net.u.degree), (ends[k], far[k]), (0.0, 1.0))
+            topology.edge(geometry.curve(net.poles[:, k], net.u.knots, net.u.degree), (ends[k], far[k]), (0.0, 1.0))
             for k in (0, -1)
         ]
-        end = make.edge(make.curve(net.poles[-1], net.v.knots, net.v.degree), far, (0.0, 1.0))
+        end = topology.edge(geometry.curve(net.poles[-1], net.v.knots, net.v.degree), far, (0.0, 1.0))
         loop = [
-            make.Side(rails[0], make.line2d((0.0, 0.0), (1, 0))),
-            make.Side(end, make.line2d((1.0, 0.0), (0, 1))),
-            make.Side(rails[1], make.line2d((0.0, 1.0), (1, 0)), False),
-            make.Side(common, make.line2d((0.0, 0.0), (0, 1)), False),
+            topology.Side(rails[0], geometry.line2d((0.0, 0.0), (1, 0))),
+            topology.Side(end, geometry.line2d((1.0, 0.0), (0, 1))),
+            topology.Side(rails[1], geometry.line2d((0.0, 1.0), (1, 0)), False),
+            topology.Side(common, geometry.line2d((0.0, 0.0), (0, 1)), False),
         ]
-        on = make.surface(net.poles, net.u.knots, net.v.knots, (net.u.degree, net.v.degree))
-        faces.append(make.face(on, [loop]))
-    return make.single(make.shell([faces[0].Reversed(), faces[1]]), "pair")
+        on = geometry.surface(net.poles, net.u.knots, net.v.knots, (net.u.degree, net.v.degree))
+        faces.append(topology.face(on, [loop]))
+    return documents.single(topology.shell([faces[0].Reversed(), faces[1]]), "pair")
 
 
 def junction(noisy):
@@ -231,7 +231,7 @@ def junction(noisy):
         (1, 0, 2, 1): quarters[1, 0].net,
         (1, 1, 2, 2): quarters[1, 1].net,
     }
-    corners = {(i, j): make.vertex(noisy.evaluate([(SIZE * i, SIZE * j)])[0]) for i in range(3) for j in range(3)}
+    corners = {(i, j): topology.vertex(noisy.evaluate([(SIZE * i, SIZE * j)])[0]) for i in range(3) for j in range(3)}
     edges, faces = {}, []
     for (i0, j0, i1, j1), net in nets.items():
         right = [(i1, j) for j in ([j0, 1, j1] if j1 - j0 == 2 and i1 == 1 else [j0, j1])]
@@ -244,10 +244,12 @@ def junction(noisy):
                 beside = (
                     quarters[min(low[0], 1), min(low[1], 1)] if short else Patch(net, "", ((0, SIZE), (0, 2 * SIZE)))
                 )
-                edges[low, high] = make.edge(_boundary(beside, low, high), (corners[low], corners[high]), (0.0, 1.0))
+                edges[low, high] = topology.edge(
+                    _boundary(beside, low, high), (corners[low], corners[high]), (0.0, 1.0)
+                )
             ends = SIZE * np.array([low, high], float)
-            path = make.curve(ends, np.array([0.0, 0.0, 1.0, 1.0]), 1)
-            loop.append(make.Side(edges[low, high], path, start < stop))
-        on = make.surface(net.poles, net.u.knots, net.v.knots, (net.u.degree, net.v.degree))
-        faces.append(make.face(on, [loop]))
-    return make.single(make.shell(faces), "junction")
+            path = geometry.curve(ends, np.array([0.0, 0.0, 1.0, 1.0]), 1)
+            loop.append(topology.Side(edges[low, high], path, start < stop))
+        on = geometry.surface(net.poles, net.u.knots, net.v.knots, (net.u.degree, net.v.degree))
+        faces.append(topology.face(on, [loop]))
+    return documents.single(topology.shell(faces), "junction")

@@ -19,7 +19,7 @@ from mracad.occ.files import write
 from mracad.occ.step import read_step
 from mracad.occ.view import view
 from mracad.spec.steps import Smooth
-from samples import make
+from samples.models import documents
 from tests.occ.test_mesh import corners, is_watertight
 
 NOISE, SPANS = 0.05, 8
@@ -31,7 +31,7 @@ def rounded_box():
     solid = BRepBuilderAPI_NurbsConvert(solid, True).Shape()
     for face in cadquery.Shape.cast(solid).Faces():
         BRep_Tool.Surface_s(TopoDS.Face_s(face.wrapped), TopLoc_Location()).IncreaseDegree(3, 3)
-    document = make.single(solid, "box")
+    document = documents.single(solid, "box")
     model = view(document)
     rng, offsets = np.random.default_rng(3), {}
     for surface in model.surfaces:
@@ -75,7 +75,7 @@ def test_solids_stay_solid_and_smooth(samples, tmp_path, source, scale):
 def pipe():
     path = cadquery.Workplane("XY").spline([(0, 0), (20, 5), (40, 30), (60, 20)])
     solid = cadquery.Workplane("YZ").circle(4).sweep(path).val().wrapped
-    return make.single(BRepBuilderAPI_NurbsConvert(solid, True).Shape(), "pipe")
+    return documents.single(BRepBuilderAPI_NurbsConvert(solid, True).Shape(), "pipe")
 
 
 def test_a_clean_pipe_is_left_as_it_is():

@@ -6,7 +6,7 @@ from mracad.bspline.fit import interpolated as at_greville
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
 from mracad.wavelet.ladder import arc_lengths
-from samples import make
+from samples.models import documents, geometry, topology
 from tests.edit.models import fitted
 from tests.edit.panels import interpolated
 from tests.occ import shapes
@@ -75,7 +75,7 @@ def save(path, *nets):
     for net in nets:
         degrees = (net.u.degree, net.v.degree)
         weights = () if net.weights is None else (net.weights,)
-        faces.append(shapes.face_on(make.surface(net.poles, net.u.knots, net.v.knots, degrees, *weights)))
+        faces.append(shapes.face_on(geometry.surface(net.poles, net.u.knots, net.v.knots, degrees, *weights)))
     return shapes.save(shapes.compound(*faces) if len(faces) > 1 else faces[0], path)
 
 
@@ -87,9 +87,9 @@ def rhombi(side=60.0, spans=30, bend=0.0, degree=3, turns=("", "", "")):
     corner = [side * np.array([np.cos(a), np.sin(a)]) for a in np.radians([90, 210, 330])]
     k = KnotVector.clamped(np.linspace(0.0, 1.0, spans + 1), degree)
     lift = lambda p: np.r_[p, bend * (p @ p) / 2]  # noqa: E731
-    hub = make.vertex(lift(np.zeros(2)))
-    rim = [make.vertex(lift(c)) for c in corner]
-    tips = [make.vertex(lift(corner[i] + corner[(i + 1) % 3])) for i in range(3)]
+    hub = topology.vertex(lift(np.zeros(2)))
+    rim = [topology.vertex(lift(c)) for c in corner]
+    tips = [topology.vertex(lift(corner[i] + corner[(i + 1) % 3])) for i in range(3)]
 
     u, v = np.meshgrid(k.greville(), k.greville(), indexing="ij")
     nets = []
@@ -98,24 +98,28 @@ def rhombi(side=60.0, spans=30, bend=0.0, degree=3, turns=("", "", "")):
         x, y = (u * p[axis] + v * q[axis] for axis in (0, 1))
         paraboloid = lambda s, t, p=p, q=q: bend / 2 * sum((s * p[k] + t * q[k]) ** 2 for k in (0, 1))  # noqa: E731
         nets.append(Net(k, k, np.stack([x, y, _interpolated(k, paraboloid)], axis=-1)))
-    spokes = [make.edge(make.curve(nets[i].poles[:, 0], k.knots, degree), (hub, rim[i]), (0.0, 1.0)) for i in range(3)]
+    spokes = [
+        topology.edge(geometry.curve(nets[i].poles[:, 0], k.knots, degree), (hub, rim[i]), (0.0, 1.0)) for i in range(3)
+    ]
     faces = []
     for i, n in enumerate(nets):
         far = [
-            make.edge(make.curve(n.poles[-1], k.knots, degree), (rim[i], tips[i]), (0.0, 1.0)),
-            make.edge(make.curve(n.poles[:, -1], k.knots, degree), (rim[(i + 1) % 3], tips[i]), (0.0, 1.0)),
+            topology.edge(geometry.curve(n.poles[-1], k.knots, degree), (rim[i], tips[i]), (0.0, 1.0)),
+            topology.edge(geometry.curve(n.poles[:, -1], k.knots, degree), (rim[(i + 1) % 3], tips[i]), (0.0, 1.0)),
         ]
         way = (lambda a, b: (b, a)) if turns[i] == "x" else (lambda a, b: (a, b))
         loop = [
-            make.Side(spokes[i], make.line2d(way(0.0, 0.0), way(1, 0))),
-            make.Side(far[0], make.line2d(way(1.0, 0.0), way(0, 1))),
-            make.Side(far[1], make.line2d(way(0.0, 1.0), way(1, 0)), False),
-            make.Side(spokes[(i + 1) % 3], make.line2d(way(0.0, 0.0), way(0, 1)), False),
+            topology.Side(spokes[i], geometry.line2d(way(0.0, 0.0), way(1, 0))),
+            topology.Side(far[0], geometry.line2d(way(1.0, 0.0), way(0, 1))),
+            topology.Side(far[1], geometry.line2d(way(0.0, 1.0), way(1, 0)), False),
+            topology.Side(spokes[(i + 1) % 3], geometry.line2d(way(0.0, 0.0), way(0, 1)), False),
         ]
         poles = n.poles.swapaxes(0, 1) if turns[i] == "x" else n.poles
-        face = make.face(make.surface(poles, k.knots, k.knots, (degree, degree)), [loop], outward=turns[i] != "x")
+        face = topology.face(
+            geometry.surface(poles, k.knots, k.knots, (degree, degree)), [loop], outward=turns[i] != "x"
+        )
         faces.append(face)
-    return make.single(make.shell(faces), "rhombi")
+    return documents.single(topology.shell(faces), "rhombi")
 
 
 def _interpolated(k, function):

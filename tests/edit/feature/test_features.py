@@ -20,7 +20,7 @@ from mracad.inspect.seams import seams
 from mracad.occ.step import read_step, write_step
 from mracad.occ.view import view
 from mracad.spec.steps import Repeat, Single
-from samples import make
+from samples.models import geometry
 from tests.conftest import CORPUS
 from tests.edit import panels
 from tests.edit.feature import grounds
@@ -268,7 +268,7 @@ def test_copies_on_an_analytic_cylinder(feature, tmp_path):
 
 
 def hole(path):
-    face = shapes.face_on(make.surface(*_flat()))
+    face = shapes.face_on(geometry.surface(*_flat()))
     tool = BRepPrimAPI_MakeCylinder(gp_Ax2(gp_Pnt(60, 60, -5), gp_Dir(0, 0, 1)), 6.0, 10.0).Shape()
     return shapes.save(BRepAlgoAPI_Cut(face, tool).Shape(), path)
 
@@ -394,7 +394,7 @@ def test_features_are_found(plane, capsys):
 
 def test_transfer_of_a_feature_between_units(small, tmp_path):
     k = KnotVector.clamped(np.linspace(0.0, 120.0, 61), 3)
-    flat = shapes.face_on(make.surface(fitted(k, k, lambda x, y: 0 * x, size=1.0).poles, k.knots, k.knots))
+    flat = shapes.face_on(geometry.surface(fitted(k, k, lambda x, y: 0 * x, size=1.0).poles, k.knots, k.knots))
     inch = shapes.save(flat, tmp_path / "inch.step", "INCH")
     target = tmp_path / "out.step"
     run("transfer", small, inch, "-o", target, "--from", "near:25,25,0,radius:17", "--to", "61.2,58.3,0")
@@ -502,7 +502,7 @@ def test_a_surface_that_stands_in_two_places_is_edited_from_either(angle):
 def test_a_copy_stands_out_of_the_face_that_it_is_on():
     """Two faces on one surface, the second turned over: its outside is below."""
     net = grounds.plane(120.0, (30.0, 30.0))
-    surface = make.surface(net.poles, net.u.knots, net.v.knots, (3, 3))
+    surface = geometry.surface(net.poles, net.u.knots, net.v.knots, (3, 3))
     faces = shapes.face_on(surface, 0.0, 60.0, 0.0, 120.0), shapes.face_on(surface, 60.0, 120.0, 0.0, 120.0).Reversed()
     for number, order in enumerate((faces, faces[::-1])):
         before = view(shapes.document(shapes.compound(*order)))
