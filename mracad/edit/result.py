@@ -90,7 +90,6 @@ class Edit:
 
     displacement: Displacement
     outcomes: tuple[FaceOutcome, ...]
-    notes: tuple[str, ...] = field(default=())
     edges: tuple[Treatment, ...] = field(default=())
     copies: tuple[Copy, ...] = field(default=())
 

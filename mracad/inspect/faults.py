@@ -58,36 +58,6 @@ class Fault:
         """What identifies it in another file."""
         return self.reason, self.faces, self.status
 
-    def __str__(self) -> str:
-        where = " and ".join(f"#{face + 1}" for face in self.faces[:2]) + (" …" if len(self.faces) > 2 else "")
-        return _WORDS[self.reason].format(
-            f=self, where=where or _SOMEWHERE.get(self.reason, "somewhere"), share=_share(self.value, self.was)
-        )
-
-
-_WORDS = {
-    Reason.UNREAD: "{where} cannot be read back: {f.status}",
-    Reason.INVALID: "{f.status} in {where}",
-    Reason.SOLIDS: "{f.value:.0f} solids (were {f.was:.0f})",
-    Reason.SHELLS: "{f.value:.0f} shells (were {f.was:.0f})",
-    Reason.FACES: "{f.value:.0f} faces (were {f.was:.0f})",
-    Reason.FREE_EDGES: "{f.value:.0f} free edges (were {f.was:.0f})",
-    Reason.LOST: "{where} is lost",
-    Reason.AREA: "the area of {where} changes by {share}",
-    Reason.VOLUME: "the volume changes by {share}",
-    Reason.BOX: "the box changes by {f.value:.3g} mm",
-    Reason.TOLERANCE: "a tolerance of {f.value:.3g} mm at {where} (largest {f.was:.3g} mm)",
-    Reason.SEAM: "no seam between {where}",
-    Reason.GAP: "a gap of {f.value:.3g} mm between {where} (was {f.was:.3g} mm)",
-    Reason.ANGLE: "an angle of {f.value:.2g}° between {where} (was {f.was:.2g}°)",
-    Reason.OPEN: "the mesh is open at {where}",
-}
-_SOMEWHERE = {Reason.UNREAD: "it"}
-
-
-def _share(value: float, was: float) -> str:
-    return f"{100 * abs(value - was) / abs(was):.3g} %" if was else f"{value:.3g}"
-
 
 @dataclass(frozen=True)
 class ReadBack:

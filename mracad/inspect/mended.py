@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+import math
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
 
 from mracad.inspect.seams import SeamMeasure
 from mracad.spec.quantity import length
@@ -19,15 +21,45 @@ TANGENT = 0.01
 """Angle, degrees, that counts for none."""
 
 
+@dataclass(frozen=True)
+class Mending:
+    """What became of the gaps or angles that were to be mended.
+
+    Attributes
+    ----------
+    what : {"close-gaps", "fit-g1"}
+        The option.
+    least, most : float
+        Between which there is a defect: mm or degrees.
+    defects, left, mostly : int
+        How many there were; are not mended; of these are, but for the ends of their seams.
+    edge : int or None
+        The one that is farthest off.
+    after : float
+        By how much.
+    next : float or None
+        Where there was no defect: the widest gap, or the least angle above ``most``.
+    """
+
+    what: Literal["close-gaps", "fit-g1"]
+    least: float
+    most: float
+    defects: int = 0
+    left: int = 0
+    mostly: int = 0
+    edge: int | None = None
+    after: float = 0.0
+    next: float | None = None
+
+
 def unmended(
     options: Fitting,
     diagonal: float,
     movable: Collection[int],
     before: Sequence[SeamMeasure],
     after: Sequence[SeamMeasure],
-    reasons: Mapping[int, str],
-) -> tuple[str, ...]:
-    """What to say of gaps and angles that were to be mended and were not, or were not there; nothing where all were.
+) -> tuple[Mending, ...]:
+    """Gaps and angles that were to be mended and were not, or were not there; nothing where all were.
 
     Parameters
     ----------
@@ -38,30 +70,22 @@ def unmended(
         Faces that the edit could move: only seams between two of them count.
     before, after : sequence of SeamMeasure
         In the same order.
-    reasons : mapping
-        Why edges did not move.
     """
     pairs = [pair for pair in zip(before, after, strict=True) if set(pair[0].faces) <= set(movable)]
-    notes = []
+    found: list[Mending | None] = []
     if options.close_gaps:
-        none = length(options.gap_tolerance, diagonal, "gap-tolerance")
-        gaps = [_Defect(m.edge, m.gap, n.gap, m.mean_gap, n.mean_gap) for m, n in pairs if m.gap > none]
-        widest = max((m.gap for m, _ in pairs), default=0.0)
-        missing = f"close-gaps: no gap between edited faces is wider than {none:g} mm (the widest: {widest:.2g} mm)"
-        notes.append(_told("close-gaps: closed", "gap", "open by {:.3g} mm", gaps, none, reasons) if gaps else missing)
+        none = Mending("close-gaps", length(options.gap_tolerance, diagonal, "gap-tolerance"), math.inf)
+        gaps = [_Defect(m.edge, m.gap, n.gap, m.mean_gap, n.mean_gap) for m, n in pairs if m.gap > none.least]
+        found.append(_became(none, gaps, max((m.gap for m, _ in pairs), default=0.0)))
     if options.fit_g1 is not None:
+        none = Mending("fit-g1", TANGENT, options.fit_g1)
         bent = [
             _Defect(m.edge, m.angle, n.angle, m.mean_angle, n.mean_angle)
             for m, n in pairs
-            if TANGENT < m.angle <= options.fit_g1
+            if none.least < m.angle <= none.most
         ]
-        above = min((m.angle for m, _ in pairs if m.angle > options.fit_g1), default=None)
-        missing = f"fit-g1: no seam between edited faces has an angle of {TANGENT}° to {options.fit_g1:g}°"
-        missing += "" if above is None else f" (the least above: {above:.3g}°)"
-        notes.append(
-            _told("fit-g1: made tangent", "seam", "bent by {:.3g}°", bent, TANGENT, reasons) if bent else missing
-        )
-    return tuple(filter(None, notes))
+        found.append(_became(none, bent, min((m.angle for m, _ in pairs if m.angle > none.most), default=None)))
+    return tuple(filter(None, found))
 
 
 @dataclass(frozen=True)
@@ -75,14 +99,13 @@ class _Defect:
     mean_after: float
 
 
-def _told(done: str, noun: str, how: str, defects: Sequence[_Defect], none: float, reasons: Mapping[int, str]) -> str:
-    """A line about defects; empty where all are mended."""
-    left = [defect for defect in defects if defect.after > LEFT * defect.before + none]
+def _became(none: Mending, defects: Sequence[_Defect], other: float | None) -> Mending | None:
+    """What became of defects; None where all are mended, ``other`` where there were none."""
+    if not defects:
+        return replace(none, next=other)
+    left = [defect for defect in defects if defect.after > LEFT * defect.before + none.least]
     if not left:
-        return ""
+        return None
     mostly = sum(defect.mean_after <= MOSTLY * defect.mean_before for defect in left)
     worst = max(left, key=lambda defect: defect.after)
-    text = f"{done} {len(defects) - len(left)} of {len(defects)} {noun}{'s' * (len(defects) > 1)}"
-    text += f", {mostly} more but for their ends" if mostly else ""
-    why = f" ({reasons[worst.edge]})" if worst.edge in reasons else ""
-    return f"{text}; edge#{worst.edge + 1} stays {how.format(worst.after)}{why}"
+    return replace(none, defects=len(defects), left=len(left), mostly=mostly, edge=worst.edge, after=worst.after)

@@ -12,7 +12,7 @@ Figure = float | int | str | bool | None
 
 @dataclass(frozen=True)
 class Finding:
-    """One piece of evidence; :func:`mracad.inspect.words.words` puts it into words.
+    """One piece of evidence; :func:`mracad.job.words.of_finding` puts it into words.
 
     Attributes
     ----------

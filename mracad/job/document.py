@@ -7,6 +7,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from enum import Enum
 from functools import partial
 from types import MappingProxyType
 from typing import TYPE_CHECKING
@@ -17,7 +18,7 @@ from mracad.edit.tolerances import Tolerances, tolerances
 from mracad.edit.torn import gaps, torn
 from mracad.errors import EditError
 from mracad.inspect.deviation import Deviation, deviations
-from mracad.inspect.mended import unmended
+from mracad.inspect.mended import Mending, unmended
 from mracad.inspect.seams import SeamMeasure, key, remeasured, seams
 from mracad.job.check import Judged, Original
 from mracad.model.brep import Model
@@ -31,6 +32,15 @@ if TYPE_CHECKING:
 ROUNDS = 8
 """How often an edit is done again, each time without the faces that came out worse; then all are left that seams join
 to those, and if that does not help it is refused."""
+
+
+class Spoilt(Enum):
+    """Why an edit may not touch a face, of which something would come out worse."""
+
+    SEAMS = "its seams would not hold"
+    INVALID = "its result would not be valid"
+    FILE = "the file would be worse there"
+
 
 Progress = Callable[[str, int, int], None]
 """Called with the name of a stage, the steps done and the steps in all."""
@@ -51,6 +61,8 @@ class Report:
     valid_before, valid_after : Validity
     tolerances : Tolerances
         What the edit may be worse in.
+    unmended : tuple of Mending
+        What was to be mended and is not.
     """
 
     model: Model
@@ -61,6 +73,7 @@ class Report:
     valid_before: Validity
     valid_after: Validity
     tolerances: Tolerances
+    unmended: tuple[Mending, ...]
     seconds: float
 
     @property
@@ -89,7 +102,7 @@ def play(
     original: Original | None = None,
     progress: Progress | None = None,
     apply: bool = True,
-    spoiled: Mapping[int, str] = MappingProxyType({}),
+    spoiled: Mapping[int, Spoilt] = MappingProxyType({}),
 ) -> list[Report | Judged]:
     """Take a document through steps, in memory, up to the first check that fails.
 
@@ -141,7 +154,7 @@ def run(
     *,
     progress: Progress | None = None,
     apply: bool = True,
-    spoiled: Mapping[int, str] = MappingProxyType({}),
+    spoiled: Mapping[int, Spoilt] = MappingProxyType({}),
 ) -> Report:
     """Edit a document in memory.
 
@@ -197,19 +210,22 @@ def run(
         found = torn(model, before, after, result, allowed, options.keep)
         found = {i for i in found if model.faces[i].surface is not None} - left.faces.keys()
         if found:
-            left.leave(found, "its seams would not hold", before, result)
+            left.leave(found, Spoilt.SEAMS, before, result)
             continue
         if not (apply and offsets):
             break
         worse, valid_after = _put(document, model, result, left, valid_before, stage)
         if not worse:
             break
-        left.leave(worse, "its result would not be valid", before, result)
+        left.leave(worse, Spoilt.INVALID, before, result)
+    mended: tuple[Mending, ...] = ()
     if isinstance(options, Fitting):
-        result = _with_notes(result, options, model, scope.chosen - left.faces.keys(), before, after)
+        mended = unmended(options, model.diagonal, scope.chosen - left.faces.keys(), before, after)
     stage("measuring the deviation")
     off = deviations(model, result.displacement)
-    return Report(model, result, off, before, after, valid_before, valid_after, allowed, time.perf_counter() - start)
+    return Report(
+        model, result, off, before, after, valid_before, valid_after, allowed, mended, time.perf_counter() - start
+    )
 
 
 def _told(progress: Progress | None, name: str, done: int = 0, total: int = 1) -> None:
@@ -230,10 +246,10 @@ class _Left:
     """
 
     name: str
-    faces: dict[int, str]
+    faces: dict[int, Spoilt]
     rounds: int = 0
 
-    def leave(self, faces: set[int], reason: str, seams: Sequence[SeamMeasure], edit: Edit) -> None:
+    def leave(self, faces: set[int], reason: Spoilt, seams: Sequence[SeamMeasure], edit: Edit) -> None:
         """Leave some more, for a reason; after enough rounds all edited ones that seams join to any of them."""
         self.rounds += 1
         if self.rounds > ROUNDS + 1:
@@ -251,7 +267,9 @@ class _Left:
         if not self.faces:
             return error
         face, reason = next(iter(self.faces.items()))
-        return EditError(f"{self.name}: #{face + 1} cannot be edited: {reason}", "choose other faces or another place")
+        return EditError(
+            f"{self.name}: #{face + 1} cannot be edited: {reason.value}", "choose other faces or another place"
+        )
 
 
 def _joined(faces: set[int], seams: Sequence[SeamMeasure], edited: set[int]) -> set[int]:
@@ -285,19 +303,6 @@ def _put(
     return worse, _verdict(before, moved, touched)
 
 
-def _with_notes(
-    edit: Edit,
-    options: Fitting,
-    model: Model,
-    movable: Collection[int],
-    before: list[SeamMeasure],
-    after: list[SeamMeasure],
-) -> Edit:
-    """An edit with notes of what was to be mended and is not."""
-    reasons = {treatment.edge: str(treatment.reason) for treatment in edit.edges if treatment.reason}
-    return replace(edit, notes=(*edit.notes, *unmended(options, model.diagonal, movable, before, after, reasons)))
-
-
 def _refuse_if_asked(model: Model, result: Edit, named: Collection[int]) -> None:
     """Raise EditError where faces were asked for one by one and none of them can be done."""
     asked = [outcome for outcome in result.outcomes if outcome.face in named]
@@ -307,14 +312,14 @@ def _refuse_if_asked(model: Model, result: Edit, named: Collection[int]) -> None
         raise EditError(f"{model.name}: {names}: {left[0].words}", "leave out what cannot be done, or all of --faces")
 
 
-def _named(result: Edit, spoiled: Mapping[int, str]) -> Edit:
+def _named(result: Edit, spoiled: Mapping[int, Spoilt]) -> Edit:
     """The outcomes with the reasons for which ``spoiled`` faces were left."""
     if not spoiled:
         return result
     return replace(
         result,
         outcomes=tuple(
-            replace(o, status="left", reason=Reason.SPOILED, said=spoiled[o.face]) if o.face in spoiled else o
+            replace(o, status="left", reason=Reason.SPOILED, said=spoiled[o.face].value) if o.face in spoiled else o
             for o in result.outcomes
         ),
     )

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from mracad.inspect.verdict import Layer, Verdict
-from mracad.inspect.words import words
+from mracad.job.words import of_finding
 
 if TYPE_CHECKING:
     from mracad.occ.document import Document
@@ -30,4 +30,4 @@ class Judged:
     @property
     def failures(self) -> list[str]:
         """What does not hold, one line each; empty when it is passed."""
-        return [text for layer in self.failed for text in ([words(f) for f in layer.findings] or [layer.text])]
+        return [text for layer in self.failed for text in ([of_finding(f) for f in layer.findings] or [layer.text])]

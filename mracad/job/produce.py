@@ -15,8 +15,9 @@ from mracad.formats import FORMATS, by_content
 from mracad.inspect import accept
 from mracad.inspect.accept import Slack
 from mracad.inspect.faults import Fault, ReadBack, Reason
-from mracad.job.document import Progress, Report, play
+from mracad.job.document import Progress, Report, Spoilt, play
 from mracad.job.judge import Judged, Original
+from mracad.job.words import of_fault
 from mracad.model.facts import Facts
 from mracad.spec.quantity import length
 
@@ -27,9 +28,6 @@ if TYPE_CHECKING:
 
 ROUNDS = 8
 """How often an edit is done again, each time without the faces of which the file would be worse."""
-
-WORSE = "the file would be worse there"
-"""The reason for which such faces are left."""
 
 
 @dataclass(frozen=True)
@@ -108,7 +106,7 @@ def produce(
     EditError
         When a step cannot be done, or a file would be worse whatever is left.
     """
-    spoiled: dict[int, str] = {}
+    spoiled: dict[int, Spoilt] = {}
     faults: tuple[tuple[Target, Fault], ...] = ()
     copies = _Copies(original)
     for number in range(ROUNDS):
@@ -136,7 +134,7 @@ def produce(
         if not edited:
             break
         left = accept.spoilt((fault for _, fault in faults), edited, memory.facts)
-        spoiled |= dict.fromkeys(left, WORSE)
+        spoiled |= dict.fromkeys(left, Spoilt.FILE)
     raise _refused(document.name, faults)
 
 
@@ -300,7 +298,7 @@ def _refused(name: str, faults: Sequence[tuple[Target, Fault]]) -> EditError:
     target, fault = min(faults, key=lambda each: list(Reason).index(each[1].reason))
     more = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
     return EditError(
-        f"{name}: the {target.format.upper()} file would be worse: {fault}{more}",
+        f"{name}: the {target.format.upper()} file would be worse: {of_fault(fault)}{more}",
         "write BREP, which holds faces as they are"
         if target.format in ("step", "iges")
         else "leave these faces out of the selection",

@@ -8,9 +8,9 @@ from mracad_cli.render import json as render
 from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
 
 from mracad.edit.smooth import smooth
-from mracad.inspect.words import words
 from mracad.job import check, compare
 from mracad.job.document import run
+from mracad.job.words import of_finding
 from mracad.occ.files import read, write
 from mracad.occ.step import write_step
 from mracad.occ.view import view
@@ -55,7 +55,9 @@ def test_a_comparison_is_plain_data(panels, samples, tmp_path):
         assert odd(raw(judged.verdict)) == []
         body = render.verdict(judged.verdict, judged.failed)
         assert odd(body) == [] and json.loads(json.dumps(body, allow_nan=True))
-        assert all(words(finding) for layer in judged.verdict.layers for finding in (*layer.findings, *layer.notes))
+        assert all(
+            of_finding(finding) for layer in judged.verdict.layers for finding in (*layer.findings, *layer.notes)
+        )
 
 
 def test_a_check_is_plain_data(panels, samples):

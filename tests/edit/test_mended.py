@@ -6,6 +6,7 @@ import pytest
 
 from mracad.edit.smooth import smooth
 from mracad.inspect.seams import seams
+from mracad.job import words
 from mracad.job.document import run
 from mracad.occ.step import write_step
 from mracad.occ.view import view
@@ -21,7 +22,7 @@ def patches():
 
 
 def notes(document, **options):
-    return run(document, smooth, Smooth(level=1, **options), apply=False).edit.notes
+    return words.notes(run(document, smooth, Smooth(level=1, **options), apply=False))
 
 
 def test_what_is_not_mended_is_named_with_how_far_off_it_stayed(patches):
@@ -34,14 +35,14 @@ def test_what_is_not_mended_is_named_with_how_far_off_it_stayed(patches):
 
 
 def test_what_is_mended_needs_no_note_and_what_needs_none_is_said(patches):
-    assert notes(torn(patches, False), close_gaps=True) == ()
+    assert notes(torn(patches, False), close_gaps=True) == []
     sound = panels.document(patches, sewn=True)
     (none,) = notes(sound, close_gaps=True)
     assert "no gap between edited faces" in none
     least = min(m.angle for m in seams(view(torn(patches, False))) if m.angle > 0.02)
     (above,) = notes(torn(patches, False), fit_g1=least / 2)
     assert f"the least above: {least:.3g}°" in above
-    assert notes(sound) == ()
+    assert notes(sound) == []
 
 
 def test_notes_are_printed_and_reported(mracad, patches, tmp_path):

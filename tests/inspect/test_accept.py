@@ -19,6 +19,7 @@ from mracad.inspect import accept
 from mracad.inspect.accept import Slack, judge
 from mracad.inspect.faults import Fault, Reason
 from mracad.inspect.seams import seams
+from mracad.job.words import of_fault
 from mracad.occ import brep
 from mracad.occ.document import Document
 from mracad.occ.facts import facts
@@ -96,7 +97,7 @@ def test_a_face_that_is_missing_is_named() -> None:
     left, _ = judge(memory, file, Slack(), lambda: (memory, memory))
     lost = [fault for fault in left if fault.reason is Reason.LOST]
     assert [fault.faces for fault in lost] == [(len(shape.Faces()) - 1,)]
-    assert f"#{len(shape.Faces())} is lost" in str(lost[0])
+    assert f"#{len(shape.Faces())} is lost" in of_fault(lost[0])
     assert {Reason.SOLIDS, Reason.FACES, Reason.FREE_EDGES} <= {fault.reason for fault in left}
 
 

@@ -210,7 +210,7 @@ def test_offsets_keep_their_degrees_and_are_counted():
     assert change.scaled(0.5).offsets[0].degrees == (4, 5)
     net = model.surfaces[0].net
     assert Offset(np.zeros(net.poles.shape), degrees=(2, 1)).over(net) is net
-    report = Report(model, Edit(change, ()), [], [], [], *[None] * 3, 0.0)
+    report = Report(model, Edit(change, ()), [], [], [], *[None] * 3, (), 0.0)
     # six spans of degree 3 and one of 1 become degrees 4 and 5 with a knot more each way
     assert report.control_points == (9 * 2, (5 + 5 * 2 + 1) * (6 + 1))
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import msgspec
 
 from mracad.inspect.verdict import Figure, Finding, Layer, Verdict
-from mracad.inspect.words import words
+from mracad.job.words import notes, of_finding
 
 if TYPE_CHECKING:
     from mracad.constraint.seam import Treatment
@@ -93,7 +93,7 @@ def report(value: Report) -> dict[str, Any]:
         "edges": [treatment(e) for e in value.edit.edges],
         "copies": [{**plain(c), "faces": [i + 1 for i in c.faces]} for c in value.edit.copies],
         "control_points": dict(zip(("before", "after"), value.control_points, strict=True)),
-        "notes": list(value.edit.notes),
+        "notes": notes(value),
         "deviation": [{**plain(d), "face": d.face + 1} for d in value.deviations],
         "seams": {
             "before": plain(summary(value.before, smooth)),
@@ -162,7 +162,7 @@ def verdict(found: Verdict, failed: Sequence[Layer]) -> dict[str, Any]:
 
 def _finding(finding: Finding) -> dict[str, Any]:
     return {
-        "text": words(finding),
+        "text": of_finding(finding),
         "rule": finding.rule,
         "faces": [face + 1 for face in finding.faces],
         "edge": None if finding.edge is None else finding.edge + 1,

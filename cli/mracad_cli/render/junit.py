@@ -10,8 +10,8 @@ from typing import Literal
 from xml.etree import ElementTree as Xml
 
 from mracad.inspect.verdict import Layer, Verdict
-from mracad.inspect.words import placed
 from mracad.job.batch.run import Outcome
+from mracad.job.words import placed
 
 _CONTROL = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")  # what XML cannot hold
 

@@ -8,7 +8,7 @@ from urllib.parse import quote
 
 import mracad
 from mracad.inspect.verdict import Finding, Layer, Verdict
-from mracad.inspect.words import placed
+from mracad.job.words import placed
 
 
 def verdict(found: Verdict, failed: Sequence[Layer], command: str) -> dict[str, Any]:

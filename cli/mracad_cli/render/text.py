@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TextIO
 
-from mracad.inspect.words import placed
+from mracad.job.words import notes, placed
 from mracad.spec.steps import Selection
 
 if TYPE_CHECKING:
@@ -107,7 +107,7 @@ def edit_lines(report: Report, options: Selection, end: str, found: Found | None
     lines = [f"{model.name}: {plural(len(nurbs), 'NURBS face')}: {', '.join(parts)}"]
     if not edit.faces("edited"):
         lines[0] += "; nothing changed"
-    lines += [f"note: {note}" for note in edit.notes]
+    lines += [f"note: {note}" for note in notes(report)]
     if report.deviations:
         worst = max(report.deviations, key=lambda d: d.largest)
         mean = sum(d.mean for d in report.deviations) / len(report.deviations)

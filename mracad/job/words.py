@@ -1,13 +1,19 @@
-"""Findings in words: the one place where evidence becomes sentences."""
+"""Evidence in words: the one place where findings, faults and what was not mended become sentences."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
 
+from mracad.inspect.faults import Fault, Reason
+from mracad.inspect.mended import Mending
 from mracad.inspect.verdict import Finding
 
+if TYPE_CHECKING:
+    from mracad.job.document import Report
 
-def words(finding: Finding) -> str:
+
+def of_finding(finding: Finding) -> str:
     """What was found, in one line."""
     return _SENTENCES.get(finding.rule, _failure)(finding)
 
@@ -15,7 +21,7 @@ def words(finding: Finding) -> str:
 def placed(finding: Finding) -> str:
     """The same with its place."""
     at = "" if finding.where is None else " at " + " ".join(f"{x:.6g}" for x in finding.where)
-    return words(finding) + at
+    return of_finding(finding) + at
 
 
 def _faces(faces: Sequence[int]) -> str:
@@ -125,3 +131,53 @@ _SENTENCES: dict[str, Callable[[Finding], str]] = {
 def _of_product(finding: Finding) -> str:
     product = finding.figures["product"]
     return f" ({product})" if product else ""
+
+
+def of_fault(fault: Fault) -> str:
+    """What is worse in a file, in one line."""
+    where = _faces(fault.faces[:2]) + (" …" if len(fault.faces) > 2 else "")
+    where = where or ("it" if fault.reason is Reason.UNREAD else "somewhere")
+    change = 100 * abs(fault.value - fault.was) / abs(fault.was) if fault.was else 0.0
+    share = f"{change:.3g} %" if fault.was else f"{fault.value:.3g}"
+    return _FAULTS[fault.reason].format(f=fault, where=where, share=share)
+
+
+_FAULTS = {
+    Reason.UNREAD: "{where} cannot be read back: {f.status}",
+    Reason.INVALID: "{f.status} in {where}",
+    Reason.SOLIDS: "{f.value:.0f} solids (were {f.was:.0f})",
+    Reason.SHELLS: "{f.value:.0f} shells (were {f.was:.0f})",
+    Reason.FACES: "{f.value:.0f} faces (were {f.was:.0f})",
+    Reason.FREE_EDGES: "{f.value:.0f} free edges (were {f.was:.0f})",
+    Reason.LOST: "{where} is lost",
+    Reason.AREA: "the area of {where} changes by {share}",
+    Reason.VOLUME: "the volume changes by {share}",
+    Reason.BOX: "the box changes by {f.value:.3g} mm",
+    Reason.TOLERANCE: "a tolerance of {f.value:.3g} mm at {where} (largest {f.was:.3g} mm)",
+    Reason.SEAM: "no seam between {where}",
+    Reason.GAP: "a gap of {f.value:.3g} mm between {where} (was {f.was:.3g} mm)",
+    Reason.ANGLE: "an angle of {f.value:.2g}° between {where} (was {f.was:.2g}°)",
+    Reason.OPEN: "the mesh is open at {where}",
+}
+
+
+def notes(report: Report) -> list[str]:
+    """What an edit says of itself beside its figures, a line each."""
+    reasons = {treatment.edge: str(treatment.reason) for treatment in report.edit.edges if treatment.reason}
+    return [_mending(each, reasons.get(-1 if each.edge is None else each.edge, "")) for each in report.unmended]
+
+
+def _mending(mending: Mending, reason: str) -> str:
+    """What became of defects that were to be mended; the edge that is farthest off did not move for a reason."""
+    gaps, m = mending.what == "close-gaps", mending
+    if not m.defects:
+        if gaps:
+            text = f"close-gaps: no gap between edited faces is wider than {m.least:g} mm"
+            return f"{text} (the widest: {m.next or 0.0:.2g} mm)"
+        text = f"fit-g1: no seam between edited faces has an angle of {m.least}° to {m.most:g}°"
+        return text if m.next is None else f"{text} (the least above: {m.next:.3g}°)"
+    text = f"{m.what}: {'closed' if gaps else 'made tangent'} {m.defects - m.left} of {m.defects} "
+    text += ("gap" if gaps else "seam") + "s" * (m.defects > 1)
+    text += f", {m.mostly} more but for their ends" if m.mostly else ""
+    how = f"open by {m.after:.3g} mm" if gaps else f"bent by {m.after:.3g}°"
+    return f"{text}; edge#{(m.edge or 0) + 1} stays {how}" + (f" ({reason})" if reason else "")
