@@ -10,7 +10,7 @@ together, the others need not be looked at alone.
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -18,12 +18,11 @@ from mracad.bspline.surface import Net
 from mracad.constraint.cause import Cause, Still
 from mracad.constraint.seam import Seam
 from mracad.constraint.trimmed import TrimmedSeam
+from mracad.edit.moved import Moved, Result
 from mracad.edit.pose import Scene, beside_rims
 from mracad.edit.target import Sheet, Wish
 from mracad.edit.tolerances import Tolerances
-from mracad.edit.trial import ENOUGH, Trial, Watch, amounts, displaced, gained, worth
-from mracad.inspect.roughness import Change, Worse
-from mracad.model.displacement import Displacement, Offset
+from mracad.edit.trial import ENOUGH, Trial, Verdict, worth
 from mracad.seam.interface import Joints
 
 Array = np.ndarray
@@ -37,116 +36,15 @@ LEAST = 0.25
 FIRST = 2
 """Surfaces of a group of which each goes through by itself, so that all are tried together before the others are."""
 
-PRICE = 0.01
+PRICE = 0.05
 """Share of what is wanted that as many control points again as a surface has must bring nearer to be added."""
 
-CLOSER = 9
-"""Points a span at which a result is looked at again."""
+CANDIDATES = 3
+"""Most displacements of which what a first look leaves is looked at closer."""
 
 BLENDS, PROMISE = 2, 1.05
 """Most times that what is best for each of joined surfaces is put together, and by how much that, or what is done to
 each by itself, has to come nearer."""
-
-
-@dataclass(frozen=True, eq=False)
-class Moved:
-    """What was done to a surface.
-
-    Attributes
-    ----------
-    sheet : Sheet
-    net : Net
-        Before, in the space of the displacement.
-    offset : ndarray (nu, nv, 3)
-    amount : float
-        Share of what was wanted that could be done.
-    changes : mapping of int to Change
-        Of the roughness of its faces, by face.
-    limits : tuple of Worse
-        What kept it from more.
-    free : int
-        Free control points.
-    gain, wanted : float
-        By how much the surfaces that move with it came nearer to what was wanted, and all of that, as squared norms.
-    rough : bool
-        Whether what was wanted would take anything off its roughness.
-    """
-
-    sheet: Sheet
-    net: Net
-    offset: Array
-    amount: float
-    changes: Mapping[int, Change]
-    limits: tuple[Worse, ...]
-    free: int
-    gain: float
-    wanted: float
-    rough: bool = True
-
-    @property
-    def deviation(self) -> float:
-        """Largest motion along the normal, mm."""
-        return max((each.deviation for each in self.changes.values()), default=0.0)
-
-    @property
-    def motion(self) -> float:
-        """Largest motion, mm."""
-        return max((each.motion for each in self.changes.values()), default=0.0)
-
-    @property
-    def finer(self) -> bool:
-        """Whether it has more control points than the surface."""
-        return self.net is not self.sheet.net and (self.net.u, self.net.v) != (self.sheet.net.u, self.sheet.net.v)
-
-    @property
-    def share(self) -> float:
-        """How much of the way to what was wanted was gone."""
-        return self.gain / self.wanted if self.wanted > 0.0 else 0.0
-
-    def scaled(self, amount: float) -> Moved:
-        """The same with another share of it done."""
-        if amount == self.amount:
-            return self
-        offset = self.offset * (amount / self.amount)
-        now = self._watch().changes({0: displaced(self.net, offset)})[0]
-        return replace(self, offset=offset, amount=amount, changes=now)
-
-    def undone(self) -> Moved:
-        """Nothing done instead."""
-        still = {face: change.undone() for face, change in self.changes.items()}
-        return replace(self, offset=np.zeros_like(self.offset), amount=0.0, changes=still, limits=(), gain=0.0)
-
-    def confirmed(self, tolerances: Tolerances) -> Moved:
-        """What a closer look leaves of it: what grows between the points of the first is taken back; nothing if no face
-        gains by the rest."""
-        if not self.amount:
-            return self
-        whole, most = self.offset / self.amount, np.array([self.amount])
-        (amount,), (changes,), (limits,) = amounts(self._watch(), [self.net], [whole], most, tolerances)
-        found = replace(self, offset=amount * whole, amount=amount, changes=changes, limits=limits or self.limits)
-        return found if gained(changes, tolerances) else replace(found.undone(), limits=found.limits)
-
-    def _watch(self) -> Watch:
-        return Watch.of([(self.net, self.sheet.faces)], self.sheet.wavelength, self.sheet.reach, CLOSER)
-
-    def displacement(self) -> Offset:
-        """The displacement over the surface as it is."""
-        return Offset.of(self.sheet.origin, self.net, self.offset)
-
-
-@dataclass(frozen=True, eq=False)
-class Result:
-    """What became of all surfaces, and the joints that moved with them; ``sheets`` are all that were looked at, and
-    ``mended`` edges that were pulled shut."""
-
-    moved: Mapping[int, Moved]
-    joints: Joints
-    sheets: Mapping[int, Sheet] = field(default_factory=dict)
-    mended: frozenset[int] = frozenset()
-
-    def displacement(self) -> Displacement:
-        """What moves."""
-        return Displacement({i: each.displacement() for i, each in self.moved.items() if np.any(each.offset)})
 
 
 def drive(scene: Scene, wish: Wish, progress: Callable[[int, int], None] | None = None) -> Result:
@@ -155,7 +53,6 @@ def drive(scene: Scene, wish: Wish, progress: Callable[[int, int], None] | None 
     result: dict[int, Moved] = {}
     exact: list[Seam] = []
     loose: list[TrimmedSeam] = []
-    rest = set(scene.sheets)
     for group in groups(scene.sheets, scene.joints):
         tell(len(result), len(scene.sheets))
         alone, tried = _alone(scene, wish, group)
@@ -166,9 +63,8 @@ def drive(scene: Scene, wish: Wish, progress: Callable[[int, int], None] | None 
                 exact += [seam for seam in joined.exact if seam.a.surface != seam.b.surface]
                 loose += joined.loose
                 result |= part
-                rest -= part.keys()
         result |= {i: _by_itself(scene, wish, i) for i in group if i not in result}
-    result = {i: result[i].confirmed(scene.tolerances) if i in rest else result[i] for i in scene.sheets}
+    result = {i: result[i] for i in scene.sheets}
     moving = {i for i, moved in result.items() if moved.amount > 0}
     exact += [seam for seam in scene.joints.exact if seam.a.surface == seam.b.surface and seam.a.surface in moving]
     closing = {edge: pair for edge, pair in scene.joints.closing.items() if pair[0].surface in moving}
@@ -302,8 +198,8 @@ def _by_itself(scene: Scene, wish: Wish, i: int) -> Moved:
     least = plain.share + PRICE * (size - 1.0)
     if size == 1.0 or least >= 1.0:
         return plain
-    finer = _attempt(scene, wish, [i], joined, {i})[i]
-    if finer.share > least or not (plain.amount or finer.amount):
+    finer = _attempt(scene, wish, [i], joined, {i}, least)[i]
+    if finer.share > least:
         return finer
     return plain if plain.amount else finer.undone()
 
@@ -313,18 +209,29 @@ def _points(net: Net) -> int:
 
 
 def _attempt(
-    scene: Scene, wish: Wish, surfaces: Iterable[int], joined: Joints, finer: Collection[int] = ()
+    scene: Scene,
+    wish: Wish,
+    surfaces: Iterable[int],
+    joined: Joints,
+    finer: Collection[int] = (),
+    least: float = 0.0,
 ) -> dict[int, Moved]:
-    """The best that can be done to surfaces that move together, some with more control points; amounts may differ."""
+    """The best that can be done to surfaces that move together, some with more control points; amounts may differ.
+
+    Nothing is done where that comes to less than a share of what is wanted.
+    """
     members = {i: scene.sheets[i] for i in surfaces}
     trial = Trial(scene, members, joined, finer)
     target = wish.target(trial.problem, members, joined)
-    found = [trial.nothing()]
+    wished = sum(trial.problem.gains(target, target, [1.0] * len(members)))
+    found = [trial.nothing(least * wished)]
     for batch in wish.ways(trial.problem, target, trial.width) if trial.problem.free.any() else ():
-        tried = [trial.judged(wanted, target) for wanted in batch]
-        if max(found + tried, key=worth).least <= ENOUGH:
-            tried = [trial.eased(each, target) for each in tried]
-        found += tried
+        first = len(found)
+        for wanted in batch:
+            found.append(trial.judged(wanted, target, found))
+        if max(found, key=worth).least <= ENOUGH:
+            for each in found[first:]:
+                found.append(trial.eased(each, target, found))
         if max(found, key=worth).least > ENOUGH:
             break
     for _ in range(BLENDS if len(found) > 1 and len(members) > 1 else 0):
@@ -332,17 +239,36 @@ def _attempt(
         now = max(found, key=worth)
         if sum(each.gains[i] for each, i in chosen) <= PROMISE * now.gain:
             break
-        found.append(trial.blended(chosen, target))
+        found.append(trial.blended(chosen, target, found))
         if max(found, key=worth) is now:
             break
-    done = max(found, key=worth)
-    fairer = [True] * len(members) if done.least or not scene.tolerances.fairer else trial.fairer(target)
-    wished = float((target * (trial.problem.mass @ target)).sum())
-    return {
-        i: Moved(
-            members[i], space.net, amount * part, amount, change, limits, int(space.free.sum()), done.gain, wished, fair
-        )
-        for (i, space), part, amount, change, limits, fair in zip(
-            trial.problem.spaces.items(), done.parts, done.amounts, done.changes, done.limits, fairer, strict=True
-        )
-    }
+    moved = _confirmed(trial, members, found, target)
+    if any(each.amount for each in moved.values()) or not scene.tolerances.fairer:
+        return moved
+    fairer = trial.fairer(target)
+    return {i: replace(each, rough=fair) for (i, each), fair in zip(moved.items(), fairer, strict=True)}
+
+
+def _confirmed(trial: Trial, members: Mapping[int, Sheet], found: Sequence[Verdict], target: Array) -> dict[int, Moved]:
+    """What is worth most once it has been looked at closer."""
+    best: dict[int, Moved] = {}
+    most, wanted = -1.0, sum(trial.problem.gains(target, target, [1.0] * len(members)))
+    for verdict in sorted(found, key=worth, reverse=True)[:CANDIDATES]:
+        if worth(verdict) <= most:
+            break
+        verdict = trial.settled(verdict, target)
+        moved = [each.confirmed(trial.tolerances) for each in _moved(trial, members, verdict)]
+        verdict = trial.left(verdict, [each.amount for each in moved], target)
+        if worth(verdict) > most:
+            most = worth(verdict)
+            best = {each.sheet.index: replace(each, gain=verdict.gain, wanted=wanted) for each in moved}
+    return best
+
+
+def _moved(trial: Trial, members: Mapping[int, Sheet], verdict: Verdict) -> list[Moved]:
+    """What a verdict leaves of a displacement."""
+    figures = zip(verdict.parts, verdict.amounts, verdict.changes, verdict.limits, strict=True)
+    return [
+        Moved(members[i], space.net, amount * part, amount, changes, limits, int(space.free.sum()), 0.0, 0.0)
+        for (i, space), (part, amount, changes, limits) in zip(trial.problem.spaces.items(), figures, strict=True)
+    ]

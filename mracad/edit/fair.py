@@ -20,8 +20,9 @@ import numpy as np
 from mracad.bspline.jets import jets
 from mracad.bspline.surface import Net
 from mracad.constraint.wishes import Wishes
-from mracad.edit.driver import Result, drive
+from mracad.edit.driver import drive
 from mracad.edit.mend import Mended, mended
+from mracad.edit.moved import Result
 from mracad.edit.pose import Scene
 from mracad.edit.target import Sheet, Wish, eased, sheets, stiffness
 from mracad.edit.tolerances import Tolerances

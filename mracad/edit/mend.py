@@ -16,10 +16,11 @@ import numpy as np
 from mracad.bspline.surface import Net
 from mracad.constraint.trace import along
 from mracad.constraint.trimmed import TrimmedSeam
-from mracad.edit.driver import Moved, Result, groups
+from mracad.edit.driver import groups
+from mracad.edit.moved import Moved, Result
 from mracad.edit.pose import Pose, Scene, pose
 from mracad.edit.target import Sheet, stiffness
-from mracad.edit.trial import Watch, displaced
+from mracad.edit.watch import Watch, displaced
 from mracad.model.brep import Model
 from mracad.model.displacement import lifted
 from mracad.seam.interface import Joints
@@ -132,7 +133,9 @@ def _moved(members: Mapping[int, Sheet], found: Pose, delta: Array) -> dict[int,
 
 def _whole(sheet: Sheet, net: Net, offset: Array, free: int) -> Moved:
     """A displacement that was done in whole."""
-    now = Watch.of([(net, sheet.faces)], sheet.wavelength, sheet.reach).changes({0: displaced(net, offset)})[0]
+    now = Watch.of([(net, sheet.base, sheet.faces)], sheet.wavelength, sheet.reach).changes(
+        {0: displaced(net, offset)}
+    )[0]
     return Moved(sheet, net, offset, 1.0, now, (), free, 0.0, 0.0)
 
 

@@ -25,8 +25,8 @@ Array = np.ndarray
 DEGREE = 3
 """Least degree of a surface that moves: knots set into a lower one make facets."""
 
-TREND = 2.5
-"""Waves of more wavelengths than this are shape."""
+TREND, BASE = 2.5, 6.0
+"""Waves of more wavelengths than the first are shape, of more than the second what waves show beside."""
 
 
 class Wish(Protocol):
@@ -83,8 +83,9 @@ class Sheet:
         Below which the edit takes waves from it, mm.
     reach : float
         Within which what it takes spreads, mm.
-    trend : Net
-        The surface projected on the splines of a few wavelengths: what is in it is shape.
+    trend, base : Net
+        The surface projected on the splines of a few wavelengths: what is in it is shape; and of many, for the judge: a
+        trend that swings about a mark would hide waves that are made there.
     detail : float
         Largest displacement of a control point were nothing held, mm.
     """
@@ -99,6 +100,7 @@ class Sheet:
     wavelength: float
     reach: float
     trend: Net
+    base: Net
     detail: float = 0.0
 
     @property
@@ -131,8 +133,8 @@ def _sheet(index: int, origin: Net, every: tuple[Face, ...], faces: tuple[Face, 
     metric = smoothed(net, points, SMOOTHER**4 * stiffness(wavelength))
     form = forms(net, metric, points, sharp)
     reach = seen(net, form)
-    trend, wide = at_scale(net, TREND * wavelength, sharp), wish.spread * wavelength
-    sheet = Sheet(index, origin, net, every, faces, metric, sharp, wavelength, wide, trend)
+    trend, base = (at_scale(net, waves * wavelength, sharp) for waves in (TREND, BASE))
+    sheet = Sheet(index, origin, net, every, faces, metric, sharp, wavelength, wish.spread * wavelength, trend, base)
     alone = Problem({index: Space(net, form, reach, reach, sheet.trend.poles)})
     change = wish.target(alone, {index: sheet}, Joints())
     return replace(sheet, detail=float(np.linalg.norm(change[alone.seen], axis=1).max(initial=0.0)))

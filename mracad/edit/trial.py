@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,16 +12,12 @@ from mracad.edit.jumps import Jumps
 from mracad.edit.pose import Scene, pose
 from mracad.edit.target import Sheet, eased, stiffness
 from mracad.edit.tolerances import Tolerances
+from mracad.edit.watch import BISECTIONS, Tried, Watch, amounts, displaced
 from mracad.inspect.places import Placed
-from mracad.inspect.roughness import Change, Worse, better, places, worse
-from mracad.inspect.survey import POINTS, Survey, changes, surveys
-from mracad.model.brep import Face
+from mracad.inspect.roughness import Change, Worse, better, places
 from mracad.seam.interface import Joints
 
 Array = np.ndarray
-
-BISECTIONS = 5
-"""Steps in which the amount is found."""
 
 GAIN = 0.01, 0.25, 0.01
 """Least share of its bending or curvature variation that a face must lose to be touched at all; or one of its places,
@@ -40,9 +36,6 @@ SHARES = 0.125, 0.25, 0.5, 1.0
 EASINGS = 2
 """Most times that this is done to one displacement."""
 
-SINGULAR = 1e5
-"""Curvature over the wavelength from which on a face is singular."""
-
 FINER = 3
 """Steps from one Greville point to the next in which deviations are looked for."""
 
@@ -53,8 +46,8 @@ class Verdict:
 
     Attributes
     ----------
-    parts : sequence of ndarray (nu, nv, 3)
-        What is done to each surface, mm.
+    tried : Tried
+        What is done to each surface.
     amounts : sequence of float
         How much of it may be done.
     changes : sequence of mapping of int to Change
@@ -67,12 +60,17 @@ class Verdict:
         The same of all, the least of the amounts of each.
     """
 
-    parts: Sequence[Array]
+    tried: Tried
     amounts: Sequence[float]
     changes: Sequence[Mapping[int, Change]]
     limits: Sequence[tuple[Worse, ...]]
     gains: Sequence[float]
     gain: float
+
+    @property
+    def parts(self) -> Sequence[Array]:
+        """What is done to each surface, mm, ``(nu, nv, 3)`` each."""
+        return self.tried.parts
 
     @property
     def least(self) -> float:
@@ -90,48 +88,66 @@ class Trial:
         self.pose = pose(scene, members, joined, self.width, detail, finer=finer)
         self.problem = self.pose.problem
         self.jumps = Jumps(scene, members, joined, self.width)
-        surfaces = [(space.net, members[i].faces) for i, space in self.problem.spaces.items()]
+        spaces = self.problem.spaces
+        surfaces = [(space.net, members[i].base, members[i].faces) for i, space in spaces.items()]
+        self.nets = [space.net for space in spaces.values()]
         self.watch = Watch.of(surfaces, self.width, max(sheet.reach for sheet in members.values()))
 
-    def nothing(self) -> Verdict:
-        """What the judge makes of leaving everything as it is."""
-        parts = [np.zeros(space.net.poles.shape) for space in self.problem.spaces.values()]
-        return Verdict(parts, [0.0] * len(parts), self.watch.still(), [()] * len(parts), [0.0] * len(parts), 0.0)
+    def nothing(self, least: float = 0.0) -> Verdict:
+        """What the judge makes of leaving everything as it is, which counts for a gain that others have to exceed."""
+        still = Tried(self.watch, self.nets, [np.zeros(net.poles.shape) for net in self.nets])
+        none = [0.0] * len(self.nets)
+        return Verdict(still, none, self.watch.still(), [()] * len(none), none, least)
 
-    def judged(self, delta: Array, target: Array) -> Verdict:
-        """How much of a displacement may be done to each surface."""
-        problem = self.problem
+    def judged(self, delta: Array, target: Array, others: Sequence[Verdict] = ()) -> Verdict:
+        """How much of a displacement may be done to each surface; where it could not do better than others, nothing."""
         bound = self.tolerances.deviation
         if np.isfinite(bound) and np.linalg.norm(delta, axis=1).max(initial=0.0) > bound:
-            both = zip(problem.spaces.values(), problem.split(delta).values(), strict=True)
-            within = [bounded(space.net, part, bound, self.width).reshape(-1, 3) for space, part in both]
-            delta = problem.nearest(np.concatenate(within))
-        parts = list(problem.split(delta).values())
-        ceiling = self._ceilings(delta)
-        nets = [space.net for space in problem.spaces.values()]
-        shares, found, limits = amounts(self.watch, nets, parts, ceiling, self.tolerances)
+            both = zip(self.nets, self._split(delta), strict=True)
+            within = [bounded(net, part, bound, self.width).reshape(-1, 3) for net, part in both]
+            delta = self.problem.nearest(np.concatenate(within))
+        tried = Tried(self.watch, self.nets, self._split(delta))
+        return self._verdict(tried, target, self._floor(delta, target, others), BISECTIONS[0])
+
+    def settled(self, verdict: Verdict, target: Array) -> Verdict:
+        """The same, its amounts found closely."""
+        if not verdict.least or verdict.least == 1.0:
+            return verdict
+        return self._verdict(verdict.tried, target, np.zeros(len(self.nets)), BISECTIONS[1])
+
+    def left(self, verdict: Verdict, shares: Sequence[float], target: Array) -> Verdict:
+        """The same with other amounts."""
+        delta = np.concatenate([part.reshape(-1, 3) for part in verdict.parts])
+        gains, gain = self._gains(delta, target, shares)
+        return replace(verdict, amounts=shares, gains=gains, gain=gain)
+
+    def _verdict(self, tried: Tried, target: Array, floor: Array, steps: int) -> Verdict:
+        delta = np.concatenate([part.reshape(-1, 3) for part in tried.parts])
+        shares, found, limits = amounts(tried, floor, self._ceilings(delta), self.tolerances, steps)
         for i, faces in enumerate(found):
             if not gained(faces, self.tolerances):
                 shares[i], found[i] = 0.0, {face: change.undone() for face, change in faces.items()}
-        gains = problem.gains(delta, target, shares)
-        gain = sum(problem.gains(delta, target, [min(shares)] * len(parts)))
-        return Verdict(parts, shares, found, limits, gains, gain)
+        return Verdict(tried, shares, found, limits, *self._gains(delta, target, shares))
 
-    def eased(self, verdict: Verdict, target: Array) -> Verdict:
+    def eased(self, verdict: Verdict, target: Array, others: Sequence[Verdict] = ()) -> Verdict:
         """The best that becomes of a displacement that is scaled back where places allow less of it."""
         found = [verdict]
         while found[-1].least <= ENOUGH and len(found) <= EASINGS:
             delta = np.concatenate([part.reshape(-1, 3) for part in found[-1].parts])
-            share = self._shares(delta)
+            if np.isinf(self._floor(delta, target, others)).all():
+                break
+            share = self._shares(found[-1].tried)
             if np.ptp(share) == 0:
                 break
-            found.append(self.judged(self.problem.nearest(share * delta, stiffness(self.width)), target))
+            easier = self.problem.nearest(share * delta, stiffness(self.width))
+            found.append(self.judged(easier, target, [*others, *found]))
         return max(found, key=worth)
 
-    def blended(self, chosen: Sequence[tuple[Verdict, int]], target: Array) -> Verdict:
+    def blended(self, chosen: Sequence[tuple[Verdict, int]], target: Array, others: Sequence[Verdict]) -> Verdict:
         """For each surface another verdict on it, by place, made to meet as smoothly as can be."""
         wanted = np.concatenate([each.amounts[i] * each.parts[i].reshape(-1, 3) for each, i in chosen])
-        return self.eased(self.judged(self.problem.nearest(wanted, stiffness(self.width)), target), target)
+        together = self.judged(self.problem.nearest(wanted, stiffness(self.width)), target, others)
+        return self.eased(together, target, others)
 
     def fairer(self, delta: Array) -> list[bool]:
         """Whether a displacement would take anything off the roughness of each surface, whatever it adds to others."""
@@ -139,24 +155,38 @@ class Trial:
         found = self.watch.changes({i: displaced(space.net, part) for i, (space, part) in enumerate(both)})
         return [any(better(change, GAIN[0]) for change in faces.values()) for faces in found.values()]
 
-    def _shares(self, delta: Array) -> Array:
+    def _floor(self, delta: Array, target: Array, others: Sequence[Verdict]) -> Array:
+        """Amounts of a displacement up to which it is worth less than one of others, infinite where it is in whole."""
+        best, count = max((worth(each) for each in others), default=0.0), len(self.nets)
+        if best and count == 1:
+            return np.array([_beating(best, *(self.problem.gains(delta, target, [a])[0] for a in (0.5, 1.0)))])
+        gains, gain = self._gains(delta, target, [1.0] * count)
+        beaten = [any(each.gains[i] >= most for each in others) for i, most in enumerate(gains)]
+        return np.full(count, np.inf if WHOLE * gain <= best and all(beaten) else 0.0)
+
+    def _gains(self, delta: Array, target: Array, shares: Sequence[float]) -> tuple[list[float], float]:
+        """By how much amounts of a displacement bring each surface nearer to a target, and the least of them all."""
+        least = [min(shares)] * len(shares)
+        return self.problem.gains(delta, target, shares), sum(self.problem.gains(delta, target, least))
+
+    def _split(self, delta: Array) -> list[Array]:
+        return list(self.problem.split(delta).values())
+
+    def _shares(self, tried: Tried) -> Array:
         """The largest of :data:`SHARES` of a displacement that makes no place rougher, eased, ``(points, 1)``."""
-        nets = [space.net for space in self.problem.spaces.values()]
-        parts = list(self.problem.split(delta).values())
         found: dict[tuple[int, int], tuple[Placed, Array]] = {}
         for amount in SHARES:
-            tried = {i: displaced(net, amount * part) for i, (net, part) in enumerate(zip(nets, parts, strict=True))}
-            for i, faces in self.watch.changes(tried).items():
+            for i, faces in tried.changes(dict.fromkeys(range(len(self.nets)), amount)).items():
                 for face, change in faces.items():
                     assert change.placed is not None
                     _, share = found.get((i, face), (None, np.zeros(change.placed.area.shape)))
                     share = np.where(places(change, self.tolerances.growth), share, amount)
                     found[i, face] = change.placed, share
-        least = [np.ones(net.poles.shape[:2]) for net in nets]
+        least = [np.ones(net.poles.shape[:2]) for net in self.nets]
         for (i, _), (placed, share) in found.items():
-            at = placed.at(nets[i].u.greville(), nets[i].v.greville())
+            at = placed.at(self.nets[i].u.greville(), self.nets[i].v.greville())
             least[i] = np.minimum(least[i], share[np.ix_(*at)])
-        both = zip(nets, least, strict=True)
+        both = zip(self.nets, least, strict=True)
         return np.concatenate([eased(net, share, self.width / 2).ravel() for net, share in both])[:, None]
 
     def _ceilings(self, delta: Array) -> Array:
@@ -181,6 +211,14 @@ def gained(faces: Mapping[int, Change], tolerances: Tolerances) -> bool:
 def worth(verdict: Verdict) -> float:
     """What a verdict counts for among others."""
     return verdict.gain * (WHOLE if verdict.least > ENOUGH else 1.0)
+
+
+def _beating(best: float, half: float, whole: float) -> float:
+    """The least amount of a displacement that is worth more than the best, from what half and all of it gain."""
+    amounts = np.arange(1, 65) / 64
+    gain = (4 * half - whole) * amounts + 2 * (whole - 2 * half) * amounts**2
+    more = amounts[gain * np.where(amounts > ENOUGH, WHOLE, 1.0) > best]
+    return float(more[0]) if len(more) else np.inf
 
 
 def bounded(net: Net, offset: Array, bound: float, width: float) -> Array:
@@ -209,70 +247,3 @@ def bounded(net: Net, offset: Array, bound: float, width: float) -> Array:
 def _between(places: Array) -> Array:
     """Parameters with more between each and the next."""
     return np.asarray(np.interp(np.arange(FINER * (len(places) - 1) + 1) / FINER, np.arange(len(places)), places))
-
-
-def displaced(net: Net, offset: Array) -> Net:
-    """The surface with control points moved by ``(nu, nv, 3)``, mm."""
-    return net.with_poles(net.poles + offset)
-
-
-@dataclass(frozen=True, eq=False)
-class Watch:
-    """The faces of surfaces, each looked at by itself.
-
-    Attributes
-    ----------
-    surveys : sequence of Survey
-    owners : sequence of (int, int)
-        Place of the surface of each, and the face.
-    """
-
-    surveys: Sequence[Survey]
-    owners: Sequence[tuple[int, int]]
-
-    @classmethod
-    def of(
-        cls, surfaces: Sequence[tuple[Net, Sequence[Face]]], width: float, reach: float, points: int = POINTS
-    ) -> Watch:
-        """Look at faces of surfaces before an edit that takes waves up to a width and spreads them within a reach (mm),
-        at so many points a span."""
-        every = [(place, net, face) for place, (net, faces) in enumerate(surfaces) for face in faces]
-        return cls(
-            surveys([(net, (face,), net.u, net.v) for _, net, face in every], points, SINGULAR / width, reach),
-            [(place, face.index) for place, _, face in every],
-        )
-
-    def still(self) -> list[dict[int, Change]]:
-        """What becomes of the faces of each surface where nothing moves."""
-        found: list[dict[int, Change]] = [{} for _ in range(self.owners[-1][0] + 1)]
-        for (place, face), survey in zip(self.owners, self.surveys, strict=True):
-            found[place][face] = Change(survey.roughness, survey.roughness, survey.noise)
-        return found
-
-    def changes(self, nets: Mapping[int, Net]) -> dict[int, dict[int, Change]]:
-        """What became of the faces of some surfaces, by place."""
-        found: dict[int, dict[int, Change]] = {place: {} for place in nets}
-        looked = [(*owner, survey) for owner, survey in zip(self.owners, self.surveys, strict=True) if owner[0] in nets]
-        now = changes([survey for *_, survey in looked], [nets[place] for place, *_ in looked])
-        for (place, face, _), change in zip(looked, now, strict=True):
-            found[place][face] = change
-        return found
-
-
-def amounts(
-    watch: Watch, nets: Sequence[Net], parts: Sequence[Array], ceiling: Array, tolerances: Tolerances
-) -> tuple[list[float], list[dict[int, Change]], list[tuple[Worse, ...]]]:
-    """For each surface the largest amount of its displacement that makes no face rougher, by bisection."""
-    low, high, best = np.zeros(len(parts)), ceiling.copy(), watch.still()
-    why: list[tuple[Worse, ...]] = [()] * len(parts)
-    for step in range(BISECTIONS + 1):
-        test = (low + high) / 2 if step else high.copy()
-        tried = {i: displaced(nets[i], test[i] * parts[i]) for i in np.flatnonzero(low < high).tolist()}
-        for i, faces in watch.changes(tried).items():
-            wrong = tuple(w for each in faces.values() for w in worse(each, tolerances.growth))
-            far = any(each.deviation > tolerances.deviation * (1 + 1e-9) for each in faces.values())
-            if wrong or far:
-                high[i], why[i] = test[i], why[i] or wrong
-            else:
-                low[i], best[i] = test[i], faces
-    return low.tolist(), best, why

@@ -9,8 +9,8 @@ from dataclasses import replace
 from mracad.constraint.cause import Cause, Still
 from mracad.constraint.seam import Treatment
 from mracad.constraint.wishes import Wishes
-from mracad.edit.driver import Moved, Result
 from mracad.edit.fair import faired
+from mracad.edit.moved import Moved, Result
 from mracad.edit.result import Edit, FaceOutcome, Reason, Status, spared
 from mracad.edit.target import Wish
 from mracad.edit.tolerances import RESHAPED, tolerances

@@ -41,6 +41,10 @@ class Forms:
         |∇H|², H the mean curvature, its gradient along the surface.
     largest : ndarray (q,)
         max(|κ₁|, |κ₂|).
+    shape : ndarray (3, q)
+        The shape operator in the frame of S_u / |S_u| and what is normal to it: its 11, 12 and 22 components.
+    slope : ndarray (2, q)
+        ∇H in that frame.
     regular : ndarray of bool (q,)
         Where the surface is not degenerate; elsewhere all figures are zero.
     """
@@ -51,6 +55,8 @@ class Forms:
     bending: Array
     variation: Array
     largest: Array
+    shape: Array
+    slope: Array
     regular: Array
 
     def part(self, points: slice) -> Forms:
@@ -79,11 +85,13 @@ def forms(jet: Array) -> Forms:
     points = jet.shape[2]
     _Work.done += points
     if _Work.done < MANY:
-        n, density, speeds, bending, variation, largest, regular = _figures(THIN, VOID, jet[1:])
-        return Forms(np.stack(n), density, np.stack(speeds), bending, variation, largest, regular)
+        every = _figures(THIN, VOID, jet[1:])
+        return Forms(*(np.stack(each) if isinstance(each, tuple) else each for each in every))
     density, bending, variation, largest = np.empty((4, points))
     regular = np.empty(points, bool)
-    found = Forms(np.empty((3, points)), density, np.empty((2, points)), bending, variation, largest, regular)
+    normal, shape = np.empty((2, 3, points))
+    speeds, slope = np.empty((2, 2, points))
+    found = Forms(normal, density, speeds, bending, variation, largest, shape, slope, regular)
     _compiled()(np.ascontiguousarray(jet), THIN, VOID, tuple(getattr(found, each.name) for each in fields(found)))
     return found
 
@@ -129,24 +137,31 @@ def _figures(thin: Any, void: Any, derivatives: Any) -> Any:
     hv = slope(f, g, (suuv, suvv, svvv), 2 * uv_u, uv_v + vv_u, 2 * vv_v)
     variation = (gg * hu * hu - 2 * ff * hu * hv + ee * hv * hv) / area2
     largest = np.abs(mean) + np.sqrt(np.maximum(mean * mean - gauss, 0.0))
+    long = share * ee + (1.0 - share)
+    skew, root = ff / long, np.sqrt(long)
+    across = share / safe
+    shape = share * e / long, across * (f - skew * e), across * across * long * (g - 2 * skew * f + skew * skew * e)
+    falls = share * hu / root, across * root * (hv - skew * hu)
     return (
         n, size * share, (np.sqrt(ee), np.sqrt(gg)), (4 * mean * mean - 2 * gauss) * share,
-        np.maximum(variation, 0.0) * share, largest * share, regular,
+        np.maximum(variation, 0.0) * share, largest * share, shape, falls, regular,
     )  # fmt: skip
 
 
 def _swept(jet: Any, thin: Any, void: Any, found: Any) -> None:
     """Fill in the figures (those of :class:`Forms`, in order) point by point."""
-    normal, density, speeds, bending, variation, largest, regular = found
+    normal, density, speeds, bending, variation, largest, shape, slope, regular = found
 
     def at(order: int, p: int) -> Any:
         return jet[order, 0, p], jet[order, 1, p], jet[order, 2, p]
 
     for p in range(jet.shape[2]):
-        n, density[p], (speeds[0, p], speeds[1, p]), bending[p], variation[p], largest[p], regular[p] = _figures(
+        n, density[p], sides, bending[p], variation[p], largest[p], bent, fall, regular[p] = _figures(
             thin, void, (at(1, p), at(2, p), at(3, p), at(4, p), at(5, p), at(6, p), at(7, p), at(8, p), at(9, p))
         )
         normal[0, p], normal[1, p], normal[2, p] = n
+        shape[0, p], shape[1, p], shape[2, p] = bent
+        (speeds[0, p], speeds[1, p]), (slope[0, p], slope[1, p]) = sides, fall
 
 
 @cache

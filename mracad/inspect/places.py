@@ -1,14 +1,15 @@
 """Roughness place by place: whether an edit made waves where a face was smooth, which no sum over the face shows.
 
-A face is divided into places with sides of half the wavelength of the edit.  What an edit takes from one spreads to
-those beside it, so bending and curvature variation of a place (their means over it) are compared with the largest of
-the place itself and of the eight about it before.
+A face is divided into places with sides of half the wavelength of the edit.  What it has beyond its base bends by
+|S − S₀|² and varies by |∇H − ∇H₀|², S the shape operator and ₀ the base: beside the curvature of the base itself,
+waves that reflections show are small.  What an edit takes from one place spreads to those beside it, so these figures
+(their means over a place) are compared with the largest of the place itself and of the eight about it before.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -35,9 +36,11 @@ class Placed:
     Attributes
     ----------
     spread : ndarray
-        By how much bending or curvature variation exceeds the largest about the place before, over that.
+        By how much what the place bends or varies beyond its base exceeds the largest about it before, over that.
     lost : ndarray
-        Share that the place lost of the one of which it lost more.
+        Share of its bending or curvature variation that the place lost, of the one of which it lost more.
+    rise : ndarray (2, nu, nv)
+        By how much bending and curvature variation of the place grew, over the mean of those that grew.
     curvature : ndarray
         Largest curvature now, 1/mm.
     turn : ndarray
@@ -54,6 +57,7 @@ class Placed:
 
     spread: Array
     lost: Array
+    rise: Array
     curvature: Array
     turn: Array
     opened: Array
@@ -82,9 +86,12 @@ class Places:
         Parameters at which they end.
     area : ndarray (nu, nv)
         mm², zero where a place is too small.
-    before, around : ndarray (2, nu, nv)
-        Means of bending and curvature variation; the largest of each place and those beside it, and of what shows
-        nowhere.
+    base : ndarray (5, q)
+        Shape operator and slope of the base, zero by default.
+    before : ndarray (2, nu, nv)
+        Means of bending and curvature variation.
+    most, around : ndarray (2, nu, nv)
+        The largest of each place and those beside it, and of what shows nowhere: of these, and beyond the base.
     """
 
     order: Array
@@ -93,28 +100,28 @@ class Places:
     shape: tuple[int, int]
     ends: tuple[Array, Array]
     area: Array
+    base: Array
     before: Array
+    most: Array
     around: Array
 
     @classmethod
-    def of(cls, rule: Quadrature, form: Forms, areas: Array, wavelength: float) -> Places:
-        """Places of the faces that a rule goes over, with the forms of the surface and areas (mm²) at its points."""
-        from scipy.ndimage import maximum_filter
-
+    def of(cls, rule: Quadrature, form: Forms, base: Forms | None, areas: Array, wavelength: float) -> Places:
+        """Places of the faces that a rule goes over, with forms of the surface and of what is shape in it, and areas
+        (mm²) at its points."""
         (rows, u), (columns, v) = (_divided(rule, form, axis, wavelength / SIDES) for axis in (0, 1))
         shape = len(u), len(v)
         cell = rows * shape[1] + columns
         order = np.argsort(cell, kind="stable")
         filled, first = np.unique(cell[order], return_index=True)
-        bare = np.zeros(shape)
-        places = cls(order, first, filled, shape, (u, v), bare, bare, bare)
+        bare, known = np.zeros(shape), np.zeros((5, len(areas))) if base is None else _bent(base)
+        places = cls(order, first, filled, shape, (u, v), bare, known, bare, bare, bare)
         area = places._gathered(np.add, areas)
-        k = 2 * np.pi / wavelength
-        flat = np.array([SLOPE**2 * k**2 / 2, SLOPE**2 * k**4 / 8])[:, None, None]
-        before = places._means(form, areas)
-        around = np.maximum(maximum_filter(before, (1, 3, 3), mode="nearest"), np.maximum(flat, 1e-300))
         area = np.where(area > SMALL * area.max(initial=0.0), area, 0.0)
-        return cls(order, first, filled, shape, (u, v), area, before, around)
+        before, beyond = places._means(form, areas), places._beyond(form, areas)
+        k = 2 * np.pi / wavelength
+        flat = np.array([SLOPE**2 * k**2 / 2, SLOPE**2 * k**4 / 8])
+        return replace(places, area=area, before=before, most=_around(before, flat), around=_around(beyond, flat))
 
     def compared(
         self, form: Forms, areas: Array, turned: Array, unsettled: Array, opened: Iterable[tuple[Crossing, Array]]
@@ -132,13 +139,16 @@ class Places:
         opened : iterable of (Crossing, ndarray)
             By how much angles across knot lines grew, radians.
         """
-        now, counts = self._means(form, areas), self.area > 0
-        spread = np.where(counts, (now / self.around - 1).max(axis=0), 0.0)
-        lost = np.where(counts, ((self.before - now) / self.around).max(axis=0), 0.0)
+        counts = self.area > 0
+        spread = np.where(counts, (self._beyond(form, areas) / self.around - 1).max(axis=0), 0.0)
+        fell = self.before - self._means(form, areas)
+        lost = np.where(counts, (fell / self.most).max(axis=0), 0.0)
+        rise = np.maximum(-fell * self.area, 0.0)
+        rise /= np.maximum(rise.mean(axis=(1, 2), keepdims=True), 1e-300)
         peaks, turn, singular = (
             self._gathered(np.maximum, each) for each in (form.largest * (areas > 0), turned, unsettled)
         )
-        return Placed(spread, lost, peaks, turn, self._opened(opened), singular, self.area, self.ends)
+        return Placed(spread, lost, rise, peaks, turn, self._opened(opened), singular, self.area, self.ends)
 
     def _opened(self, opened: Iterable[tuple[Crossing, Array]]) -> Array:
         found = np.zeros(self.shape)
@@ -157,8 +167,30 @@ class Places:
 
     def _means(self, form: Forms, areas: Array) -> Array:
         """Means of bending and curvature variation, ``(2, nu, nv)``."""
-        sums = [self._gathered(np.add, areas * each) for each in (form.bending, form.variation)]
+        return self._mean(areas, form.bending, form.variation)
+
+    def _beyond(self, form: Forms, areas: Array) -> Array:
+        """Means of what bends and varies beyond the base, ``(2, nu, nv)``."""
+        off = _bent(form) - self.base
+        off *= off
+        return self._mean(areas, off[0] + 2 * off[1] + off[2], off[3] + off[4])
+
+    def _mean(self, areas: Array, *figures: Array) -> Array:
+        sums = [self._gathered(np.add, areas * each) for each in figures]
         return np.asarray(np.stack(sums) / np.maximum(self._gathered(np.add, areas), 1e-300))
+
+
+def _bent(form: Forms) -> Array:
+    """Shape operator and slope, ``(5, q)``."""
+    return np.concatenate([form.shape, form.slope])
+
+
+def _around(figures: Array, least: Array) -> Array:
+    """The largest of each place and of those beside it, and no less than what shows nowhere, ``(2, nu, nv)``."""
+    from scipy.ndimage import maximum_filter
+
+    most = maximum_filter(figures, (1, 3, 3), mode="nearest")
+    return np.asarray(np.maximum(most, np.maximum(least, 1e-300)[:, None, None]))
 
 
 def _divided(rule: Quadrature, form: Forms, axis: int, side: float) -> tuple[Array, Array]:

@@ -24,6 +24,8 @@ class Rougher(Enum):
     SPREAD = "waves where it is smooth"
 
 
+SUMS = Rougher.BENDING, Rougher.VARIATION
+
 SETTLED = 0.005
 """Share by which the curvature at singular points may change."""
 
@@ -147,11 +149,11 @@ class Worse:
 def worse(change: Change, allowed: Growth) -> tuple[Worse, ...]:
     """In what a change made faces rougher than allowed, in the order of :class:`Rougher`."""
     before, after, noise = change.before, change.after, change.noise
-    found = []
-    for what, share in ((Rougher.BENDING, allowed.bending), (Rougher.VARIATION, allowed.variation)):
-        old, new, ripple = (float(getattr(each, what.name.lower())) for each in (before, after, noise))
-        if new > max(old * (1 + share), ripple):
-            found.append(Worse(what, old, new))
+    found = [
+        Worse(what, *(float(getattr(each, what.name.lower())) for each in (before, after)))
+        for what in SUMS
+        if _grown(change, what, allowed)
+    ]
     if after.curvature > before.curvature * (1 + allowed.curvature) + noise.curvature:
         found.append(Worse(Rougher.CURVATURE, before.curvature, after.curvature))
     if change.opened > allowed.kink + noise.kink:
@@ -165,14 +167,25 @@ def worse(change: Change, allowed: Growth) -> tuple[Worse, ...]:
     return tuple(found)
 
 
+def _grown(change: Change, what: Rougher, allowed: Growth) -> bool:
+    """Whether bending or curvature variation of all grew by more than allowed."""
+    name = what.name.lower()
+    old, new, ripple, share = (
+        float(getattr(each, name)) for each in (change.before, change.after, change.noise, allowed)
+    )
+    return new > max(old * (1 + share), ripple)
+
+
 def places(change: Change, allowed: Growth) -> Array:
-    """The places of a face that got worse than allowed, ``(nu, nv)``."""
+    """The places of a face that got worse than allowed, or by which all of it did, ``(nu, nv)``."""
     found = change.placed
     assert found is not None
     most = change.before.curvature * (1 + allowed.curvature) + change.noise.curvature
     steep = (found.turn > np.radians(allowed.fold)) | (found.opened > np.radians(allowed.kink + change.noise.kink))
     rough = (found.spread > allowed.spread) | (found.curvature > most)
-    return np.asarray(steep | rough | (found.unsettled > max(SETTLED, allowed.curvature)))
+    grown = [_grown(change, what, allowed) for what in SUMS]
+    more = (found.rise[grown] > 1.0).any(axis=0)
+    return np.asarray(steep | rough | more | (found.unsettled > max(SETTLED, allowed.curvature)))
 
 
 def better(change: Change, share: float, local: float = np.inf, mean: float = 0.0) -> bool:

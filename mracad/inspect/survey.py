@@ -88,6 +88,7 @@ def surveys(
     points: int = POINTS,
     singular: float = np.inf,
     reach: float = 0.0,
+    bases: Sequence[Net] = (),
 ) -> list[Survey]:
     """Look at surfaces before an edit.
 
@@ -101,6 +102,8 @@ def surveys(
         Curvature, 1/mm, from which on a point is singular: what a grid sees of it depends on where its points lie.
     reach : float
         Within which what an edit takes spreads, mm: faces are then looked at place by place, too.
+    bases : sequence of Net
+        Smooth copies of the surfaces, beside which waves show; planes by default.
     """
     ready = [
         (net, tuple(faces), _rule(faces, u, v, points), (u, v), net.poles.mean(axis=(0, 1)))
@@ -108,7 +111,9 @@ def surveys(
     ]
     found = []
     seen = _seen([(net, rule, centre) for net, _, rule, _, centre in ready])
+    shapes = _seen([(net, rule, centre) for net, (_, _, rule, _, centre) in zip(bases, ready, strict=False)])
     for (net, faces, rule, knots, centre), (at, form) in zip(ready, seen, strict=True):
+        _, base = next(shapes, (None, None))
         sides = form.speeds * _spans(rule, knots)
         least = max(CLUSTER[0], CLUSTER[1] * float(np.linalg.norm(np.ptp(net.poles, axis=(0, 1)))))
         regular = form.regular & (sides.min(axis=0) >= least)
@@ -123,7 +128,7 @@ def surveys(
             Survey(
                 net, faces, rule, centre, at, form.normal.astype(np.float32), regular, sharp, rounding, crossed,
                 _roughness(areas, form, regular, rounding, kink), _noise(areas * regular, sides, rounding),
-                Places.of(rule, form, areas * regular, reach) if reach else None,
+                Places.of(rule, form, base, areas * regular, reach) if reach else None,
             )
         )  # fmt: skip
     return found

@@ -209,7 +209,7 @@ def test_points_are_added_only_where_that_is_allowed():
     inner = np.pad(np.random.default_rng(0).standard_normal((5, 5)), 2)
     model = sheet(Net(u, v, np.stack([x, y, inner], axis=-1)))
     few, more = (
-        faired(model, {0}, Filter(12.0), Wishes(), Tolerances(1e-3), refine=refine) for refine in (False, True)
+        faired(model, {0}, Filter(10.0), Wishes(), Tolerances(1e-3), refine=refine) for refine in (False, True)
     )
     assert few.moved[0].net.poles.shape[:2] == (9, 9)
     assert min(more.moved[0].net.poles.shape[:2]) > 9
@@ -400,5 +400,5 @@ def test_a_strut_between_held_ends_stays_straight(noise):
     result, after = smoothed(net, 300.0)
     before, now = turning(net), turning(after)
     print(f"{result.moved[0].amount:.2f} of it; turns by {now:.2f}° per 100 mm, before {before:.2f}°")
-    assert now <= (before + 1e-3 if noise else 5.0)
+    assert now <= (1.01 * before if noise else 5.0)
     assert no_rougher(sheet(net), sheet(after))

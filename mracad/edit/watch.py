@@ -1,0 +1,125 @@
+"""Faces looked at while displacements of their surfaces are tried: how much of each may be done."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from mracad.bspline.surface import Net
+from mracad.edit.tolerances import Tolerances
+from mracad.inspect.roughness import Change, Worse, worse
+from mracad.inspect.survey import POINTS, Survey, changes, surveys
+from mracad.model.brep import Face
+
+Array = np.ndarray
+
+BISECTIONS = 3, 6
+"""Steps in which an amount is found: roughly among several displacements, and closely."""
+
+SINGULAR = 1e5
+"""Curvature over the wavelength from which on a face is singular."""
+
+
+@dataclass(frozen=True, eq=False)
+class Watch:
+    """The faces of surfaces, each looked at by itself.
+
+    Attributes
+    ----------
+    surveys : sequence of Survey
+    owners : sequence of (int, int)
+        Place of the surface of each, and the face.
+    """
+
+    surveys: Sequence[Survey]
+    owners: Sequence[tuple[int, int]]
+
+    @classmethod
+    def of(
+        cls, surfaces: Sequence[tuple[Net, Net, Sequence[Face]]], width: float, reach: float, points: int = POINTS
+    ) -> Watch:
+        """Look at faces of surfaces, with their bases, before an edit that takes waves up to a width and
+        spreads them within a reach (mm), at so many points a span."""
+        every = [(place, net, base, face) for place, (net, base, faces) in enumerate(surfaces) for face in faces]
+        looked = [(net, (face,), net.u, net.v) for _, net, _, face in every]
+        return cls(
+            surveys(looked, points, SINGULAR / width, reach, [base for *_, base, _ in every]),
+            [(place, face.index) for place, *_, face in every],
+        )
+
+    def still(self) -> list[dict[int, Change]]:
+        """What becomes of the faces of each surface where nothing moves."""
+        found: list[dict[int, Change]] = [{} for _ in range(self.owners[-1][0] + 1)]
+        for (place, face), survey in zip(self.owners, self.surveys, strict=True):
+            found[place][face] = Change(survey.roughness, survey.roughness, survey.noise)
+        return found
+
+    def changes(self, nets: Mapping[int, Net]) -> dict[int, dict[int, Change]]:
+        """What became of the faces of some surfaces, by place."""
+        found: dict[int, dict[int, Change]] = {place: {} for place in nets}
+        looked = [(*owner, survey) for owner, survey in zip(self.owners, self.surveys, strict=True) if owner[0] in nets]
+        now = changes([survey for *_, survey in looked], [nets[place] for place, *_ in looked])
+        for (place, face, _), change in zip(looked, now, strict=True):
+            found[place][face] = change
+        return found
+
+
+@dataclass(frozen=True, eq=False)
+class Tried:
+    """Displacements of surfaces, of which amounts are looked at, each once.
+
+    Attributes
+    ----------
+    watch : Watch
+    nets : sequence of Net
+    parts : sequence of ndarray (nu, nv, 3)
+        The whole displacements, mm.
+    """
+
+    watch: Watch
+    nets: Sequence[Net]
+    parts: Sequence[Array]
+    _seen: dict[tuple[int, float], Mapping[int, Change]] = field(default_factory=dict)
+
+    def changes(self, amounts: Mapping[int, float]) -> dict[int, Mapping[int, Change]]:
+        """What an amount of its displacement makes of the faces of each surface that is named."""
+        new = {i: displaced(self.nets[i], a * self.parts[i]) for i, a in amounts.items() if (i, a) not in self._seen}
+        self._seen.update({(i, amounts[i]): faces for i, faces in self.watch.changes(new).items()})
+        return {i: self._seen[i, amount] for i, amount in amounts.items()}
+
+
+def amounts(
+    tried: Tried, floor: Array, ceiling: Array, tolerances: Tolerances, steps: int = BISECTIONS[1]
+) -> tuple[list[float], list[Mapping[int, Change]], list[tuple[Worse, ...]]]:
+    """For each surface the largest amount of its displacement that makes no face rougher, by bisection.
+
+    Parameters
+    ----------
+    tried : Tried
+    floor, ceiling : ndarray (surfaces,)
+        Amounts below which nothing is done, and those that are not to be exceeded.
+    tolerances : Tolerances
+    steps : int
+        Bisections.
+    """
+    low, high = np.zeros(len(floor)), np.where(floor < ceiling, ceiling, 0.0)
+    best: list[Mapping[int, Change]] = [*tried.watch.still()]
+    why: list[tuple[Worse, ...]] = [()] * len(floor)
+    for step in range(steps + 1):
+        test = high if not step else np.where(low < floor, floor, (low + high) / 2)
+        now = {i: float(test[i]) for i in np.flatnonzero(low < high).tolist()}
+        for i, faces in tried.changes(now).items():
+            wrong = tuple(w for each in faces.values() for w in worse(each, tolerances.growth))
+            far = any(each.deviation > tolerances.deviation * (1 + 1e-9) for each in faces.values())
+            if wrong or far:
+                high[i], why[i] = (now[i] if now[i] > floor[i] else 0.0), why[i] or wrong
+            else:
+                low[i], best[i] = now[i], faces
+    return low.tolist(), best, why
+
+
+def displaced(net: Net, offset: Array) -> Net:
+    """The surface with control points moved by ``(nu, nv, 3)``, mm."""
+    return net.with_poles(net.poles + offset)
