@@ -87,10 +87,7 @@ def _step(name: str) -> Any:
     """The options of an edit, or its function."""
     from mracad.spec.steps import STEPS, Selection
 
-    struct = STEPS.get(name.lower())
-    if struct is None or not issubclass(struct, Selection):
-        return None
-    if name == struct.__name__:
-        return struct
-    module, _, function = struct.function.partition(":")
-    return getattr(import_module(module), function)
+    edits = {use: struct for use, struct in STEPS.items() if issubclass(struct, Selection)}
+    if name in edits:
+        return getattr(import_module(edits[name].function.partition(":")[0]), name)
+    return next((struct for struct in edits.values() if struct.__name__ == name), None)

@@ -18,9 +18,9 @@ __all__ = [
 ]  # fmt: skip
 
 STEPS: dict[str, type[Options]] = {
-    name.lower(): struct
+    struct.function.partition(":")[2]: struct
     for module in (smooth, features, checks)
-    for name, struct in vars(module).items()
+    for struct in vars(module).values()
     if isinstance(struct, type) and issubclass(struct, Options) and "function" in vars(struct)
 }
 """Every step by the name of its command: edits (subclasses of ``Selection``) and checks."""
