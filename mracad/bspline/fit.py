@@ -9,11 +9,14 @@ import numpy as np
 from mracad.bspline.basis import basis
 from mracad.bspline.knots import Array, KnotVector
 from mracad.bspline.solve import BandSolver, folded
-from mracad.bspline.surface import Net
+from mracad.bspline.surface import Net, pairs
 from mracad.memo import kept
 
 Knots = tuple[KnotVector, KnotVector]
 """In u and v."""
+
+Sites = Sequence[tuple[Array, Array]]
+"""For each direction: parameters, and the spans of that direction that they are in."""
 
 SPARE = 1.5
 """Spans are not divided that are at most so many times as wide as they need be."""
@@ -47,6 +50,47 @@ def divided(
             break
         knots = knots[0].refined(extra[0]), knots[1].refined(extra[1])
     return knots
+
+
+def offsets_over(net: Net, knots: Knots, poles: Array) -> Net:
+    """Control points over finer knots of a surface as a surface of offsets."""
+    return Net(*knots, poles, net.over(*knots).weights)
+
+
+def middles(u: KnotVector, v: KnotVector) -> Array:
+    """Parameters ``(q, 2)`` half-way between neighbouring Greville points of both directions."""
+    return pairs(*((x[1:] + x[:-1]) / 2 for x in (np.sort(k.greville()) for k in (u, v))))
+
+
+def missing(
+    net: Net, delta: Net, sites: Sites, ideal: Callable[[Array], Array], limit: float, least: Sequence[float]
+) -> list[Array]:
+    """Knots that divide the spans in which offsets miss the ideal.
+
+    Parameters
+    ----------
+    net, delta : Net
+        The surface, and offsets over it.
+    sites : Sites
+        Where they are compared.
+    ideal : callable
+        The displacement ``(q, 3)`` at parameters.
+    limit : float
+        By how much they may miss it, mm.
+    least : pair of float
+        Width of spans in u and v that are narrow enough, mm.
+    """
+    more = []
+    for axis, (kv, (uv, span)) in enumerate(zip((delta.u, delta.v), sites, strict=True)):
+        missed = np.linalg.norm(np.asarray(delta.evaluate(uv)) - ideal(uv), axis=1)
+        speed = np.linalg.norm(net.evaluate(uv, 1)[1 + axis], axis=1)
+        more.append(split(kv, span, missed / limit, speed, least[axis]))
+    return more
+
+
+def spans(kv: KnotVector, x: Array) -> Array:
+    """The spans that parameters lie in."""
+    return np.clip(np.searchsorted(kv.breaks, x, side="right") - 1, 0, kv.spans - 1)
 
 
 def split(kv: KnotVector, span: Array, missed: Array, speed: Array, least: float) -> Array:

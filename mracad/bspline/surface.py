@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import Literal, overload
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from mracad.bspline.basis import jet
 from mracad.bspline.curve import check_weights, euclidean, homogeneous
@@ -190,6 +191,11 @@ class Net:
         if v != self.v:
             poles = refinement(self.v, v).apply(poles, 1)
         return Net(u, v, *euclidean(poles, self.weights is not None))
+
+
+def pairs(us: ArrayLike, vs: ArrayLike) -> Array:
+    """All pairs of parameters ``(m n, 2)``, those of v fastest."""
+    return np.stack(np.meshgrid(us, vs, indexing="ij"), axis=-1).reshape(-1, 2)
 
 
 def cross(a: Array, b: Array) -> Array:

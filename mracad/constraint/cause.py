@@ -14,6 +14,7 @@ class Still(Enum):
     IDLE = "nothing to smooth on either side"
     FREE = "free edge"
     POLE = "pole"
+    SHARP = "sharp edge"
     CROWDED = "more than two faces"
     ELSEWHERE = "touches another instance, which moves by itself"
     PART = "coincides with a part of another edge"

@@ -59,6 +59,10 @@ class Filter:
         """The scale, for every surface."""
         return self.scale
 
+    def space(self, net: Net) -> Net:
+        """The surface over its own knots."""
+        return net
+
     def target(self, problem: Problem, sheets: Mapping[int, Sheet], joined: Joints) -> Array:
         """What smoothing would do were no rim held, ``(points, 3)``."""
         return problem.filtered(stiffness(self.scale), problem.seen)

@@ -71,6 +71,10 @@ class Level:
             total += weight * math.sqrt(2) * min(changed or spacing)
         return total
 
+    def space(self, net: Net) -> Net:
+        """The surface over its own knots."""
+        return net
+
     def target(self, problem: Problem, sheets: Mapping[int, Sheet], joined: Joints) -> Array:
         """The level of the surface that the sheets make, less that surface, ``(points, 3)``."""
         found = ladders(

@@ -50,6 +50,10 @@ class Wish(Protocol):
         """Wavelength below which it takes waves from a surface, mm: within it, it fades beside what is held."""
         ...
 
+    def space(self, net: Net) -> Net:
+        """A surface over knots that can hold what it wants; itself where those that it has will do."""
+        ...
+
     def target(self, problem: Problem, sheets: Mapping[int, Sheet], joined: Joints) -> Array:
         """What it would do to surfaces that seams join were no rim held, ``(points, 3)``."""
         ...
@@ -72,7 +76,7 @@ class Sheet:
     index : int
         In ``Model.surfaces``.
     origin, net : Net
-        As it is, and of degree 3 at least.
+        As it is, and of degree 3 at least over knots that can hold what is wanted.
     all_faces, faces : tuple of Face
         All faces on it, and those that may move.
     metric : Net
@@ -126,7 +130,7 @@ def sheets(model: Model, movable: Collection[int], wish: Wish) -> dict[int, Shee
 
 
 def _sheet(index: int, origin: Net, every: tuple[Face, ...], faces: tuple[Face, ...], wish: Wish) -> Sheet:
-    net = origin.over(origin.u.elevated(DEGREE), origin.v.elevated(DEGREE))
+    net = wish.space(origin.over(origin.u.elevated(DEGREE), origin.v.elevated(DEGREE)))
     points = quadrature(net, faces)
     sharp = creases(net, np.ones(net.poles.shape[:2], bool))
     wavelength = wish.wavelength(origin, sharp)

@@ -16,7 +16,7 @@ GROWTH = Growth(0.005, 0.005, 0.005, 0.02, 30.0, 0.25)
 """What the judge lets pass by default: a quarter of the 2 % that count as worse where faces are compared, and waves
 at a place of an eighth more than about it."""
 
-RESHAPED = Growth(1e9, 1e9, 1e9, 180.0, 30.0, 1e9)
+RESHAPED = Growth(np.inf, np.inf, np.inf, np.inf, 30.0, np.inf)
 """What the judge lets pass where an edit changes what faces are: they must not fold."""
 
 MORE = 0.02

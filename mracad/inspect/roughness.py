@@ -154,7 +154,7 @@ def worse(change: Change, allowed: Growth) -> tuple[Worse, ...]:
         for what in SUMS
         if _grown(change, what, allowed)
     ]
-    if after.curvature > before.curvature * (1 + allowed.curvature) + noise.curvature:
+    if after.curvature > _most(before.curvature, allowed.curvature) + noise.curvature:
         found.append(Worse(Rougher.CURVATURE, before.curvature, after.curvature))
     if change.opened > allowed.kink + noise.kink:
         found.append(Worse(Rougher.KINK, before.kink, after.kink))
@@ -173,14 +173,19 @@ def _grown(change: Change, what: Rougher, allowed: Growth) -> bool:
     old, new, ripple, share = (
         float(getattr(each, name)) for each in (change.before, change.after, change.noise, allowed)
     )
-    return new > max(old * (1 + share), ripple)
+    return new > max(_most(old, share), ripple)
+
+
+def _most(old: float, share: float) -> float:
+    """What a figure may grow to by a share of itself."""
+    return old * (1 + share) if share < np.inf else np.inf
 
 
 def places(change: Change, allowed: Growth) -> Array:
     """The places of a face that got worse than allowed, or by which all of it did, ``(nu, nv)``."""
     found = change.placed
     assert found is not None
-    most = change.before.curvature * (1 + allowed.curvature) + change.noise.curvature
+    most = _most(change.before.curvature, allowed.curvature) + change.noise.curvature
     steep = (found.turn > np.radians(allowed.fold)) | (found.opened > np.radians(allowed.kink + change.noise.kink))
     rough = (found.spread > allowed.spread) | (found.curvature > most)
     grown = [_grown(change, what, allowed) for what in SUMS]

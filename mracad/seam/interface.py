@@ -19,7 +19,7 @@ from mracad.constraint.frozen import CONTINUITY, meeting, reached
 from mracad.constraint.seam import Meeting, Seam, seams
 from mracad.constraint.trace import trace_of
 from mracad.constraint.trimmed import TrimmedSeam, beside, trimmed
-from mracad.constraint.wishes import Wishes
+from mracad.constraint.wishes import CREASE, Wishes
 from mracad.model.brep import Face, Model, Trim
 from mracad.seam.contact import Contact
 from mracad.seam.space import line
@@ -120,10 +120,28 @@ def joints(model: Model, movable: Collection[int], wishes: Wishes) -> Joints:
         elif not seam.joint.order:
             exact.remove(seam)
             frozen |= dict.fromkeys((seam.edge, seam.twin), rest)
-    ends = frozenset(edge for edge, why in frozen.items() if wishes.open and why.still in (Still.FREE, Still.POLE))
-    frozen = {edge: why for edge, why in frozen.items() if edge not in ends}
-    jumps = wishes.keep not in CONTINUITY and not wishes.open
-    return Joints(tuple(exact), tuple(loose), known.closing, frozen, known.meetings, jumps, ends)
+    jumps = wishes.keep not in CONTINUITY
+    joined = Joints(tuple(exact), tuple(loose), known.closing, frozen, known.meetings, jumps)
+    return _opened(joined) if wishes.open else joined
+
+
+def _opened(joined: Joints) -> Joints:
+    """Joints of faces that change what they are: free edges and poles move with them, and sharp edges stay."""
+    angles = [
+        *((s.edge, s.twin, s.angle) for s in joined.exact),
+        *((s.edge, s.twin, s.opening[1]) for s in joined.loose),
+    ]
+    sharp = {edge for *edges, angle in angles if angle > CREASE for edge in edges}
+    ends = frozenset(edge for edge, why in joined.frozen.items() if why.still in (Still.FREE, Still.POLE))
+    frozen = {edge: why for edge, why in joined.frozen.items() if edge not in ends}
+    return replace(
+        joined,
+        exact=tuple(seam for seam in joined.exact if seam.edge not in sharp),
+        loose=tuple(seam for seam in joined.loose if seam.edge not in sharp),
+        frozen=frozen | dict.fromkeys(sharp, Cause(Still.SHARP)),
+        jumps=False,
+        open=ends,
+    )
 
 
 def contact(seam: TrimmedSeam) -> Contact:

@@ -184,12 +184,14 @@ class Problem:
         """δ of the filter of gain 1 / (1 + x), ``(points, 3)``; stiffness in mm⁴."""
         return self._solver(stiffness, self.free)(-stiffness * (self.bending @ self.f))
 
-    def nearest(self, wanted: Array, stiffness: float = 0.0) -> Array:
+    def nearest(self, wanted: Array, stiffness: float = 0.0, beyond: bool = False) -> Array:
         """The admissible δ nearest to ``wanted``, both ``(points, 3)``, over the faces.
 
         Its distance is ‖δ − w‖²_M + a |δ − w|²_K, with ``stiffness`` a (mm⁴): what is added is then smooth.
+        ``beyond``: control points that the faces hardly depend on move as wanted, too; else they stay.
         """
-        kept = np.where(self.free[:, None], wanted, 0.0)
+        moving = self.free | ~self.seen if beyond else self.free
+        kept = np.where(moving[:, None], wanted, 0.0)
         held = wanted - kept
         pull = self.mass @ held
         if stiffness:

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from mracad.bspline.surface import pairs
 from mracad.edit.feature.chart import DEGREE, Charts, charts, monomials
 from mracad.edit.feature.ground import Ground, axes
 from mracad.edit.feature.locate import Window
-from mracad.edit.feature.patch import pairs
 from mracad.errors import EditError
 
 Array = np.ndarray

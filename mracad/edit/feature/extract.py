@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mracad.bspline.fit import through
-from mracad.bspline.surface import Net
+from mracad.bspline.surface import Net, pairs
 from mracad.constraint.frozen import separate
 from mracad.constraint.seam import seams
 from mracad.constraint.wishes import Wishes
@@ -17,7 +17,7 @@ from mracad.edit.feature.chart import Charts
 from mracad.edit.feature.detail import LOST, Feature, Origin, load, taper
 from mracad.edit.feature.ground import STEEP, Ground
 from mracad.edit.feature.locate import Window, window
-from mracad.edit.feature.patch import Patch, pairs
+from mracad.edit.feature.patch import Patch
 from mracad.errors import EditError
 from mracad.model.brep import Model
 from mracad.spec.quantity import band_of, length

@@ -7,22 +7,19 @@ interpolant misses the ideal.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import cache
 
 import numpy as np
 
-from mracad.bspline.fit import SPARE, Knots, divided, evenly, split, through
+from mracad.bspline.fit import SPARE, Knots, Sites, divided, evenly, missing, offsets_over, spans, through
 from mracad.bspline.knots import KnotVector
-from mracad.bspline.surface import Net
 from mracad.edit.feature.ideal import Copies
 from mracad.edit.feature.patch import Patch
 from mracad.errors import EditError
 from mracad.wavelet.ladder import arc_lengths
 
 Array = np.ndarray
-Sites = Sequence[tuple[Array, Array]]
-"""For each direction: parameters, and the spans of that direction that they are in."""
 
 MISSED = 3e-4
 """Share of its height by which a copy may miss the ideal before knots are inserted."""
@@ -71,9 +68,9 @@ def holding(copies: Copies, patch: Patch) -> tuple[Knots, Array]:
                 f"the copies need {knots[0].count} × {knots[1].count} control points on #{patch.faces[0].index + 1}",
                 "use larger or fewer copies",
             )
-        delta = offsets_over(patch, knots, poles(knots))
+        delta = offsets_over(patch.net, knots, poles(knots))
         sites = between(copies, patch, knots)
-        return missing(patch, delta, sites, lambda uv: copies.at(patch, uv), MISSED * copies.height, least)
+        return missing(patch.net, delta, sites, lambda uv: copies.at(patch, uv), MISSED * copies.height, least)
 
     knots = divided((u.refined(first[0]), v.refined(first[1])), more)
     return knots, poles(knots)
@@ -86,37 +83,6 @@ def over_knots(copies: Copies, patch: Patch, knots: Knots) -> Array:
     poles = through(patch.net.over(*knots), values.reshape(points.shape))
     near = grown(count.reshape(points.shape[:2]) > 0, knots)
     return np.where(near[..., None], poles, 0.0)
-
-
-def offsets_over(patch: Patch, knots: Knots, poles: Array) -> Net:
-    """Control points over knots of a patch as a surface of offsets."""
-    return Net(*knots, poles, patch.net.over(*knots).weights)
-
-
-def missing(
-    patch: Patch, delta: Net, sites: Sites, ideal: Callable[[Array], Array], limit: float, least: Sequence[float]
-) -> list[Array]:
-    """Knots that divide the spans in which offsets miss the ideal.
-
-    Parameters
-    ----------
-    patch : Patch
-    delta : Net
-    sites : Sites
-        Where they are compared.
-    ideal : callable
-        The displacement ``(q, 3)`` at parameters.
-    limit : float
-        By how much they may miss it, mm.
-    least : pair of float
-        Width of spans in u and v that are narrow enough, mm.
-    """
-    more = []
-    for axis, (kv, (uv, span)) in enumerate(zip((delta.u, delta.v), sites, strict=True)):
-        missed = np.linalg.norm(np.asarray(delta.evaluate(uv)) - ideal(uv), axis=1)
-        speed = np.linalg.norm(patch.net.evaluate(uv, 1)[1 + axis], axis=1)
-        more.append(split(kv, span, missed / limit, speed, least[axis]))
-    return more
 
 
 def _least(copies: Copies, kv: KnotVector) -> float:
@@ -195,8 +161,3 @@ def between(copies: Copies, patch: Patch, knots: Knots) -> Sites:
         uv[:, axis] = (at[axis][order[own[keep]]] + at[axis][order[own[keep] + 1]]) / 2
         found.append((uv, spans(kv, uv[:, axis])))
     return found
-
-
-def spans(kv: KnotVector, x: Array) -> Array:
-    """The spans that parameters lie in."""
-    return np.clip(np.searchsorted(kv.breaks, x, side="right") - 1, 0, kv.spans - 1)

@@ -7,10 +7,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from mracad.bspline.knots import KnotVector
-from mracad.bspline.surface import Net
+from mracad.bspline.surface import Net, pairs
 from mracad.model.brep import Face, Model
 from mracad.model.outline import FLAT, outline
 from mracad.model.region import face_region
@@ -177,11 +176,6 @@ class Patch:
                 within = (cross & (x > at[..., 0])).sum(axis=1) % 2 == 1
                 off[block] = np.minimum(off[block], np.where(within, 0.0, apart))
         return off
-
-
-def pairs(us: ArrayLike, vs: ArrayLike) -> Array:
-    """All pairs of parameters ``(m n, 2)``, those of v fastest."""
-    return np.stack(np.meshgrid(us, vs, indexing="ij"), axis=-1).reshape(-1, 2)
 
 
 def touched(net: Net, faces: Iterable[Face]) -> Array:

@@ -12,17 +12,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mracad.bspline.fit import Knots, divided, through
+from mracad.bspline.fit import Knots, divided, middles, missing, offsets_over, spans, through
 from mracad.bspline.knots import KnotVector
-from mracad.bspline.surface import Net
+from mracad.bspline.surface import Net, pairs
 from mracad.constraint.frozen import separate
 from mracad.constraint.seam import seams
 from mracad.constraint.wishes import Wishes
 from mracad.edit.feature.detail import taper
-from mracad.edit.feature.fit import MISSED, NARROWEST, missing, offsets_over, spans
+from mracad.edit.feature.fit import MISSED, NARROWEST
 from mracad.edit.feature.ideal import Way
 from mracad.edit.feature.lay import Laid
-from mracad.edit.feature.patch import Patch, pairs
+from mracad.edit.feature.patch import Patch
 from mracad.edit.feature.score import Copy, Figures, copied
 from mracad.errors import EditError
 from mracad.model.brep import Model
@@ -146,8 +146,8 @@ def laid_on(
     def more(knots: Knots) -> Sequence[Array]:
         uv = _middles(target, *knots)
         sites = [(uv, spans(kv, uv[:, axis])) for axis, kv in enumerate(knots)]
-        delta = offsets_over(target, knots, _poles(target, ideal, knots))
-        return missing(target, delta, sites, ideal, MISSED * height, (least, least))
+        delta = offsets_over(target.net, knots, _poles(target, ideal, knots))
+        return missing(target.net, delta, sites, ideal, MISSED * height, (least, least))
 
     knots = divided(target.knots, more)
     poles, net = _poles(target, ideal, knots), model.surfaces[target.index].net
@@ -159,7 +159,7 @@ def laid_on(
     window = _window(fine, free, band[1] / 2 if width is None else width)
     wanted = poles + lifted(net, fine, (stays - 1.0) * own.detail.poles)
     gone = wanted * (window - 1.0)[..., None]
-    copy = _compared(target, ideal, offsets_over(target, knots, poles), offsets_over(target, knots, gone))
+    copy = _compared(target, ideal, offsets_over(target.net, knots, poles), offsets_over(target.net, knots, gone))
     copy = replace(copy, place=f"{options.from_} on {options.to}")
     return Laid({target.index: Offset.of(net, fine, wanted * window[..., None] @ target.turn)}, (copy,))
 
@@ -186,8 +186,8 @@ def _poles(target: Patch, ideal: Carried, knots: Knots) -> Array:
 
 
 def _middles(target: Patch, u: KnotVector, v: KnotVector) -> Array:
-    """Parameters on a patch half-way between neighbouring Greville points of both directions."""
-    uv = pairs(*((x[1:] + x[:-1]) / 2 for x in (np.sort(k.greville()) for k in (u, v))))
+    """Parameters on the faces of a patch half-way between Greville points."""
+    uv = middles(u, v)
     return np.asarray(uv[target.covers(uv)])
 
 
