@@ -46,13 +46,13 @@ def make_panel(path: Path, side: int, spans: int) -> None:
 
 def group(model: Any) -> Any:
     """All faces as one problem, edges that bound one face free."""
-    from mracad.constraint.wishes import Wishes
     from mracad.model.cells import quadrature
     from mracad.seam.conditions import matched, rows
     from mracad.seam.energy import forms
     from mracad.seam.interface import joints
     from mracad.seam.metric import planar, seen
     from mracad.seam.solve import Problem, Space
+    from mracad.seam.wishes import Wishes
 
     joined = joints(model, set(range(len(model.faces))), Wishes("g1"))
     spaces = {}

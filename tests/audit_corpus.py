@@ -26,13 +26,13 @@ from statistics import mean, median
 
 import numpy as np
 
-from mracad.constraint.frozen import separate
 from mracad.model.brep import Model
 from mracad.model.displacement import Displacement, Offset
 from mracad.occ.apply import apply
 from mracad.occ.settings import quiet
 from mracad.occ.step import read_step, write_step
 from mracad.occ.view import view
+from mracad.seam.hold import separate
 from mracad.spec.quantity import length
 from tests.roughness import FEWEST, POINTS, Face, compared, faces, matched, opened, removed, report
 from tests.sheet import Sheet, grid

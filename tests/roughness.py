@@ -30,9 +30,9 @@ from OCP.TopExp import TopExp_Explorer
 from OCP.TopoDS import TopoDS, TopoDS_Face
 from scipy.optimize import linear_sum_assignment
 
+from mracad.bspline.crease import crease_lines
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
-from mracad.constraint.crease import crease_lines
 from mracad.occ.document import Document
 from mracad.occ.settings import quiet
 from mracad.occ.step import read_step

@@ -25,11 +25,11 @@ from OCP.TopExp import TopExp_Explorer
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Shape, TopoDS_Shell
 
-from mracad.constraint.frozen import separate
 from mracad.model.displacement import Displacement, Offset
 from mracad.occ.apply import apply
 from mracad.occ.document import Document
 from mracad.occ.view import view
+from mracad.seam.hold import separate
 from mracad.wavelet.ladder import arc_lengths
 from tests.occ import shapes
 

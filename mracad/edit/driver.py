@@ -15,15 +15,15 @@ from dataclasses import replace
 import numpy as np
 
 from mracad.bspline.surface import Net
-from mracad.constraint.cause import Cause, Still
-from mracad.constraint.seam import Seam
-from mracad.constraint.trimmed import TrimmedSeam
 from mracad.edit.moved import Moved, Result
 from mracad.edit.pose import Scene, beside_rims
 from mracad.edit.target import Sheet, Wish
 from mracad.edit.tolerances import Tolerances
 from mracad.edit.trial import ENOUGH, Trial, Verdict, worth
+from mracad.seam.cause import Cause, Still
 from mracad.seam.interface import Joints
+from mracad.seam.natural import Seam
+from mracad.seam.trimmed import TrimmedSeam
 
 Array = np.ndarray
 

@@ -19,7 +19,6 @@ import numpy as np
 
 from mracad.bspline.jets import jets
 from mracad.bspline.surface import Net
-from mracad.constraint.wishes import Wishes
 from mracad.edit.driver import drive
 from mracad.edit.mend import Mended, mended
 from mracad.edit.moved import Result
@@ -31,6 +30,7 @@ from mracad.model.brep import Model
 from mracad.seam.interface import Joints, joints
 from mracad.seam.ladders import Creases
 from mracad.seam.solve import Problem
+from mracad.seam.wishes import Wishes
 
 Array = np.ndarray
 

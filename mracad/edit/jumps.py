@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from mracad.bspline.surface import Net
-from mracad.constraint.sides import views
 from mracad.edit.pose import Scene
 from mracad.seam.interface import Joints
+from mracad.seam.sides import views
 
 MORE = 0.1
 """Share by which a jump may grow, beside what an edit may add where there is none."""

@@ -26,12 +26,12 @@ from mracad.bspline.gram import gram
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.refine import refinement
 from mracad.bspline.surface import Net
-from mracad.constraint.seam import Seam
 from mracad.edit.target import Sheet, stiffness
 from mracad.seam.conditions import rows
 from mracad.seam.constrained import Constrained
 from mracad.seam.interface import Joints
 from mracad.seam.ladders import Creases, ladders
+from mracad.seam.natural import Seam
 from mracad.seam.solve import Problem
 from mracad.wavelet.ladder import arc_lengths
 from mracad.wavelet.project import projection

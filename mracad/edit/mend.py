@@ -14,8 +14,6 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from mracad.bspline.surface import Net
-from mracad.constraint.trace import along
-from mracad.constraint.trimmed import TrimmedSeam
 from mracad.edit.driver import groups
 from mracad.edit.moved import Moved, Result
 from mracad.edit.pose import Pose, Scene, pose
@@ -24,6 +22,8 @@ from mracad.edit.watch import Watch, displaced
 from mracad.model.brep import Model
 from mracad.model.displacement import lifted
 from mracad.seam.interface import Joints
+from mracad.seam.trace import along
+from mracad.seam.trimmed import TrimmedSeam
 
 Array = np.ndarray
 

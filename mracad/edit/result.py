@@ -7,11 +7,11 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Literal
 
-from mracad.constraint.seam import Treatment
 from mracad.edit.feature.score import Copy
 from mracad.inspect.roughness import Roughness
 from mracad.model.brep import Face
 from mracad.model.displacement import Displacement
+from mracad.seam.natural import Treatment
 from mracad.spec.select import Scope
 
 Status = Literal["edited", "unchanged", "left", "held", "unselected", "analytic"]

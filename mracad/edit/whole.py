@@ -6,9 +6,6 @@ import math
 from collections.abc import Callable, Collection
 from dataclasses import replace
 
-from mracad.constraint.cause import Cause, Still
-from mracad.constraint.seam import Treatment
-from mracad.constraint.wishes import Wishes
 from mracad.edit.fair import faired
 from mracad.edit.moved import Moved, Result
 from mracad.edit.result import Edit, FaceOutcome, Reason, Status, spared
@@ -16,6 +13,9 @@ from mracad.edit.target import Wish
 from mracad.edit.tolerances import RESHAPED, tolerances
 from mracad.inspect.roughness import Worse
 from mracad.model.brep import Face, Model
+from mracad.seam.cause import Cause, Still
+from mracad.seam.natural import Treatment
+from mracad.seam.wishes import Wishes
 from mracad.spec.select import Scope
 from mracad.spec.select import scope as scope_of
 from mracad.spec.steps import Fitting

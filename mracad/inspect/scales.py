@@ -12,12 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from mracad.bspline.basis import gauss
+from mracad.bspline.crease import crease_lines
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
-from mracad.constraint.crease import crease_lines
-from mracad.constraint.frozen import separate
 from mracad.model.brep import Face, Model, Surface
 from mracad.model.region import face_region
+from mracad.seam.hold import separate
 from mracad.wavelet.ladder import arc_lengths, finest_scale
 from mracad.wavelet.project import at_scale
 

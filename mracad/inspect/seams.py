@@ -13,9 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mracad.constraint.coincide import GAP, TORN, coinciding
-from mracad.constraint.sides import between, views
+from mracad.model.adjacency import GAP, TORN, coinciding
 from mracad.model.brep import Edge, Model, Side
+from mracad.seam.sides import between, views
 
 Array = np.ndarray
 _Pair = tuple[Edge, bool, tuple[Side, Side]]

@@ -5,7 +5,7 @@ displacement δ, at the Greville points of the splines along it,
 
     G0   δ_b = δ_a,   G1   ∂_n δ_b = a ∂_n δ_a + b ∂_t δ_a,   G2   ∂_nn δ_b = a² ∂_nn δ_a + r ∂_n δ_a + s ∂_t δ_a
 
-(a, b, r, s of the input's joint: :class:`mracad.constraint.joint.Joint`), or what comes to the same with fewer control
+(a, b, r, s of the input's joint: :class:`mracad.seam.joint.Joint`), or what comes to the same with fewer control
 points in each condition.  As many conditions as the space has functions are exact where the joint's coefficients are
 constant, and never lock where they vary.  Along double knots (:func:`doubled`) there is room for conditions that are
 exact where they vary, too.
@@ -22,9 +22,9 @@ from mracad.bspline.basis import basis
 from mracad.bspline.functions import functions
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
-from mracad.constraint.border import Border
-from mracad.constraint.joint import Joint
-from mracad.constraint.seam import Seam
+from mracad.seam.border import Border
+from mracad.seam.joint import Joint
+from mracad.seam.natural import Seam
 
 Array = np.ndarray
 

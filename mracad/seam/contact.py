@@ -6,7 +6,7 @@ points of every piece between knot lines of either side,
     G0   δ_b = δ_a,      G1   D_c δ_b = D_c δ_a,      G2   D_c² δ_b + D_z δ_b = D_c² δ_a
 
 (δ_b = 0 at a rim, and with G1 D_t δ_a = 0, t along it: what is off by next to nothing still tilts a surface where its
-knots are close; directions as in :mod:`mracad.constraint.trimmed`), weighted with the inverse square of what each may
+knots are close; directions as in :mod:`mracad.seam.trimmed`), weighted with the inverse square of what each may
 lack: where the net can, it does, and where it cannot δ gives way.  What two noisy sides lack already is their noise:
 conditions are drawn towards surfaces that meet, the more gently the more they lacked.
 """
@@ -21,8 +21,8 @@ import numpy as np
 
 from mracad.bspline.functions import functions
 from mracad.bspline.surface import Net
-from mracad.constraint.trace import Trace, crossings, derived, directions
 from mracad.seam.conditions import laid_out
+from mracad.seam.trace import Trace, crossings, derived, directions
 
 Array = np.ndarray
 

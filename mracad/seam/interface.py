@@ -13,16 +13,16 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from mracad.bspline.surface import Net
-from mracad.constraint.border import Border
-from mracad.constraint.cause import Cause, Still
-from mracad.constraint.frozen import CONTINUITY, meeting, reached
-from mracad.constraint.seam import Meeting, Seam, seams
-from mracad.constraint.trace import trace_of
-from mracad.constraint.trimmed import TrimmedSeam, beside, trimmed
-from mracad.constraint.wishes import CREASE, Wishes
 from mracad.model.brep import Face, Model, Trim
+from mracad.seam.border import Border
+from mracad.seam.cause import Cause, Still
 from mracad.seam.contact import Contact
+from mracad.seam.hold import CONTINUITY, meeting, reached
+from mracad.seam.natural import Meeting, Seam, seams
 from mracad.seam.space import line
+from mracad.seam.trace import trace_of
+from mracad.seam.trimmed import TrimmedSeam, beside, trimmed
+from mracad.seam.wishes import CREASE, Wishes
 
 Array = np.ndarray
 

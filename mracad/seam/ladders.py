@@ -16,7 +16,7 @@ import numpy as np
 
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
-from mracad.constraint.seam import Seam
+from mracad.seam.natural import Seam
 from mracad.wavelet.ladder import arc_lengths, rungs_by_level
 
 Array = np.ndarray

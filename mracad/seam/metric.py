@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from mracad.bspline.crease import crease_lines
 from mracad.bspline.gram import gram
 from mracad.bspline.surface import Net, cross
-from mracad.constraint.crease import crease_lines
 from mracad.model.cells import Quadrature
 from mracad.seam.energy import Forms, forms
 from mracad.seam.solve import Problem, Space

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from mracad.bspline.surface import Net
-from mracad.constraint.frozen import ISO, local_span
 from mracad.model.brep import Face, Trim
 from mracad.model.region import face_region
+from mracad.seam.hold import ISO, local_span
 from mracad.wavelet.ladder import arc_lengths
 
 Array = np.ndarray

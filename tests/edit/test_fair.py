@@ -8,7 +8,6 @@ import pytest
 from mracad.bspline.fit import interpolated
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
-from mracad.constraint.wishes import Wishes
 from mracad.edit.driver import groups
 from mracad.edit.fair import Filter, faired
 from mracad.edit.pose import Scene
@@ -20,6 +19,7 @@ from mracad.inspect.seams import seams
 from mracad.inspect.survey import changes, surveys
 from mracad.occ.view import view
 from mracad.seam.interface import joints
+from mracad.seam.wishes import Wishes
 from tests.edit import halves, panels
 from tests.edit.models import fitted, rotation, sheet
 from tests.model.shapes import cylinder

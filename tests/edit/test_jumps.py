@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from mracad.constraint.wishes import Wishes
 from mracad.edit.fair import Filter
 from mracad.edit.jumps import MORE, Jumps
 from mracad.edit.pose import Scene
@@ -12,6 +11,7 @@ from mracad.edit.tolerances import Tolerances
 from mracad.edit.trial import displaced
 from mracad.occ.view import view
 from mracad.seam.interface import joints
+from mracad.seam.wishes import Wishes
 from tests.occ import shapes
 
 LENGTH, WIDTH = 30.0, 40.0

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from mracad.bspline.surface import Net
-from mracad.constraint.wishes import Wishes
 from mracad.edit.fair import faired
 from mracad.edit.level import Level
 from mracad.edit.target import sheets
@@ -15,6 +14,7 @@ from mracad.occ.view import view
 from mracad.seam.energy import forms
 from mracad.seam.interface import Joints
 from mracad.seam.solve import Problem, Space
+from mracad.seam.wishes import Wishes
 from mracad.wavelet.ladder import arc_lengths, rungs_by_level
 from mracad.wavelet.project import projection
 from tests.edit import halves, panels

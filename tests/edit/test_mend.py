@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from mracad.bspline.surface import Net
-from mracad.constraint.wishes import Wishes
 from mracad.edit.fair import Filter, faired
 from mracad.edit.mend import mended
 from mracad.edit.pose import Scene
@@ -15,6 +14,7 @@ from mracad.edit.tolerances import Tolerances
 from mracad.inspect.seams import seams
 from mracad.occ.view import view
 from mracad.seam.interface import joints
+from mracad.seam.wishes import Wishes
 from tests.edit import halves, panels
 
 GAP, TILT = 4e-3, 6e-3

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 import mracad
-from mracad.constraint.cause import Cause, Still
 from mracad.errors import UsageError
 from mracad.job.document import run
 from mracad.occ.step import read_step, write_step
 from mracad.occ.view import view
+from mracad.seam.cause import Cause, Still
 from tests.edit import panels
 from tests.occ import shapes
 

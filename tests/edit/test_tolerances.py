@@ -6,8 +6,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mracad.constraint.seam import Treatment
-from mracad.constraint.wishes import Wishes
 from mracad.edit.fair import Filter
 from mracad.edit.pose import Scene
 from mracad.edit.result import Edit, FaceOutcome
@@ -18,6 +16,8 @@ from mracad.inspect.seams import seams
 from mracad.model.displacement import Displacement
 from mracad.occ.view import view
 from mracad.seam.interface import joints, rims
+from mracad.seam.natural import Treatment
+from mracad.seam.wishes import Wishes
 from mracad.spec.steps import Repeat, Smooth
 from tests.edit import halves
 

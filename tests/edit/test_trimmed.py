@@ -7,12 +7,12 @@ import pytest
 from OCP.BRep import BRep_Tool
 from OCP.TopExp import TopExp
 
-from mracad.constraint.cause import Cause, Still
 from mracad.edit.smooth import smooth
 from mracad.inspect.seams import seams
 from mracad.job.document import run
 from mracad.occ.step import read_step, write_step
 from mracad.occ.view import view
+from mracad.seam.cause import Cause, Still
 from mracad.spec.steps import Smooth
 from tests.edit import halves
 from tests.edit.models import sheet

@@ -7,10 +7,10 @@ from scipy.sparse import eye_array
 from mracad.bspline.fit import interpolated
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
-from mracad.constraint.border import Border
-from mracad.constraint.joint import Joint
-from mracad.constraint.seam import Seam
+from mracad.seam.border import Border
 from mracad.seam.conditions import doubled, laid_out, matched, rows
+from mracad.seam.joint import Joint
+from mracad.seam.natural import Seam
 from mracad.seam.solve import Constrained
 
 NONE = np.empty(0)

@@ -8,8 +8,8 @@ from mracad.bspline.curve import Curve
 from mracad.bspline.fit import interpolated
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
-from mracad.constraint.trace import Trace
 from mracad.seam.contact import MORE, Contact, rows
+from mracad.seam.trace import Trace
 from tests.model.shapes import graph, plane, segment
 
 INF = float("inf")

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from mracad.bspline.crease import crease_lines
 from mracad.bspline.fit import interpolated
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
-from mracad.constraint.crease import crease_lines
 from mracad.model.cells import quadrature
 from mracad.seam.energy import KINK_WEIGHT, forms
 from tests.edit.models import rotation

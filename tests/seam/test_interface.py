@@ -7,14 +7,14 @@ import pytest
 
 from mracad.bspline.fit import interpolated
 from mracad.bspline.surface import Net
-from mracad.constraint.seam import Meeting
-from mracad.constraint.wishes import Wishes
 from mracad.model.brep import Edge, Face, Model, Side, Surface, Trim
 from mracad.model.cells import quadrature
 from mracad.occ.view import view
 from mracad.seam.interface import Joints, away, contact, end, joints, rims, twists
 from mracad.seam.metric import planar, smoothed
+from mracad.seam.natural import Meeting
 from mracad.seam.space import MOST_POINTS, refined
+from mracad.seam.wishes import Wishes
 from mracad.wavelet.ladder import arc_lengths
 from tests.edit import panels
 from tests.edit.models import free_edge, sheet

@@ -5,10 +5,10 @@ import pytest
 
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
-from mracad.constraint.border import Border
-from mracad.constraint.joint import Joint
-from mracad.constraint.seam import Seam
+from mracad.seam.border import Border
+from mracad.seam.joint import Joint
 from mracad.seam.ladders import ladders
+from mracad.seam.natural import Seam
 from mracad.wavelet.ladder import arc_lengths, rungs_by_level
 
 ACROSS = KnotVector.clamped([0, 1], 3)

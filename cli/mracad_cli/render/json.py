@@ -16,7 +16,6 @@ from mracad.inspect.verdict import Figure, Finding, Layer, Verdict
 from mracad.job.words import notes, of_finding
 
 if TYPE_CHECKING:
-    from mracad.constraint.seam import Treatment
     from mracad.edit.result import FaceOutcome
     from mracad.inspect.faults import Fault, ReadBack
     from mracad.inspect.seams import SeamMeasure
@@ -24,6 +23,7 @@ if TYPE_CHECKING:
     from mracad.job.judge import Judged
     from mracad.job.produce import Made
     from mracad.model.facts import Validity
+    from mracad.seam.natural import Treatment
 
 
 def json_text(value: Any, indent: int | None = None) -> str:

@@ -12,7 +12,6 @@ from mracad.job.words import notes, placed
 from mracad.spec.steps import Selection
 
 if TYPE_CHECKING:
-    from mracad.constraint.seam import Treatment
     from mracad.edit.result import FaceOutcome
     from mracad.inspect.seams import SeamSummary
     from mracad.inspect.verdict import Layer, Verdict
@@ -20,6 +19,7 @@ if TYPE_CHECKING:
     from mracad.job.document import Report
     from mracad.job.judge import Judged
     from mracad.job.produce import Made
+    from mracad.seam.natural import Treatment
     from mracad.spec.recipe import Step
 
 SHOWN = 6

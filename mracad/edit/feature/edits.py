@@ -12,8 +12,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from mracad.constraint.seam import Treatment
-from mracad.constraint.wishes import Wishes
 from mracad.edit.feature.detail import Feature
 from mracad.edit.feature.extract import feature_of
 from mracad.edit.feature.fit import NARROWEST
@@ -27,6 +25,8 @@ from mracad.edit.result import Edit, FaceOutcome, Reason, spared
 from mracad.errors import EditError, UsageError
 from mracad.model.brep import Face, Model
 from mracad.model.displacement import Displacement
+from mracad.seam.natural import Treatment
+from mracad.seam.wishes import Wishes
 from mracad.spec.quantity import band_of, length
 from mracad.spec.select import Scope
 from mracad.spec.select import scope as scope_of

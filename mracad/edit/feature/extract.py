@@ -9,9 +9,6 @@ import numpy as np
 
 from mracad.bspline.fit import through
 from mracad.bspline.surface import Net, pairs
-from mracad.constraint.frozen import separate
-from mracad.constraint.seam import seams
-from mracad.constraint.wishes import Wishes
 from mracad.edit.feature.base import plate
 from mracad.edit.feature.chart import Charts
 from mracad.edit.feature.detail import LOST, Feature, Origin, load, taper
@@ -20,6 +17,9 @@ from mracad.edit.feature.locate import Window, window
 from mracad.edit.feature.patch import Patch
 from mracad.errors import EditError
 from mracad.model.brep import Model
+from mracad.seam.hold import separate
+from mracad.seam.natural import seams
+from mracad.seam.wishes import Wishes
 from mracad.spec.quantity import band_of, length
 from mracad.spec.steps import Featured
 from mracad.wavelet.project import band

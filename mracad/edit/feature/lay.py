@@ -12,13 +12,6 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from mracad.bspline.surface import Net
-from mracad.constraint.border import opening
-from mracad.constraint.cause import Cause, Still
-from mracad.constraint.frozen import separate
-from mracad.constraint.seam import Seam
-from mracad.constraint.trace import Trace
-from mracad.constraint.trimmed import TrimmedSeam
-from mracad.constraint.wishes import Wishes
 from mracad.edit.feature.exact import Shifts, shifted
 from mracad.edit.feature.fit import MISSED, holding, over_knots
 from mracad.edit.feature.ground import Ground
@@ -28,7 +21,14 @@ from mracad.edit.feature.seams import ALLOWED, Crossing, Wanted, crossing, held,
 from mracad.edit.pose import WITHIN
 from mracad.model.brep import Model
 from mracad.model.displacement import Displacement, Offset, lifted
+from mracad.seam.border import opening
+from mracad.seam.cause import Cause, Still
+from mracad.seam.hold import separate
 from mracad.seam.interface import Joints, joints
+from mracad.seam.natural import Seam
+from mracad.seam.trace import Trace
+from mracad.seam.trimmed import TrimmedSeam
+from mracad.seam.wishes import Wishes
 
 Array = np.ndarray
 

@@ -9,13 +9,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from mracad.constraint.trace import EVENLY, Trace, trace_of
 from mracad.edit.feature.detail import Feature
 from mracad.edit.feature.ground import SIDEWAYS, Feet, Ground, axes
 from mracad.edit.feature.locate import MOST_PLACES, Place, numbers, place, standing, table, whole
 from mracad.edit.feature.patch import Patch
 from mracad.errors import EditError, UsageError
 from mracad.model.brep import Face
+from mracad.seam.trace import EVENLY, Trace, trace_of
 from mracad.spec.quantity import length
 from mracad.spec.steps import Repeat
 

@@ -13,22 +13,22 @@ import numpy as np
 
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
-from mracad.constraint.border import Border
-from mracad.constraint.seam import Seam
-from mracad.constraint.trace import Trace, along, crossings
-from mracad.constraint.trimmed import TrimmedSeam
 from mracad.edit.feature.fit import grown
 from mracad.edit.pose import WITHIN, worth
 from mracad.edit.tolerances import Tolerances
 from mracad.model.brep import Face
 from mracad.model.cells import quadrature
 from mracad.model.region import supported
+from mracad.seam.border import Border
 from mracad.seam.conditions import SAME, doubled, matched
 from mracad.seam.conditions import rows as seam_rows
 from mracad.seam.contact import Contact
 from mracad.seam.contact import rows as contact_rows
 from mracad.seam.energy import forms
+from mracad.seam.natural import Seam
 from mracad.seam.solve import Problem, Space
+from mracad.seam.trace import Trace, along, crossings
+from mracad.seam.trimmed import TrimmedSeam
 
 Array = np.ndarray
 Stretch = tuple[float, float]

@@ -15,9 +15,6 @@ import numpy as np
 from mracad.bspline.fit import Knots, divided, middles, missing, offsets_over, spans, through
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net, pairs
-from mracad.constraint.frozen import separate
-from mracad.constraint.seam import seams
-from mracad.constraint.wishes import Wishes
 from mracad.edit.feature.detail import taper
 from mracad.edit.feature.fit import MISSED, NARROWEST
 from mracad.edit.feature.ideal import Way
@@ -27,6 +24,9 @@ from mracad.edit.feature.score import Copy, Figures, copied
 from mracad.errors import EditError
 from mracad.model.brep import Model
 from mracad.model.displacement import Offset, lifted
+from mracad.seam.hold import separate
+from mracad.seam.natural import seams
+from mracad.seam.wishes import Wishes
 from mracad.spec.steps import Transfer
 from mracad.wavelet.ladder import arc_lengths
 from mracad.wavelet.project import band as band_of

@@ -6,15 +6,15 @@ from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
 
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
-from mracad.constraint.border import Border
-from mracad.constraint.joint import Joint
-from mracad.constraint.seam import Seam
 from mracad.edit.feature.detail import save
 from mracad.edit.feature.edits import repeat
 from mracad.edit.feature.extract import feature_of
 from mracad.edit.feature.seams import crossing
 from mracad.errors import EditError
 from mracad.occ.view import view
+from mracad.seam.border import Border
+from mracad.seam.joint import Joint
+from mracad.seam.natural import Seam
 from mracad.spec.steps import Repeat, Single
 from tests import zoo
 from tests.edit import panels

@@ -5,8 +5,6 @@ import io
 import numpy as np
 import pytest
 
-from mracad.constraint.cause import Cause, Still
-from mracad.constraint.wishes import Wishes
 from mracad.edit.feature.detail import save
 from mracad.edit.feature.edits import move, repeat
 from mracad.edit.feature.extract import feature_of
@@ -16,7 +14,9 @@ from mracad.job.document import run
 from mracad.model.displacement import Displacement, Offset
 from mracad.occ.step import read_step, write_step
 from mracad.occ.view import view
+from mracad.seam.cause import Cause, Still
 from mracad.seam.interface import joints
+from mracad.seam.wishes import Wishes
 from mracad.spec.steps import Move, Repeat, Single
 from tests.edit import halves
 from tests.edit.feature import grounds

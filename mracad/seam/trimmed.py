@@ -18,12 +18,12 @@ import numpy as np
 
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import curvature
-from mracad.constraint.cause import Cause, Still
-from mracad.constraint.seam import Seam, runs_back
-from mracad.constraint.sides import across, between
-from mracad.constraint.trace import EVENLY, LOOKS, NEAR, Trace, along, crossings, trace_of
-from mracad.constraint.wishes import Wishes
 from mracad.model.brep import Edge, Face, Model, Trim
+from mracad.seam.cause import Cause, Still
+from mracad.seam.natural import Seam, runs_back
+from mracad.seam.sides import across, between
+from mracad.seam.trace import EVENLY, LOOKS, NEAR, Trace, along, crossings, trace_of
+from mracad.seam.wishes import Wishes
 
 Array = np.ndarray
 

@@ -10,15 +10,15 @@ from OCP.gp import gp_Trsf, gp_Vec
 from OCP.TopLoc import TopLoc_Location
 
 from mracad.bspline.surface import Net
-from mracad.constraint.cause import Cause, Still
-from mracad.constraint.coincide import TORN, coinciding, touching
 from mracad.edit.smooth import smooth
 from mracad.inspect.seams import seams
 from mracad.job.document import run
+from mracad.model.adjacency import TORN, coinciding, touching
 from mracad.occ.document import Document, empty
 from mracad.occ.files import read, write
 from mracad.occ.load import Text
 from mracad.occ.view import view
+from mracad.seam.cause import Cause, Still
 from mracad.spec.steps import Smooth
 from tests.edit import panels
 from tests.occ import shapes

@@ -11,12 +11,12 @@ from mracad.bspline.curve import Curve
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.knots import Side as Limit
 from mracad.bspline.surface import Net
-from mracad.constraint.border import Border
-from mracad.constraint.frozen import local_span
-from mracad.constraint.sides import from_inside
 from mracad.model.brep import Face, Model, Trim
 from mracad.model.region import meeting
 from mracad.model.sampling import shares
+from mracad.seam.border import Border
+from mracad.seam.hold import local_span
+from mracad.seam.sides import from_inside
 
 Array = np.ndarray
 

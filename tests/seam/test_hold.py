@@ -5,9 +5,9 @@ import pytest
 
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
-from mracad.constraint.frozen import CONTINUITY, frozen_along, jet_support, separate
 from mracad.model.brep import Face, Trim
 from mracad.model.region import face_region
+from mracad.seam.hold import CONTINUITY, frozen_along, jet_support, separate
 from tests.model.test_region import circle, segment, square
 
 TRIMS = {

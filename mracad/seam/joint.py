@@ -16,11 +16,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mracad.constraint.border import SHARES, Border, Jet, outward
-from mracad.constraint.cause import Cause, Still
-from mracad.constraint.sides import between
-from mracad.constraint.wishes import Wishes
 from mracad.model.brep import Model
+from mracad.seam.border import SHARES, Border, Jet, outward
+from mracad.seam.cause import Cause, Still
+from mracad.seam.sides import between
+from mracad.seam.wishes import Wishes
 
 Array = np.ndarray
 

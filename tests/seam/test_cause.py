@@ -6,8 +6,8 @@ import pytest
 from mracad_cli.render.json import treatment
 from mracad_cli.render.text import edge_words
 
-from mracad.constraint.cause import Cause, Still
-from mracad.constraint.seam import Treatment
+from mracad.seam.cause import Cause, Still
+from mracad.seam.natural import Treatment
 
 
 @pytest.mark.parametrize("still", Still)

@@ -9,8 +9,8 @@ import numpy as np
 
 from mracad.bspline.knots import Side as Limit
 from mracad.bspline.surface import Net, cross, curvature
-from mracad.constraint.frozen import ISO, local_span
 from mracad.model.brep import Edge, Face, Model, Side
+from mracad.seam.hold import ISO, local_span
 
 Array = np.ndarray
 

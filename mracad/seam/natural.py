@@ -7,14 +7,14 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from mracad.constraint.border import SHARES, Border, border, jets, opened
-from mracad.constraint.cause import Cause, Still
-from mracad.constraint.coincide import apart, coinciding, length, reach, touching
-from mracad.constraint.frozen import CONTINUITY, ISO
-from mracad.constraint.joint import Joint, joint_of
-from mracad.constraint.sides import across, between, views
-from mracad.constraint.wishes import Wishes
+from mracad.model.adjacency import apart, coinciding, length, reach, touching
 from mracad.model.brep import Edge, Model, Side
+from mracad.seam.border import SHARES, Border, border, jets, opened
+from mracad.seam.cause import Cause, Still
+from mracad.seam.hold import CONTINUITY, ISO
+from mracad.seam.joint import Joint, joint_of
+from mracad.seam.sides import across, between, views
+from mracad.seam.wishes import Wishes
 
 Array = np.ndarray
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mracad.constraint.frozen import CONTINUITY
+from mracad.seam.hold import CONTINUITY
 
 Array = np.ndarray
 

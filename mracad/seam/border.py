@@ -8,10 +8,10 @@ import numpy as np
 
 from mracad.bspline.knots import Side as Limit
 from mracad.bspline.surface import cross
-from mracad.constraint.frozen import ISO, local_span
-from mracad.constraint.sides import between, inner_side
 from mracad.model.brep import Edge, Model, Side
 from mracad.model.sampling import shares
+from mracad.seam.hold import ISO, local_span
+from mracad.seam.sides import between, inner_side
 
 Array = np.ndarray
 Jet = tuple[Array, ...]
