@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from mracad.inspect.faults import Fault, ReadBack, Reason
+from mracad.inspect.faults import Fault, FaultKind, ReadBack
 from mracad.inspect.seams import SeamMeasure, seams
 from mracad.model.facts import Facts, Line
 
@@ -34,8 +34,7 @@ SAME = 1e-5
 PLACED = 1e-6
 """The same for the box, as a share of the diagonal."""
 
-
-CONTENT = frozenset({Reason.UNREAD, Reason.LOST, Reason.AREA, Reason.VOLUME, Reason.BOX})
+CONTENT = frozenset({FaultKind.UNREAD, FaultKind.LOST, FaultKind.AREA, FaultKind.VOLUME, FaultKind.BOX})
 """What is not forgiven though the kernel's own copy has it, too."""
 
 _LAID = 1e-8  # mm: an edge of which no point lies farther off is the same
@@ -43,23 +42,26 @@ _TURNED = 2e-5  # radians: nor has a face turned there that turned by less
 _NEAR = 0.1  # share of the diagonal: faces that are farther apart are not the same
 
 _COUNTS = {
-    Reason.SOLIDS: "solids", Reason.SHELLS: "shells", Reason.FACES: "faces", Reason.FREE_EDGES: "free_edges",
-}  # fmt: skip
+    FaultKind.SOLIDS: "solids",
+    FaultKind.SHELLS: "shells",
+    FaultKind.FACES: "faces",
+    FaultKind.FREE_EDGES: "free_edges",
+}
 
 
 def meshed(open_faces: Collection[int], before: Collection[int]) -> ReadBack:
     """The verdict on a mesh that leaves faces of closed bodies open, those that it did ``before`` forgiven."""
     fresh = tuple(sorted(set(open_faces) - set(before)))
     known = tuple(sorted(set(open_faces) & set(before)))
-    faults, forgiven = ((Fault(Reason.OPEN, faces),) if faces else () for faces in (fresh, known))
+    faults, forgiven = ((Fault(FaultKind.OPEN, faces),) if faces else () for faces in (fresh, known))
     return ReadBack(not open_faces, faults, forgiven)
 
 
 def read_back(file: Facts, faults: tuple[Fault, ...], forgiven: tuple[Fault, ...] = ()) -> ReadBack:
     """The figures of a file and the verdict on it."""
-    measured = [f for f in (*faults, *forgiven) if f.reason in (Reason.GAP, Reason.ANGLE)]
+    measured = [f for f in (*faults, *forgiven) if f.reason in (FaultKind.GAP, FaultKind.ANGLE)]
     hull = _hull(file.spots).tolist()
-    volume = next(((fault.was, fault.value) for fault in faults if fault.reason is Reason.VOLUME), None)
+    volume = next(((fault.was, fault.value) for fault in faults if fault.reason is FaultKind.VOLUME), None)
     return ReadBack(
         valid=file.probe.validity().valid and not faults,
         counts=file.counts,
@@ -67,8 +69,8 @@ def read_back(file: Facts, faults: tuple[Fault, ...], forgiven: tuple[Fault, ...
         volume=volume,
         tolerance=file.tolerance,
         seams=len({f.faces for f in measured}),
-        gap=max((f.value for f in measured if f.reason is Reason.GAP), default=0.0),
-        angle=max((f.value for f in measured if f.reason is Reason.ANGLE), default=0.0),
+        gap=max((f.value for f in measured if f.reason is FaultKind.GAP), default=0.0),
+        angle=max((f.value for f in measured if f.reason is FaultKind.ANGLE), default=0.0),
         faults=faults,
         forgiven=forgiven,
     )
@@ -165,11 +167,15 @@ def _beside(base: _File, file: _File, slack: Slack, pairs: Collection[tuple[int,
     """Where a file is worse than ``base``, its seams between some pairs of faces."""
     if file.failures:
         for (_, status, face), count in (file.failures - base.failures).items():
-            yield Fault(Reason.INVALID, () if face is None else (face,), count, 0, status)
+            yield Fault(FaultKind.INVALID, () if face is None else (face,), count, 0, status)
     more = sum(parts - 1 for parts in slack.parts.values())
     for reason, name in _COUNTS.items():
         value, was = getattr(file.facts.counts, name), getattr(base.facts.counts, name)
-        if value > was if reason is Reason.FREE_EDGES else not was <= value <= was + more * (reason is Reason.FACES):
+        if (
+            value > was
+            if reason is FaultKind.FREE_EDGES
+            else not was <= value <= was + more * (reason is FaultKind.FACES)
+        ):
             yield Fault(reason, (), value, was)
     yield from _tolerances(base, file, slack)
     yield from _seams(base, file, slack, pairs)
@@ -220,7 +226,7 @@ def _bodies(memory: _File, file: _File) -> Iterator[Fault]:
     changed = {face for pair in _changed(memory, file, lambda edge: max(edge.tolerance, SLACK)) for face in pair}
     before, after = memory.areas(), file.areas()
     lost = [face for face in range(old.count) if face not in after]
-    yield from (Fault(Reason.LOST, (face,), 0.0, old.probe.area(face, False)) for face in lost)
+    yield from (Fault(FaultKind.LOST, (face,), 0.0, old.probe.area(face, False)) for face in lost)
     borders = _borders(old)
     others = []
     for face in sorted((old.closing | changed) & after.keys()):
@@ -231,18 +237,18 @@ def _bodies(memory: _File, file: _File) -> Iterator[Fault]:
             if abs(value - was) <= allowed + SAME * was:
                 break
         else:
-            others.append(Fault(Reason.AREA, (face,), value, was))
+            others.append(Fault(FaultKind.AREA, (face,), value, was))
     yield from others
     solids = old.counts.solids and new.counts.solids
     if solids and (lost or old.counts.solids != new.counts.solids):  # exact volumes take long, and say nothing more
         value, was = new.probe.volume(), old.probe.volume()
         if abs(value - was) > SAME * abs(was):
-            yield Fault(Reason.VOLUME, tuple(lost), value, was)
+            yield Fault(FaultKind.VOLUME, tuple(lost), value, was)
     room = PLACED * old.diagonal + 2 * old.tolerance
     if np.abs(_hull(old.spots) - _hull(new.spots)).max() > room:
         far = float(np.abs(old.probe.box() - new.probe.box()).max())
         if far > room:
-            yield Fault(Reason.BOX, (), far, 0.0)
+            yield Fault(FaultKind.BOX, (), far, 0.0)
 
 
 def _borders(facts: Facts) -> Array:
@@ -270,7 +276,7 @@ def _tolerances(base: _File, file: _File, slack: Slack) -> Iterator[Fault]:
         found[own] = max(found[own], value)
     for faces, value in found.items():
         if value > limit + SLACK:
-            yield Fault(Reason.TOLERANCE, tuple(face for face in faces if face >= 0), value, limit)
+            yield Fault(FaultKind.TOLERANCE, tuple(face for face in faces if face >= 0), value, limit)
 
 
 def _seams(base: _File, file: _File, slack: Slack, pairs: Collection[tuple[int, ...]]) -> Iterator[Fault]:
@@ -281,15 +287,15 @@ def _seams(base: _File, file: _File, slack: Slack, pairs: Collection[tuple[int, 
             continue
         found = new.get(pair, [])
         if not found:
-            yield Fault(Reason.SEAM, pair, 0, len(before))
+            yield Fault(FaultKind.SEAM, pair, 0, len(before))
             continue
         room = MOVED if pair in slack.moved else SLACK
         gap, was = _worst(found, before, "gap", room)
         if gap > max(was + room, slack.gaps.get(pair, 0.0)):
-            yield Fault(Reason.GAP, pair, gap, was)
+            yield Fault(FaultKind.GAP, pair, gap, was)
         angle, was = _worst(found, [m for m in before if m.smooth], "angle", STEEPER)
         if angle > was + STEEPER:
-            yield Fault(Reason.ANGLE, pair, angle, was)
+            yield Fault(FaultKind.ANGLE, pair, angle, was)
 
 
 def _worst(found: list[SeamMeasure], before: list[SeamMeasure], what: str, room: float) -> tuple[float, float]:

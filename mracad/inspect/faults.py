@@ -12,7 +12,7 @@ from mracad.model.facts import Counts
 Array = np.ndarray
 
 
-class Reason(StrEnum):
+class FaultKind(StrEnum):
     """What is worse in a file."""
 
     UNREAD = "not read back"
@@ -38,7 +38,7 @@ class Fault:
 
     Attributes
     ----------
-    reason : Reason
+    reason : FaultKind
     faces : tuple of int
         Indices in the document of the faces that it concerns; empty where it cannot be told.
     value, was : float
@@ -47,14 +47,14 @@ class Fault:
         What the kernel calls it, for ``INVALID``; what the reader says, for ``UNREAD``.
     """
 
-    reason: Reason
+    reason: FaultKind
     faces: tuple[int, ...] = ()
     value: float = 0.0
     was: float = 0.0
     status: str = ""
 
     @property
-    def key(self) -> tuple[Reason, tuple[int, ...], str]:
+    def key(self) -> tuple[FaultKind, tuple[int, ...], str]:
         """What identifies it in another file."""
         return self.reason, self.faces, self.status
 

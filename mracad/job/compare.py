@@ -35,9 +35,9 @@ def compare(document: Document, options: Compare, original: Original | None = No
     else:
         raise UsageError("compare has nothing to compare with", "name a reference")
 
-    def limits(size: float) -> audit.Limits:
+    def limits(size: float) -> audit.CompareLimits:
         growth, volume = options.max_gap_growth, options.max_volume_change
-        return audit.Limits(
+        return audit.CompareLimits(
             deviation=length(options.max_deviation, size, "max-deviation"),
             gap_growth=None if growth is None else length(growth, size, "max-gap-growth"),
             angle_growth=options.max_angle_growth,
@@ -49,7 +49,10 @@ def compare(document: Document, options: Compare, original: Original | None = No
 
 
 def compared(
-    ref: Document, new: Document, limits: Callable[[float], audit.Limits] | None = None, ignore: Iterable[str] = ()
+    ref: Document,
+    new: Document,
+    limits: Callable[[float], audit.CompareLimits] | None = None,
+    ignore: Iterable[str] = (),
 ) -> Verdict:
     """Judge a new version of a document by a reference.
 
@@ -64,7 +67,7 @@ def compared(
     """
     place = "assembly" in unheld(ref.schema, new.schema)
     old, fresh = (_measured(document, place) for document in (ref, new))
-    return audit.compare(old, fresh, limits(old.model.diagonal) if limits else audit.Limits(1e-6), ignore)
+    return audit.compare(old, fresh, limits(old.model.diagonal) if limits else audit.CompareLimits(1e-6), ignore)
 
 
 def _measured(document: Document, place: bool) -> audit.Subject:

@@ -14,7 +14,7 @@ from mracad.errors import EditError, FileError
 from mracad.formats import FORMATS, by_content
 from mracad.inspect import accept
 from mracad.inspect.accept import Slack
-from mracad.inspect.faults import Fault, ReadBack, Reason
+from mracad.inspect.faults import Fault, FaultKind, ReadBack
 from mracad.job.document import Progress, Report, Spoilt, play
 from mracad.job.judge import Judged, Original
 from mracad.job.words import of_fault
@@ -289,13 +289,13 @@ def _judged(made: Made, memory: _Memory, copies: _Copies) -> Made:
         if not _unreadable(error):
             raise
         only = (0,) if known.count == 1 else ()
-        found = ReadBack(False, (Fault(Reason.UNREAD, only, status=getattr(error, "message", str(error))),))
+        found = ReadBack(False, (Fault(FaultKind.UNREAD, only, status=getattr(error, "message", str(error))),))
     return replace(made, read_back=found)
 
 
 def _refused(name: str, faults: Sequence[tuple[Target, Fault]]) -> EditError:
     """The error that names what would be worse, the worst kind first."""
-    target, fault = min(faults, key=lambda each: list(Reason).index(each[1].reason))
+    target, fault = min(faults, key=lambda each: list(FaultKind).index(each[1].reason))
     more = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
     return EditError(
         f"{name}: the {target.format.upper()} file would be worse: {of_fault(fault)}{more}",

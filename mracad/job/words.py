@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
-from mracad.inspect.faults import Fault, Reason
+from mracad.inspect.faults import Fault, FaultKind
 from mracad.inspect.mended import Mending
 from mracad.inspect.verdict import Finding
 
@@ -136,28 +136,28 @@ def _of_product(finding: Finding) -> str:
 def of_fault(fault: Fault) -> str:
     """What is worse in a file, in one line."""
     where = _faces(fault.faces[:2]) + (" …" if len(fault.faces) > 2 else "")
-    where = where or ("it" if fault.reason is Reason.UNREAD else "somewhere")
+    where = where or ("it" if fault.reason is FaultKind.UNREAD else "somewhere")
     change = 100 * abs(fault.value - fault.was) / abs(fault.was) if fault.was else 0.0
     share = f"{change:.3g} %" if fault.was else f"{fault.value:.3g}"
     return _FAULTS[fault.reason].format(f=fault, where=where, share=share)
 
 
 _FAULTS = {
-    Reason.UNREAD: "{where} cannot be read back: {f.status}",
-    Reason.INVALID: "{f.status} in {where}",
-    Reason.SOLIDS: "{f.value:.0f} solids (were {f.was:.0f})",
-    Reason.SHELLS: "{f.value:.0f} shells (were {f.was:.0f})",
-    Reason.FACES: "{f.value:.0f} faces (were {f.was:.0f})",
-    Reason.FREE_EDGES: "{f.value:.0f} free edges (were {f.was:.0f})",
-    Reason.LOST: "{where} is lost",
-    Reason.AREA: "the area of {where} changes by {share}",
-    Reason.VOLUME: "the volume changes by {share}",
-    Reason.BOX: "the box changes by {f.value:.3g} mm",
-    Reason.TOLERANCE: "a tolerance of {f.value:.3g} mm at {where} (largest {f.was:.3g} mm)",
-    Reason.SEAM: "no seam between {where}",
-    Reason.GAP: "a gap of {f.value:.3g} mm between {where} (was {f.was:.3g} mm)",
-    Reason.ANGLE: "an angle of {f.value:.2g}° between {where} (was {f.was:.2g}°)",
-    Reason.OPEN: "the mesh is open at {where}",
+    FaultKind.UNREAD: "{where} cannot be read back: {f.status}",
+    FaultKind.INVALID: "{f.status} in {where}",
+    FaultKind.SOLIDS: "{f.value:.0f} solids (were {f.was:.0f})",
+    FaultKind.SHELLS: "{f.value:.0f} shells (were {f.was:.0f})",
+    FaultKind.FACES: "{f.value:.0f} faces (were {f.was:.0f})",
+    FaultKind.FREE_EDGES: "{f.value:.0f} free edges (were {f.was:.0f})",
+    FaultKind.LOST: "{where} is lost",
+    FaultKind.AREA: "the area of {where} changes by {share}",
+    FaultKind.VOLUME: "the volume changes by {share}",
+    FaultKind.BOX: "the box changes by {f.value:.3g} mm",
+    FaultKind.TOLERANCE: "a tolerance of {f.value:.3g} mm at {where} (largest {f.was:.3g} mm)",
+    FaultKind.SEAM: "no seam between {where}",
+    FaultKind.GAP: "a gap of {f.value:.3g} mm between {where} (was {f.was:.3g} mm)",
+    FaultKind.ANGLE: "an angle of {f.value:.2g}° between {where} (was {f.was:.2g}°)",
+    FaultKind.OPEN: "the mesh is open at {where}",
 }
 
 

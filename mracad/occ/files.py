@@ -15,7 +15,7 @@ from mracad.occ.document import Document, named_labels, nested_colours
 from mracad.occ.labels import label_name
 from mracad.occ.literals import known
 from mracad.occ.load import load
-from mracad.occ.writable import Cut
+from mracad.occ.writable import CutFace
 from mracad.output import put
 
 
@@ -53,14 +53,14 @@ class Written:
     ----------
     lost : tuple of Lost
         What it lacks.
-    cut : tuple of Cut
+    cut : tuple of CutFace
         The faces that it holds on NURBS or in several parts, because a reader would mistake them as they are.
     open : tuple of int
         The faces of closed bodies that a mesh leaves open.
     """
 
     lost: tuple[Lost, ...] = ()
-    cut: tuple[Cut, ...] = ()
+    cut: tuple[CutFace, ...] = ()
     open: tuple[int, ...] = ()
 
 
@@ -107,7 +107,7 @@ def read(source: str | os.PathLike | BinaryIO, input_unit: str | None = None, en
 
 
 @dataclass(frozen=True)
-class Writing:
+class FileOptions:
     """How a document is written.
 
     Attributes
@@ -139,7 +139,7 @@ def write(document: Document, target: str | os.PathLike | BinaryIO, format: str 
     format : str
         A key of ``mracad.formats.FORMATS``; by default what the ending of the path means, STEP for a stream.
     **how
-        The fields of :class:`Writing`.
+        The fields of :class:`FileOptions`.
 
     Returns
     -------
@@ -158,7 +158,7 @@ def write(document: Document, target: str | os.PathLike | BinaryIO, format: str 
     UsageError
         For an unknown format or schema, or settings that make no sense.
     """
-    wanted, name = Writing(**how), document.name
+    wanted, name = FileOptions(**how), document.name
     if isinstance(target, str | os.PathLike):
         format, name = format or by_ending(target).name, Path(target).name
     format = format or "step"
@@ -176,7 +176,7 @@ def write(document: Document, target: str | os.PathLike | BinaryIO, format: str 
     return written
 
 
-def _step(document: Document, name: str, format: str, how: Writing) -> tuple[bytes, Written]:
+def _step(document: Document, name: str, format: str, how: FileOptions) -> tuple[bytes, Written]:
     from mracad.occ.step import step
 
     with _expressing(document.name, format):
@@ -184,7 +184,7 @@ def _step(document: Document, name: str, format: str, how: Writing) -> tuple[byt
     return data, Written(_opaque(document), cut)
 
 
-def _iges(document: Document, name: str, format: str, how: Writing) -> tuple[bytes, Written]:
+def _iges(document: Document, name: str, format: str, how: FileOptions) -> tuple[bytes, Written]:
     from mracad.occ.iges import iges
 
     with _expressing(document.name, format):
@@ -192,13 +192,13 @@ def _iges(document: Document, name: str, format: str, how: Writing) -> tuple[byt
     return data, Written(_unwritten(document), cut)
 
 
-def _brep(document: Document, name: str, format: str, how: Writing) -> tuple[bytes, Written]:
+def _brep(document: Document, name: str, format: str, how: FileOptions) -> tuple[bytes, Written]:
     from mracad.occ.brep import brep
 
     return brep(document, binary=format == "binbrep"), Written()
 
 
-def _mesh(document: Document, name: str, format: str, how: Writing) -> tuple[bytes, Written]:
+def _mesh(document: Document, name: str, format: str, how: FileOptions) -> tuple[bytes, Written]:
     from mracad.mesh import write as write_mesh
     from mracad.occ.scene import scene
 

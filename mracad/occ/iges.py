@@ -25,7 +25,7 @@ from mracad.occ.labels import label_name, name_label
 from mracad.occ.load import load
 from mracad.occ.settings import all_digits, exchange, moment, quiet
 from mracad.occ.units import UNITS, Units, named
-from mracad.occ.writable import Cut, writable
+from mracad.occ.writable import CutFace, writable
 from mracad.version import __version__
 
 _FLAGS = {1: "in", 2: "mm", 4: "ft", 5: "mi", 6: "m", 7: "km", 8: "mil", 9: "um", 10: "cm", 11: "uin"}
@@ -72,7 +72,7 @@ def _put_names(document: Document, names: dict[str, str]) -> None:
             name_label(label, names[mark])
 
 
-def iges(document: Document, name: str, options_text: str = "") -> tuple[bytes, tuple[Cut, ...]]:
+def iges(document: Document, name: str, options_text: str = "") -> tuple[bytes, tuple[CutFace, ...]]:
     """A document as IGES 5.3 in its own unit, solids as such; and the faces that it holds in parts.
 
     Parameters

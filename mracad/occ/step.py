@@ -26,7 +26,7 @@ from mracad.occ.properties import restated
 from mracad.occ.settings import all_digits, exchange, moment, quiet
 from mracad.occ.titles import marked, marking, put_names
 from mracad.occ.units import UNITS, of_file
-from mracad.occ.writable import Cut, writable
+from mracad.occ.writable import CutFace, writable
 from mracad.output import put
 from mracad.version import __version__
 
@@ -103,7 +103,7 @@ def write_step(
     put(step(document, name, schema, options_text)[0], target)
 
 
-def step(document: Document, name: str, schema: str = "", options_text: str = "") -> tuple[bytes, tuple[Cut, ...]]:
+def step(document: Document, name: str, schema: str = "", options_text: str = "") -> tuple[bytes, tuple[CutFace, ...]]:
     """The whole STEP file, and the faces that it holds in parts.
 
     ``name`` is that in its header, the rest is as for :func:`write_step`.

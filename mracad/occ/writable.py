@@ -64,7 +64,7 @@ _PRECISION = 1e-7
 
 
 @dataclass(frozen=True)
-class Cut:
+class CutFace:
     """A face that a file holds in another way.
 
     Attributes
@@ -83,7 +83,7 @@ class Cut:
 
 
 @contextmanager
-def writable(document: Document, copier: Copier) -> Iterator[tuple[Cut, ...]]:
+def writable(document: Document, copier: Copier) -> Iterator[tuple[CutFace, ...]]:
     """Let a document hold, inside the block, only faces that a format can express.
 
     Parameters
@@ -95,7 +95,7 @@ def writable(document: Document, copier: Copier) -> Iterator[tuple[Cut, ...]]:
 
     Yields
     ------
-    tuple of Cut
+    tuple of CutFace
         The faces that are on NURBS or in several parts, which have their name, colour and layers.
 
     Raises
@@ -171,7 +171,7 @@ def _tolerance(shape: TopoDS_Shape) -> float:
     return ShapeAnalysis_ShapeTolerance().Tolerance(shape, 1, TopAbs_EDGE)
 
 
-def _rewrite(document: Document, part: Part, faces: Sequence[int], copier: Copier) -> Iterator[Cut]:
+def _rewrite(document: Document, part: Part, faces: Sequence[int], copier: Copier) -> Iterator[CutFace]:
     """Put a part with some faces on NURBS or in parts in its own place in the document."""
     twins = BRepBuilderAPI_Copy(part.shape, False, False)
     context = ShapeBuild_ReShape()
@@ -181,7 +181,7 @@ def _rewrite(document: Document, part: Part, faces: Sequence[int], copier: Copie
             if not _alike(twin, copier(twin), _OTHER):
                 raise _mistaken(document, index)
             continue
-        yield Cut(index, len(_faces(context.Apply(twin))))
+        yield CutFace(index, len(_faces(context.Apply(twin))))
     whole = context.Apply(twins.Shape())
     if BRepCheck_Analyzer(part.shape).IsValid() and not BRepCheck_Analyzer(whole).IsValid():
         raise _mistaken(document, faces[0])

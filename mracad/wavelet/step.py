@@ -21,7 +21,7 @@ EXACT = 1e-13
 """What rounding may lose, of the whole signal."""
 
 
-class Step:
+class TwoScale:
     """One analysis and synthesis step between two nested spaces: ``c = P c' + Q d``.  Get it from :func:`step`.
 
     Attributes
@@ -105,7 +105,7 @@ class Step:
 class Chain:
     """Several steps in a row, presented as one: ``details`` of the steps follow each other, the finest first."""
 
-    def __init__(self, steps: Sequence[Step]) -> None:
+    def __init__(self, steps: Sequence[TwoScale]) -> None:
         self.steps = tuple(steps)
         self.fine, self.coarse = self.steps[0].fine, self.steps[-1].coarse
 
@@ -133,14 +133,14 @@ class Chain:
 
 
 @kept(128)
-def step(coarse: KnotVector, fine: KnotVector) -> Step | Chain:
+def step(coarse: KnotVector, fine: KnotVector) -> TwoScale | Chain:
     """The step between two nested spaces, factored once.
 
     Where neighbouring knots are to go, or several copies of one, the step is a chain of steps that each remove
     alternate ones: a single step would be badly conditioned.
     """
     between = _between(coarse, fine)
-    return Chain([Step(b, a) for a, b in pairwise(between)]) if len(between) > 2 else Step(coarse, fine)
+    return Chain([TwoScale(b, a) for a, b in pairwise(between)]) if len(between) > 2 else TwoScale(coarse, fine)
 
 
 def _between(coarse: KnotVector, fine: KnotVector) -> list[KnotVector]:

@@ -16,16 +16,16 @@ import numpy as np
 
 from mracad.bspline.knots import Array, KnotVector
 from mracad.errors import UsageError
-from mracad.wavelet.step import EXACT, Chain, Step, step
+from mracad.wavelet.step import EXACT, Chain, TwoScale, step
 
 
 @dataclass(frozen=True, eq=False)
-class Level:
+class LevelBands:
     """What one level adds to the next coarser surface.
 
     Attributes
     ----------
-    u, v : Step or Chain or None
+    u, v : TwoScale or Chain or None
         The steps taken; None where a direction does not change.
     bands : dict
         ``"LH"``, ``"HL"``, ``"HH"``: details (see the module).
@@ -33,12 +33,12 @@ class Level:
         What rounding left over, in poles of the finer net, where it is more than 1e-13 of the whole net.
     """
 
-    u: Step | Chain | None
-    v: Step | Chain | None
+    u: TwoScale | Chain | None
+    v: TwoScale | Chain | None
     bands: dict[str, Array]
     residual: Array | None = None
 
-    def scaled(self, gain: float) -> Level:
+    def scaled(self, gain: float) -> LevelBands:
         """The level with its details times ``gain``."""
         bands = {name: gain * band for name, band in self.bands.items()}
         return replace(self, bands=bands, residual=None if self.residual is None else gain * self.residual)
@@ -68,13 +68,13 @@ class Pyramid:
     ----------
     coarse : ndarray
         Poles of the coarsest net, centroid subtracted.
-    levels : tuple of Level
+    levels : tuple of LevelBands
         From the finest to the coarsest.
     centroid : ndarray (k,)
     """
 
     coarse: Array
-    levels: tuple[Level, ...]
+    levels: tuple[LevelBands, ...]
     centroid: Array
 
     def scaled(self, gains: Sequence[float]) -> Pyramid:
@@ -146,7 +146,9 @@ def _move(poles: Array, offset: Array) -> None:
     lines += np.tile(offset, lines.shape[1] // len(offset))
 
 
-def _analysed(c: Array, pairs: list[tuple[Step | Chain | None, Step | Chain | None]]) -> tuple[Array, list[Level]]:
+def _analysed(
+    c: Array, pairs: list[tuple[TwoScale | Chain | None, TwoScale | Chain | None]]
+) -> tuple[Array, list[LevelBands]]:
     """Coarsest poles and levels.
 
     Unless all steps are exact, what a level loses to rounding is folded in once, and the rest is kept where it still
@@ -158,7 +160,7 @@ def _analysed(c: Array, pairs: list[tuple[Step | Chain | None, Step | Chain | No
     nets, levels = [], []
     for u, v in pairs:
         coarse, bands = _bands(c, u, v, overwrite=exact)
-        level = Level(u, v, bands)
+        level = LevelBands(u, v, bands)
         if not exact:
             nets.append(c)
             more, extra = _bands(c - level.synthesise(coarse), u, v)
@@ -177,7 +179,7 @@ def _analysed(c: Array, pairs: list[tuple[Step | Chain | None, Step | Chain | No
 
 
 def _bands(
-    c: Array, u: Step | Chain | None, v: Step | Chain | None, overwrite: bool = False
+    c: Array, u: TwoScale | Chain | None, v: TwoScale | Chain | None, overwrite: bool = False
 ) -> tuple[Array, dict[str, Array]]:
     """Coarse poles and bands of one level."""
     bands = {}

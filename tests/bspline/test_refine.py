@@ -3,12 +3,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mracad.bspline import rows as rows_module
 from mracad.bspline.curve import Curve
 from mracad.bspline.gram import gram
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.refine import refinement
-from mracad.bspline.rows import Rows
+from mracad.bspline.rows import LARGE, Rows
 from mracad.bspline.solve import BandSolver, folded
 from mracad.errors import MracadError, UsageError
 from tests.bspline.spaces import KINDS, knot_vectors, random_knots
@@ -94,21 +93,20 @@ def test_banded_products_are_those_of_the_dense_matrix(kv, seed):
     np.testing.assert_allclose(g.dot(p).toarray(), g.toarray() @ dense, atol=1e-14)
 
 
-def test_compiled_sweeps_agree(monkeypatch):
+def test_large_arrays_are_what_small_ones_are():
+    """They are swept by compiled code."""
     kv = random_knots(3, "clamped", 30, 0)
     fine = kv.refined(np.linspace(0.05, 4, 21))
     p = refinement(kv, fine)
     rng = np.random.default_rng(0)
-    for shape in ((kv.count, 5, 3), (kv.count,), (kv.count, 200)):
-        for axis in (0, -len(shape)):
+    for axis in (0, 1, -1):
+        for count, product in ((kv.count, p.apply), (fine.count, p.apply_transposed)):
+            shape = [60, 2 * (LARGE // (60 * count) + 1)]
+            shape.insert(axis % 3, count)
             c = rng.standard_normal(shape)
-            e = rng.standard_normal((fine.count, *shape[1:]))
-            plain = p.apply(c, axis), p.apply_transposed(e, axis)
-            monkeypatch.setattr(rows_module, "LARGE", 1)
-            swept = p.apply(c, axis), p.apply_transposed(e, axis)
-            monkeypatch.undo()
-            for a, b in zip(plain, swept, strict=True):
-                np.testing.assert_allclose(a, b, atol=1e-13)
+            other = 0 if axis % 3 else 1
+            parts = [product(part, axis) for part in np.array_split(c, 20, other)]
+            np.testing.assert_allclose(product(c, axis), np.concatenate(parts, other), atol=1e-13)
 
 
 @pytest.mark.parametrize("n", [1, 2, 7, 8])
@@ -129,19 +127,17 @@ def test_solver_needs_pivots_and_says_when_there_are_none():
 
 
 @pytest.mark.parametrize("axis", [0, 1])
-def test_compiled_triangles_agree_with_pivoting(axis, monkeypatch):
-    from mracad.bspline import solve as solve_module
-
+def test_compiled_triangles_agree_with_pivoting(axis):
     rng = np.random.default_rng(4)
     n = 60
     row, column = (x.ravel() for x in np.meshgrid(np.arange(n), np.arange(n), indexing="ij"))
     near = np.abs(row - column) <= 4
     row, column = row[near], column[near]
     solver = BandSolver(row, column, rng.standard_normal(len(row)), np.arange(n), np.arange(n))
-    b = rng.standard_normal((n, 31, 2) if axis == 0 else (31, n, 2))
-    plain = solver.solve(b, axis)
-    monkeypatch.setattr(solve_module, "LARGE", 1)
-    np.testing.assert_allclose(solver.solve(b, axis), plain, rtol=1e-8, atol=1e-9)
+    many = LARGE // (2 * n) + 1
+    b = rng.standard_normal((n, many, 2) if axis == 0 else (many, n, 2))
+    parts = [solver.solve(part, axis) for part in np.array_split(b, 20, 1 - axis)]
+    np.testing.assert_allclose(solver.solve(b, axis), np.concatenate(parts, 1 - axis), rtol=1e-8, atol=1e-9)
 
 
 def test_wrong_sizes_are_refused():

@@ -10,7 +10,7 @@ from mracad.edit import driver
 from mracad.edit.result import Edit, FaceOutcome
 from mracad.edit.smooth import smooth
 from mracad.errors import Code, EditError
-from mracad.inspect.faults import Fault, ReadBack, Reason
+from mracad.inspect.faults import Fault, FaultKind, ReadBack
 from mracad.job import document as job
 from mracad.job import produce
 from mracad.model.displacement import Displacement
@@ -146,7 +146,7 @@ def test_files_are_made_again_a_bounded_number_of_times(monkeypatch):
 
     def judged(made, memory, copies):
         assert memory.edited == set(range(stub.rounds - 1, produce.ROUNDS + 4))
-        return replace(made, read_back=ReadBack(False, (Fault(Reason.AREA, (min(memory.edited),), 2.0, 1.0),)))
+        return replace(made, read_back=ReadBack(False, (Fault(FaultKind.AREA, (min(memory.edited),), 2.0, 1.0),)))
 
     monkeypatch.setattr("mracad.job.produce._judged", judged)
     monkeypatch.setattr(sys.modules["mracad.edit.smooth"], "smooth", stub)

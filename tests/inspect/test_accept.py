@@ -17,7 +17,7 @@ from OCP.TopoDS import TopoDS, TopoDS_Shape
 
 from mracad.inspect import accept
 from mracad.inspect.accept import Slack, judge
-from mracad.inspect.faults import Fault, Reason
+from mracad.inspect.faults import Fault, FaultKind
 from mracad.inspect.seams import seams
 from mracad.job.words import of_fault
 from mracad.occ import brep
@@ -78,7 +78,7 @@ def smaller(shape: cq.Shape) -> TopoDS_Shape:
     return shape.scale(0.999).wrapped
 
 
-def reasons(doctor: Doctor, **slack: object) -> set[Reason]:
+def reasons(doctor: Doctor, **slack: object) -> set[FaultKind]:
     """What is found in a doctored body, with nothing to forgive it."""
     shape = body()
     memory, file = facts(document(shape.wrapped)), facts(document(doctor(shape)))
@@ -95,24 +95,24 @@ def test_a_face_that_is_missing_is_named() -> None:
     shape = body()
     memory, file = facts(document(shape.wrapped)), facts(document(without_a_face(shape)))
     left, _ = judge(memory, file, Slack(), lambda: (memory, memory))
-    lost = [fault for fault in left if fault.reason is Reason.LOST]
+    lost = [fault for fault in left if fault.reason is FaultKind.LOST]
     assert [fault.faces for fault in lost] == [(len(shape.Faces()) - 1,)]
     assert f"#{len(shape.Faces())} is lost" in of_fault(lost[0])
-    assert {Reason.SOLIDS, Reason.FACES, Reason.FREE_EDGES} <= {fault.reason for fault in left}
+    assert {FaultKind.SOLIDS, FaultKind.FACES, FaultKind.FREE_EDGES} <= {fault.reason for fault in left}
 
 
 @pytest.mark.parametrize(
     ("doctor", "expected"),
     [
-        (twice, {Reason.SOLIDS, Reason.SHELLS, Reason.FACES, Reason.VOLUME}),
-        (poles(lambda p: p + np.array([0, 0, 0.02])), {Reason.GAP}),
-        (poles(lambda p: p + np.array([0, 0, 0.05 * p[0]])), {Reason.GAP}),
-        (loose, {Reason.TOLERANCE}),
-        (smaller, {Reason.AREA, Reason.BOX}),
+        (twice, {FaultKind.SOLIDS, FaultKind.SHELLS, FaultKind.FACES, FaultKind.VOLUME}),
+        (poles(lambda p: p + np.array([0, 0, 0.02])), {FaultKind.GAP}),
+        (poles(lambda p: p + np.array([0, 0, 0.05 * p[0]])), {FaultKind.GAP}),
+        (loose, {FaultKind.TOLERANCE}),
+        (smaller, {FaultKind.AREA, FaultKind.BOX}),
     ],
     ids=["solid added", "seam opened", "face tilted", "tolerance grown", "smaller"],
 )
-def test_what_was_doctored_is_found(doctor: Doctor, expected: set[Reason]) -> None:
+def test_what_was_doctored_is_found(doctor: Doctor, expected: set[FaultKind]) -> None:
     assert expected <= reasons(doctor)
 
 
@@ -129,34 +129,34 @@ def panels(angle: float) -> TopoDS_Shape:
 _CORNERS = [(0, 0, 0), (20, 0, 0), (20, 30, 0), (0, 30, 0)]
 
 
-@pytest.mark.parametrize(("angle", "found"), [(0.105, set()), (0.2, {Reason.ANGLE}), (5.0, {Reason.ANGLE})])
-def test_a_smooth_seam_that_bends_is_found(angle: float, found: set[Reason]) -> None:
+@pytest.mark.parametrize(("angle", "found"), [(0.105, set()), (0.2, {FaultKind.ANGLE}), (5.0, {FaultKind.ANGLE})])
+def test_a_smooth_seam_that_bends_is_found(angle: float, found: set[FaultKind]) -> None:
     """By more than a hundredth of a degree, and also where it is not smooth any more."""
     memory, file = facts(document(panels(0.1))), facts(document(panels(angle)))
     left, _ = judge(memory, file, Slack(), lambda: (memory, memory))
-    assert {fault.reason for fault in left if fault.reason is Reason.ANGLE} == found
+    assert {fault.reason for fault in left if fault.reason is FaultKind.ANGLE} == found
     assert all(fault.value == pytest.approx(angle, abs=1e-6) and fault.was == pytest.approx(0.1, abs=1e-6)
-               for fault in left if fault.reason is Reason.ANGLE)  # fmt: skip
+               for fault in left if fault.reason is FaultKind.ANGLE)  # fmt: skip
 
 
 def test_the_slack_of_seams_that_moved_is_theirs_alone() -> None:
     """A gap of 2e-5 mm is a fault, but not where the seam may gape 1e-4 mm."""
     shift = poles(lambda p: p + np.array([0, 0, 2e-5]))
-    assert Reason.GAP in reasons(shift)
+    assert FaultKind.GAP in reasons(shift)
     count = len(body().Faces())
     pairs = {(i, j) for i in range(count) for j in range(i, count)}
-    assert Reason.GAP not in reasons(shift, gaps=dict.fromkeys(pairs, 1e-4))
-    assert Reason.GAP in reasons(shift, moved=pairs)
+    assert FaultKind.GAP not in reasons(shift, gaps=dict.fromkeys(pairs, 1e-4))
+    assert FaultKind.GAP in reasons(shift, moved=pairs)
 
 
 def test_what_the_kernel_does_as_well_is_forgiven_but_no_loss() -> None:
     shape = body()
     memory, gap = facts(document(shape.wrapped)), facts(document(poles(lambda p: p + np.array([0, 0, 0.02]))(shape)))
     left, forgiven = judge(memory, gap, Slack(), lambda: (memory, gap))
-    assert left == () and Reason.GAP in {fault.reason for fault in forgiven}
+    assert left == () and FaultKind.GAP in {fault.reason for fault in forgiven}
     lost = facts(document(without_a_face(shape)))
     left, _ = judge(memory, lost, Slack(), lambda: (memory, lost))
-    assert {fault.reason for fault in left} >= {Reason.LOST}
+    assert {fault.reason for fault in left} >= {FaultKind.LOST}
 
 
 def test_faces_are_told_whatever_their_numbers() -> None:
@@ -171,21 +171,21 @@ def test_faces_are_told_whatever_their_numbers() -> None:
 
 def test_faults_are_put_down_to_edited_faces() -> None:
     memory = facts(document(body().wrapped))
-    fault = Fault(Reason.GAP, (0, 1))
+    fault = Fault(FaultKind.GAP, (0, 1))
     assert accept.spoilt([fault], {1, 2}, memory) == {1}
     far = replace(fault, faces=(0,))
     near = accept.spoilt([far], set(range(1, memory.count)), memory)
     assert near and near == {f for edge in memory.edges if 0 in edge.faces for f in edge.faces} - {0}
-    assert accept.spoilt([Fault(Reason.SOLIDS)], {3, 4}, memory) == {3, 4}
+    assert accept.spoilt([Fault(FaultKind.SOLIDS)], {3, 4}, memory) == {3, 4}
 
 
 @pytest.mark.parametrize("height", [2e-3, 1.0])
 def test_seams_that_were_never_sewn_are_judged_too(height: float) -> None:
     """A patch that lifts off its neighbour, so far that they do not look joined any more or not."""
     memory, file = (facts(document(apart(lift))) for lift in (0.0, height))
-    for copy, expected in ((memory, {Reason.GAP, Reason.SEAM}), (file, set())):
+    for copy, expected in ((memory, {FaultKind.GAP, FaultKind.SEAM}), (file, set())):
         left, _ = judge(memory, file, Slack(), lambda copy=copy: (memory, copy))
-        assert bool({fault.reason for fault in left} & {Reason.GAP, Reason.SEAM}) == bool(expected)
+        assert bool({fault.reason for fault in left} & {FaultKind.GAP, FaultKind.SEAM}) == bool(expected)
 
 
 def apart(height: float) -> TopoDS_Shape:

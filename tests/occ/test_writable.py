@@ -18,7 +18,7 @@ from mracad.occ.files import read, write
 from mracad.occ.load import Text
 from mracad.occ.measure import mass
 from mracad.occ.view import view
-from mracad.occ.writable import Cut
+from mracad.occ.writable import CutFace
 from tests import zoo
 from tests.occ import shapes
 
@@ -122,7 +122,7 @@ def test_what_is_said_of_a_face_goes_to_its_parts(schema):
     said(document, 1, "wall", Quantity_Color(1.0, 0.0, 0.0, Quantity_TOC_sRGB))
     document.__dict__.pop("parts")
     data, cut = written(document, schema=schema)
-    assert cut == (Cut(0, 2),)
+    assert cut == (CutFace(0, 2),)
     found = again(data)
     assert_same(document, found, cut)
     named = sorted((face.name, face.colour) for face in view(found).faces if face.name)
@@ -175,7 +175,7 @@ def test_a_part_that_stands_in_several_places():
     document = shapes.assembly(drilled_ball(), TopLoc_Location(turn), TopLoc_Location(move))
     data, cut = written(document)
     found = again(data)
-    assert cut == (Cut(0, 2),)
+    assert cut == (CutFace(0, 2),)
     assert [len(part.placements) for part in found.parts] == [2]
     assert_same(document, found, cut)
 

@@ -15,10 +15,10 @@ from functools import cache
 from mracad.formats import unheld
 from mracad.inspect.compare import attributes, geometry, structure
 from mracad.inspect.compare.match import match
-from mracad.inspect.compare.subject import Limits, Subject
+from mracad.inspect.compare.subject import CompareLimits, Subject
 from mracad.inspect.verdict import Layer, Verdict
 
-__all__ = ["LAYERS", "Limits", "Subject", "compare"]
+__all__ = ["LAYERS", "CompareLimits", "Subject", "compare"]
 
 LAYERS = (
     "faces", "deviation", "seams", "topology", "validity", "size", "units", "assembly", "names", "colours", "layers",
@@ -27,13 +27,13 @@ LAYERS = (
 """Names of the layers of a comparison, in order."""
 
 
-def compare(ref: Subject, new: Subject, limits: Limits, ignore: Iterable[str] = ()) -> Verdict:
+def compare(ref: Subject, new: Subject, limits: CompareLimits, ignore: Iterable[str] = ()) -> Verdict:
     """Judge a new version of a document by a reference.
 
     Parameters
     ----------
     ref, new : Subject
-    limits : Limits
+    limits : CompareLimits
     ignore : iterable of str
         Names of layers that are left out.
     """

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from mracad.inspect.compare.subject import EQUAL, Group, Subject, layer, paired
+from mracad.inspect.compare.subject import EQUAL, Match, Subject, layer, paired
 from mracad.inspect.verdict import Figure, Finding, Layer
 from mracad.model.facts import Carrier, Contents, Occurrence
 
@@ -60,7 +60,7 @@ def _placed(place: tuple[tuple[str, ...], str, int]) -> _Key:
     return ("path", spelled), ("product", "" if product == path[-1] else product)
 
 
-def names(ref: Subject, new: Subject, groups: Sequence[Group]) -> Layer:
+def names(ref: Subject, new: Subject, groups: Sequence[Match]) -> Layer:
     """Names of products and faces."""
     products = [[(("product", name),) for name in subject.contents.products] for subject in (ref, new)]
     findings = _differences("product", *products)
@@ -73,7 +73,7 @@ def names(ref: Subject, new: Subject, groups: Sequence[Group]) -> Layer:
     return layer("names", text, findings, {"products": list(new.contents.products)})
 
 
-def colours(ref: Subject, new: Subject, groups: Sequence[Group], lacks: Mapping[str, str]) -> Layer:
+def colours(ref: Subject, new: Subject, groups: Sequence[Match], lacks: Mapping[str, str]) -> Layer:
     """Colours of products, instances and faces: where a format knows of no products, what each face looks like."""
     marked = _marked("colours", ref, new, groups) if "assembly" not in lacks else []
     opaque = "transparency" in lacks
@@ -92,7 +92,7 @@ def colours(ref: Subject, new: Subject, groups: Sequence[Group], lacks: Mapping[
     return layer("colours", f"{len(new.contents.colours)}", findings, {}, notes)
 
 
-def marks(name: str, ref: Subject, new: Subject, groups: Sequence[Group]) -> Layer:
+def marks(name: str, ref: Subject, new: Subject, groups: Sequence[Match]) -> Layer:
     """Layers or materials of products, instances and faces."""
     return layer(name, f"{len(getattr(new.contents, name))}", _marked(name, ref, new, groups), {})
 
@@ -100,7 +100,7 @@ def marks(name: str, ref: Subject, new: Subject, groups: Sequence[Group]) -> Lay
 _VALUES = {"colours": ("of", "colour"), "layers": ("layer",), "materials": ("density",)}
 
 
-def _marked(name: str, ref: Subject, new: Subject, groups: Sequence[Group]) -> list[Finding]:
+def _marked(name: str, ref: Subject, new: Subject, groups: Sequence[Match]) -> list[Finding]:
     """Attributes that only one has; a face of the reference is known by its number in the new document."""
     numbers = {ref.face_numbers[i]: new.face_numbers[j] for i, j in _pairs(groups)}
     old = [_key(name, mark, numbers) for mark in getattr(ref.contents, name)]
@@ -125,7 +125,7 @@ def pmi(ref: Mapping[str, int], new: Mapping[str, int]) -> Layer:
     return layer("annotations", text, findings, {"ref": dict(ref), "new": dict(new)})
 
 
-def _pairs(groups: Sequence[Group]) -> list[tuple[int, int]]:
+def _pairs(groups: Sequence[Match]) -> list[tuple[int, int]]:
     return [pair for group in groups for pair in group.pairs()]
 
 

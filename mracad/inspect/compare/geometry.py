@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mracad.bspline.closest import distances
-from mracad.inspect.compare.subject import EQUAL, Array, Group, Limits, Point, Subject, layer, paired
+from mracad.inspect.compare.subject import EQUAL, Array, CompareLimits, Match, Point, Subject, layer, paired
 from mracad.inspect.verdict import Finding, Layer
 from mracad.model.brep import Face, Model
 from mracad.model.region import face_region, supported
@@ -68,7 +68,7 @@ Measured = list[tuple[tuple[int, int], FaceDeviation]]
 """Matched faces of the two models, and how far they lie apart."""
 
 
-def deviation(ref: Subject, new: Subject, measured: Measured, limits: Limits, exact: bool) -> Layer:
+def deviation(ref: Subject, new: Subject, measured: Measured, limits: CompareLimits, exact: bool) -> Layer:
     """How far faces deviate; unless ``exact``, outlines may differ as far as another format makes them."""
     findings, within = [], []
     for (i, j), d in measured:
@@ -101,7 +101,7 @@ def _within(found: list[FaceDeviation]) -> Finding:
     return Finding("outline-tolerance", (worst.new,), where=worst.outline.where, figures=figures)
 
 
-def deviations(ref: Subject, new: Subject, groups: Sequence[Group]) -> Measured:
+def deviations(ref: Subject, new: Subject, groups: Sequence[Match]) -> Measured:
     """How far every matched pair of faces lies apart, in the order of the reference; parts of one face together."""
     edges = _edges(ref.model), _edges(new.model)
     found = []
@@ -123,7 +123,7 @@ def unchanged(ref: Subject, measured: Measured) -> frozenset[int]:
     return frozenset(j for (_, j), _ in measured if j not in moved)
 
 
-def _apart(ref: Subject, new: Subject, group: Group) -> tuple[Spread, Spread, float | None]:
+def _apart(ref: Subject, new: Subject, group: Match) -> tuple[Spread, Spread, float | None]:
     """Distances there and back, and their bound."""
     bound = None
     if len(group.ref) == len(group.new) == 1:

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 
 import numpy as np
 
-from mracad.inspect.compare.subject import Array, Group, Subject
+from mracad.inspect.compare.subject import Array, Match, Subject
 from mracad.model.brep import Face
 
 _STRANGE = 0.3  # farther apart in place and size, as a share of the diagonal, faces are no partners
@@ -16,7 +16,7 @@ _WHOLE = 0.03  # share of its area by which a face may differ from the sum of it
 _PROBES = 5  # points that tell whether a face lies on another
 
 
-def match(ref: Subject, new: Subject, slack: float, by_product: bool) -> list[Group]:
+def match(ref: Subject, new: Subject, slack: float, by_product: bool) -> list[Match]:
     """Faces that are the same, in the order of the reference.
 
     Faces with the same number that are alike in place, size, kind and product are partners; the others find theirs
@@ -32,15 +32,15 @@ def match(ref: Subject, new: Subject, slack: float, by_product: bool) -> list[Gr
     """
     partners = _partners(ref, new, by_product)
     slack = max(slack, _ALIKE * ref.model.diagonal)
-    groups = {i: Group((i,), (j,)) for i, j in partners.items()}
+    groups = {i: Match((i,), (j,)) for i, j in partners.items()}
     cut = _parts(ref, new, partners, slack)
     joined = _parts(new, ref, {j: i for i, j in partners.items()}, slack)
     for i, parts in cut.items():
         groups = {k: group for k, group in groups.items() if group.new[0] not in parts}
-        groups[i] = Group((i,), tuple(parts))
+        groups[i] = Match((i,), tuple(parts))
     for j, parts in joined.items():
         groups = {k: group for k, group in groups.items() if k not in parts and j not in group.new}
-        groups[parts[0]] = Group(tuple(parts), (j,))
+        groups[parts[0]] = Match(tuple(parts), (j,))
     return [groups[i] for i in sorted(groups)]
 
 

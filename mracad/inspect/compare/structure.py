@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mracad.inspect.compare.subject import Array, Group, Limits, Subject, layer, paired
+from mracad.inspect.compare.subject import Array, CompareLimits, Match, Subject, layer, paired
 from mracad.inspect.seams import SMOOTH, SeamMeasure, summary
 from mracad.inspect.seams import seams as measured
 from mracad.inspect.verdict import Finding, Layer
@@ -25,7 +25,7 @@ _SAME_LENGTH = 1e-3  # relative: free edges of the same length in all are the sa
 # Faces -----------------------------------------------------------------------------------------------------------
 
 
-def faces(ref: Subject, new: Subject, groups: Sequence[Group]) -> Layer:
+def faces(ref: Subject, new: Subject, groups: Sequence[Match]) -> Layer:
     """Faces that are gone or new; those of another kind, or in other pieces, are noted."""
     known = {i for group in groups for i in group.ref}
     found = {j for group in groups for j in group.new}
@@ -76,7 +76,9 @@ def _known(value: float) -> float:
     return value if value == value else 0.0
 
 
-def seams(ref: Subject, new: Subject, groups: Sequence[Group], limits: Limits, unchanged: Collection[int]) -> Layer:
+def seams(
+    ref: Subject, new: Subject, groups: Sequence[Match], limits: CompareLimits, unchanged: Collection[int]
+) -> Layer:
     """Seams that are gone, new, wider, steeper, or no longer smooth.
 
     Between faces of the new model that are ``unchanged`` none can break: where the angle of one is another, its curves
@@ -142,7 +144,7 @@ def _finding(subject: Subject, seam: SeamMeasure, rule: str, **figures: float) -
 
 
 def _strands(
-    ref: Model, new: Model, before: list[SeamMeasure], after: list[SeamMeasure], groups: Sequence[Group], slack: float
+    ref: Model, new: Model, before: list[SeamMeasure], after: list[SeamMeasure], groups: Sequence[Match], slack: float
 ) -> list[_Strand]:
     """The seams of both documents between matched faces, together where they are the same.
 
@@ -266,7 +268,7 @@ def validity(ref: Subject, new: Subject) -> Layer:
     return layer("validity", text, findings, {"ref": was, "new": now})
 
 
-def size(ref: Mass, new: Mass, limits: Limits, unsewn: str) -> Layer:
+def size(ref: Mass, new: Mass, limits: CompareLimits, unsewn: str) -> Layer:
     """Volume, area and centre; the volume only where both have solids, if a format (``unsewn``) need not know them."""
     solids = bool(ref.volume and new.volume) or not unsewn
     change = abs(new.volume - ref.volume) / abs(ref.volume) if ref.volume else float(new.volume != 0)

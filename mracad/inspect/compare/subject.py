@@ -73,7 +73,7 @@ class Subject:
 
 
 @dataclass(frozen=True)
-class Limits:
+class CompareLimits:
     """What may differ; None for no limit.  Lengths are millimetres, angles degrees, the volume a share of itself."""
 
     deviation: float
@@ -83,7 +83,7 @@ class Limits:
 
 
 @dataclass(frozen=True)
-class Group:
+class Match:
     """Faces of the reference and those of the new document that are the same: one each, or one and its parts."""
 
     ref: tuple[int, ...]
