@@ -29,9 +29,9 @@ from mracad.job.batch.run import run  # noqa: E402
 from mracad.job.batch.settings import Limits, Settings  # noqa: E402
 from mracad.job.batch.work import warm  # noqa: E402
 from mracad.spec.recipe import load  # noqa: E402
-from tests.batch.runs import batch, environment, kills, outputs, recipe, shams  # noqa: E402
-from tests.batch.tasks import work  # noqa: E402
-from tests.batch.test_cluster import cluster  # noqa: E402
+from tests.job.batch.runs import batch, environment, kills, outputs, recipe, shams  # noqa: E402
+from tests.job.batch.tasks import work  # noqa: E402
+from tests.job.batch.test_cluster import cluster  # noqa: E402
 
 RECIPE = '[[step]]\nuse = "smooth"\nscale = "5%"\n\n[[step]]\nuse = "check"\n'
 SAMPLES = ("blade", "bottle", "panel", "trimmed")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import types
 import typing
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from typing import Annotated, Any, Literal
@@ -54,6 +54,8 @@ class Field:
     naming : Naming or None
         How it names a file.
     bounds : tuple of Meta
+    form : callable or None
+        ``form(text, name)`` reads its texts, or raises UsageError.
     """
 
     owner: str
@@ -65,6 +67,7 @@ class Field:
     quantity: Kind | None
     naming: Naming | None
     bounds: tuple[Meta, ...]
+    form: Callable[[str, str], object] | None
 
     @property
     def hint(self) -> str:
@@ -108,6 +111,8 @@ class Field:
                 self.check(member)
         elif self.quantity is LENGTH and value is not None:
             LENGTH.read(value, name, 1.0)
+        elif self.form and value is not None:
+            self.form(value, name)
         elif isinstance(value, int | float) and not self._within(value):
             span = " and ".join(map(_span, self.bounds)) or "a finite number"
             raise UsageError(f"{name}: {value:g} is not {span}", self.hint)
@@ -166,4 +171,5 @@ def _field(owner: str, field: structs.FieldInfo, hint: Any) -> Field:
         next((note for note in notes if isinstance(note, Kind)), None),
         next((note for note in notes if isinstance(note, Naming)), None),
         tuple(meta for meta in metas if (meta.gt, meta.ge, meta.le) != (None, None, None)),
+        next((note for note in notes if callable(note)), None),
     )

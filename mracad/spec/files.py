@@ -30,11 +30,5 @@ class Naming:
 File = Annotated[str, Naming()]
 """The type of a field that names a file."""
 
-FeatureText = Annotated[str, Naming(ending=".feature")]
-"""The type of a field that is a feature, or names the file of one."""
-
 CountText = Annotated[str, Naming(or_number=True)]
 """The type of a field that is a number, or names a file that holds it."""
-
-PlaceText = Annotated[str, Naming(prefix="@")]
-"""The type of a field that is a place, or names a file of places."""

@@ -17,7 +17,7 @@ Words = tuple[str, ...]
 
 COVERED_ELSEWHERE = {
     "debug": "it lets errors through",
-    "cluster": "it starts one: tests/batch/test_cluster.py",
+    "cluster": "it starts one: tests/job/batch/test_cluster.py",
 }
 
 

@@ -17,7 +17,7 @@ COPIES = [
     (("--polar", "9" * 5000 + ",z"), 2, "not right"),
     (("--grid", "200x200,1,1"), 2, "more than 10000 places"),
     (("--along", "edge#1,3000000"), 2, "more than 10000 places"),
-    (("--along", "edge#²,2"), 2, "edge#1 to"),
+    (("--along", "edge#²,2"), 2, "not right"),
 ]
 OTHERS = [
     (("smooth", "IN", "--scale", "4mm", "--faces", "#²", "--dry-run"), 2, "not a face number"),

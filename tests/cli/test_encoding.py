@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from tests.batch.runs import recipe
+from tests.job.batch.runs import recipe
 
 RIGHT, WRONG = "Geh\u00e4use", "Geh\u0434use"  # in cp1252 and in cp1251
 

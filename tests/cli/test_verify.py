@@ -18,7 +18,7 @@ import mracad as library
 from mracad.job.document import Spoilt
 from mracad.occ import step as writer
 from tests import zoo
-from tests.batch.runs import recipe
+from tests.job.batch.runs import recipe
 from tests.occ import shapes
 
 SMOOTH = "--scale", "16mm"

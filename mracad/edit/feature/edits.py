@@ -22,11 +22,12 @@ from mracad.edit.feature.locate import Place, face_number, patch_of, place, stan
 from mracad.edit.feature.pattern import places
 from mracad.edit.feature.transfer import laid_on
 from mracad.edit.result import Edit, FaceOutcome, Reason, spared
-from mracad.errors import EditError, UsageError
+from mracad.errors import EditError
 from mracad.model.brep import Face, Model
 from mracad.model.displacement import Displacement
 from mracad.seam.natural import Treatment
 from mracad.seam.wishes import Wishes
+from mracad.spec.places import is_feature, spot
 from mracad.spec.quantity import band_of, length
 from mracad.spec.select import Scope
 from mracad.spec.select import scope as scope_of
@@ -94,15 +95,13 @@ def transfer(
     ground = Ground.of(model, _movable(model, scope))
     every = {f.index for f in source.faces if f.surface is not None}
     text = options.from_
-    if text.startswith("near:") or "@" in text or text.endswith(".feature"):
+    if is_feature(text):
         feature = replace(feature_of(source, options, every, text), origin=None)
         return _edit(model, scope, _laid(ground, feature, [_target(ground, options.to, options)], options, scope, {}))
-    if options.band is None:
-        raise UsageError("band: the detail of a face needs one", "give --band 0mm:20mm")
     one = patch_of(Ground.of(source, every), face_number(source, text, "from", FACE), "from")
     two = patch_of(ground, face_number(model, options.to, "to", FACE), "to")
     width = None if options.taper is None else length(options.taper, model.diagonal, "taper")
-    return _edit(model, scope, laid_on(model, two, one, band_of(options.band, source.diagonal), options, width))
+    return _edit(model, scope, laid_on(model, two, one, band_of(options.band or "", source.diagonal), options, width))
 
 
 def _movable(model: Model, scope: Scope) -> set[int]:
@@ -110,7 +109,7 @@ def _movable(model: Model, scope: Scope) -> set[int]:
 
 
 def _target(ground: Ground, text: str, options: Copied) -> Place:
-    found = place(ground, text, "place")
+    found = place(ground, spot(text, "to"), f"place ({text})")
     return replace(found, rotate=math.radians(options.rotate), size=options.size, height=options.height)
 
 

@@ -20,6 +20,7 @@ from mracad.model.brep import Model
 from mracad.seam.hold import separate
 from mracad.seam.natural import seams
 from mracad.seam.wishes import Wishes
+from mracad.spec.places import Stored, feature
 from mracad.spec.quantity import band_of, length
 from mracad.spec.steps import Featured
 from mracad.wavelet.project import band
@@ -54,13 +55,14 @@ def feature_of(model: Model, options: Featured, faces: Collection[int], text: st
     FileError
         For a file that is none.
     """
-    if text.endswith(".feature"):
-        return load(text)
+    given = feature(text, "feature")
+    if isinstance(given, Stored):
+        return load(given.path)
     if not faces:
         raise EditError(f"{model.name}: there is no NURBS face to edit", "select faces with --faces")
     ground = Ground.of(model, faces)
     width = None if options.taper is None else length(options.taper, model.diagonal, "taper")
-    area = window(ground, text, width)
+    area = window(ground, given, text, width)
     if options.base == "surroundings":
         return above_surroundings(ground, area, options.keep)
     low, high = band_of(options.band or "", model.diagonal)

@@ -13,32 +13,9 @@ from mracad.edit.feature.ground import SIDEWAYS, Feet, Ground
 from mracad.edit.feature.patch import Patch
 from mracad.errors import EditError, FileError, UsageError
 from mracad.model.brep import Model
+from mracad.spec.places import FEATURE, MOST_PLACES, PLACE, Disc, OnFace, Point, Rectangle, numbers, whole
 
 Array = np.ndarray
-
-PLACE = "write a place as X,Y,Z in millimetres or #FACE@u,v"
-WINDOW = "write a feature as near:X,Y,Z,radius:R (mm), #FACE@u0:u1,v0:v1 or the name of a .feature file"
-
-FAR = 1e12
-"""Numbers of this size are no places and no distances, mm."""
-
-MOST_PLACES = 10_000
-"""Places that one edit takes."""
-
-_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
-
-
-def numbers(text: str, what: str, hint: str, counts: Sequence[int]) -> list[float]:
-    """Finite numbers between commas; raises UsageError."""
-    parts = [part.strip() for part in text.split(",")]
-    if len(parts) not in counts or not all(re.fullmatch(_NUMBER, part) and abs(float(part)) < FAR for part in parts):
-        raise UsageError(f"{what}: {text!r} is not right", hint)
-    return [float(part) for part in parts]
-
-
-def whole(text: str) -> int | None:
-    """A whole number written in digits; None for anything else, and for what nothing has so many of."""
-    return int(text) if re.fullmatch(r"[0-9]{1,9}", text) else None
 
 
 def face_number(model: Model, text: str, what: str, hint: str) -> int:
@@ -82,22 +59,18 @@ class Place:
     direction: Array | None = None
 
 
-def place(ground: Ground, text: str, label: str) -> Place:
-    """A place from ``X,Y,Z``, ``near:X,Y,Z`` or ``#3@u,v``; raises UsageError and EditError."""
-    label = f"{label} ({text})"
-    if "@" in text:
-        name, _, rest = text.partition("@")
-        face = face_number(ground.model, name, label, PLACE)
-        uv = np.array(numbers(rest, label, PLACE, (2,)))
-        patch = patch_of(ground, face, label)
-        if not patch.within(uv) or not patch.inside(ground.model.faces[face], uv[None])[0]:
-            raise EditError(f"{label} is off the face: {_domain(patch)}", "give parameters inside the face")
-        return Place(label, np.asarray(patch.net.evaluate(uv[None]))[0], face, uv)
-    point = np.array(numbers(text.removeprefix("near:"), label, PLACE, (3,)))
-    return Place(label, ground.brought(point[None])[0])
+def place(ground: Ground, given: Point | OnFace, label: str) -> Place:
+    """A place on the ground; raises UsageError and EditError."""
+    if isinstance(given, Point):
+        return Place(label, ground.brought(np.array([given.xyz]))[0])
+    face, uv = face_number(ground.model, given.face, label, PLACE), np.array(given.uv)
+    patch = patch_of(ground, face, label)
+    if not patch.within(uv) or not patch.inside(ground.model.faces[face], uv[None])[0]:
+        raise EditError(f"{label} is off the face: {_domain(patch)}", "give parameters inside the face")
+    return Place(label, np.asarray(patch.net.evaluate(uv[None]))[0], face, uv)
 
 
-def table(path: str) -> list[tuple[str, list[float]]]:
+def table(path: str) -> list[tuple[str, tuple[float, ...]]]:
     """The rows of a CSV file: x, y, z and as the file goes on rotate (degrees), size, height; with their names.
 
     A first line that begins with a letter is its heading; empty lines and those that begin with # do not count.
@@ -114,16 +87,15 @@ def table(path: str) -> list[tuple[str, list[float]]]:
         why = error.strerror if isinstance(error, OSError) else "it is not UTF-8 text"
         raise FileError(f"cannot read '{path}': {why}", "give the path of a CSV file with columns x,y,z") from error
     name = path.replace("\\", "/").rpartition("/")[2]
-    rows: list[tuple[str, list[float]]] = []
+    rows: list[tuple[str, tuple[float, ...]]] = []
     for number, line in enumerate(lines, 1):
         if not line.strip() or line.lstrip().startswith("#") or (not rows and re.match(r"\s*[\"A-Za-z]", line)):
             continue
         where = f"{name}:{number}"
-        try:
-            row = numbers(line, where, "", (3, 4, 5, 6))
-        except UsageError as error:
+        row = numbers(line, (3, 4, 5, 6))
+        if row is None:
             hint = "write x,y,z or x,y,z,rotate,size,height, with numbers in millimetres and degrees"
-            raise FileError(f"{where}: {line.strip()!r} is not a place", hint) from error
+            raise FileError(f"{where}: {line.strip()!r} is not a place", hint)
         if any(factor <= 0 for factor in row[4:5]):
             raise FileError(f"{where}: size {row[4]:g} is not greater than zero", "give a factor such as 1")
         if any(factor == 0 for factor in row[5:6]):
@@ -242,28 +214,18 @@ def _beyond(net: Net, box: Array) -> Array:
     return np.asarray(np.hypot(apart[0][:, None], apart[1]).ravel())
 
 
-def window(ground: Ground, text: str, width: float | None) -> Window:
-    """A window from ``near:X,Y,Z,radius:R`` or ``#3@u0:u1,v0:v1``; raises UsageError and EditError.
+def window(ground: Ground, given: Disc | Rectangle, text: str, width: float | None) -> Window:
+    """A window on the ground, called by its text; raises UsageError and EditError.
 
     ``width`` of the taper (mm) is a quarter of the radius, or of the shorter side of a rectangle, by default.
     """
     label = f"feature {text}"
-    disc = re.fullmatch(rf"near:(.*),\s*radius:\s*({_NUMBER})\s*(?:mm)?", text)
-    if disc:
-        radius = float(disc[2])
-        if not (0 < radius < np.inf):
-            raise UsageError(f"{label}: radius {radius:g} is not greater than zero", WINDOW)
-        given = place(ground, disc[1], label.partition(",radius")[0])
-        feet = standing(ground, [given], radius)
-        return Window(text, feet, given.point, radius, radius / 4 if width is None else width)
-    box = re.fullmatch(rf"(.+)@({_NUMBER}):({_NUMBER}),({_NUMBER}):({_NUMBER})", text.replace(" ", ""))
-    if not box:
-        raise UsageError(f"{label}: this is not a window", WINDOW)
-    face = face_number(ground.model, box[1], label, WINDOW)
-    u0, u1, v0, v1 = (float(x) for x in box.groups()[1:])
-    if not (u0 < u1 and v0 < v1):
-        raise UsageError(f"{label}: the window is empty", WINDOW)
-    return _rectangle(ground, face, np.array([[u0, v0], [u1, v1]]), text, width)
+    if isinstance(given, Disc):
+        middle = place(ground, given.middle, label.partition(",radius")[0])
+        feet = standing(ground, [middle], given.radius)
+        return Window(text, feet, middle.point, given.radius, given.radius / 4 if width is None else width)
+    face = face_number(ground.model, given.face, label, FEATURE)
+    return _rectangle(ground, face, np.array([given.low, given.high]), text, width)
 
 
 def _rectangle(ground: Ground, face: int, corners: Array, text: str, width: float | None) -> Window:

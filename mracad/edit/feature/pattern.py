@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -11,24 +10,19 @@ import numpy as np
 
 from mracad.edit.feature.detail import Feature
 from mracad.edit.feature.ground import SIDEWAYS, Feet, Ground, axes
-from mracad.edit.feature.locate import MOST_PLACES, Place, numbers, place, standing, table, whole
+from mracad.edit.feature.locate import Place, place, standing, table
 from mracad.edit.feature.patch import Patch
 from mracad.errors import EditError, UsageError
 from mracad.model.brep import Face
 from mracad.seam.trace import EVENLY, Trace, trace_of
+from mracad.spec import places as spec
 from mracad.spec.quantity import length
 from mracad.spec.steps import Repeat
 
 Array = np.ndarray
 
-GRID = "write it as NxM,DX,DY: 4x3,25,25"
-POLAR = "write it as N,x|y|z or N,X,Y,Z,DX,DY,DZ: 6,z"
-ALONG = "write it as EDGE,N or EDGE,N,OFFSET: edge#4,10,15"
-
 STRIDES = 4
 """Steps from one place of a grid to the next."""
-
-AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 
 def places(ground: Ground, feature: Feature, options: Repeat) -> list[Place]:
@@ -49,14 +43,14 @@ def places(ground: Ground, feature: Feature, options: Repeat) -> list[Place]:
         own = feature.origin is not None and first is None
         origin, frame = _beginning(ground, feature, first)
         if options.grid:
-            laid = grid(ground, options.grid, origin, frame, own)
+            laid = grid(ground, spec.grid(options.grid, "grid"), origin, frame, own)
         else:
-            laid = polar(options.polar or "", origin, frame, own)
+            laid = polar(spec.polar(options.polar or "", "polar"), origin, frame, own)
         if first is not None:
             laid = [replace(p, rotate=first.rotate, size=first.size, height=first.height) for p in laid]
         found = laid + found[1:]
     if options.along:
-        found = found + along(ground, options.along)
+        found = found + along(ground, spec.along(options.along, "along"))
     turn = math.radians(options.rotate)
     found = [
         replace(p, rotate=p.rotate + turn, size=p.size * options.size, height=p.height * options.height) for p in found
@@ -81,28 +75,24 @@ def _beginning(ground: Ground, feature: Feature, first: Place | None) -> tuple[A
 
 def listed(ground: Ground, words: Sequence[str]) -> list[Place]:
     """Places from ``--at``; raises UsageError, EditError and FileError."""
-    found = []
+    found: list[Place] = []
     for word in words:
-        if word.startswith("@"):
-            for name, row in table(word[1:]):
-                rotate, size, height = (row[3:] + [0.0, 1.0, 1.0][len(row) - 3 :])[:3]
-                label = f"{name} ({','.join(f'{x:g}' for x in row[:3])})"
-                point = ground.brought(np.array([row[:3]]))[0]
-                found.append(Place(label, point, None, None, np.radians(rotate), size, height))
-        else:
-            found.append(place(ground, word, f"place {len(found) + 1}"))
+        given = spec.place(word, "at")
+        if not isinstance(given, spec.Listed):
+            found.append(place(ground, given, f"place {len(found) + 1} ({word})"))
+            continue
+        for name, row in table(given.path):
+            rotate, size, height = (*row[3:], *(0.0, 1.0, 1.0)[len(row) - 3 :])
+            label = f"{name} ({','.join(f'{x:g}' for x in row[:3])})"
+            point = ground.brought(np.array([row[:3]]))[0]
+            found.append(Place(label, point, None, None, np.radians(rotate), size, height))
     return found
 
 
-def grid(ground: Ground, text: str, origin: Array, frame: Array, own: bool) -> list[Place]:
+def grid(ground: Ground, given: spec.Grid, origin: Array, frame: Array, own: bool) -> list[Place]:
     """A grid that follows the ground along the axes of a frame (rows); the first place is left out where the feature
     is there already."""
-    match = re.fullmatch(r"\s*([0-9]+)\s*[xX]\s*([0-9]+)\s*,(.*)", text)
-    if not match:
-        raise UsageError(f"grid: {text!r} is not right", GRID)
-    wide, high = (_counted(match[i], f"grid: {text!r}", GRID) for i in (1, 2))
-    _counted(str(wide * high), f"grid: {text!r}", GRID)
-    dx, dy = numbers(match[3], "grid", GRID, (2,))
+    (wide, high), (dx, dy) = given.counts, given.steps
     rows = [(origin[None], frame[None])]
     for _ in range(wide - 1):
         rows.append(_walked(ground, *rows[-1], 0, dx))
@@ -117,16 +107,6 @@ def grid(ground: Ground, text: str, origin: Array, frame: Array, own: bool) -> l
     ]
 
 
-def _counted(text: str, what: str, hint: str) -> int:
-    """How many places a text asks for; raises UsageError."""
-    count = whole(text)
-    if not count:
-        raise UsageError(f"{what} is not right", hint)
-    if count > MOST_PLACES:
-        raise UsageError(f"{what}: more than {MOST_PLACES} places", "do them in several edits")
-    return count
-
-
 def _walked(ground: Ground, points: Array, frames: Array, axis: int, distance: float) -> tuple[Array, Array]:
     """Points and frames (rows x, y, normal) after a walk over the ground; straight on where it ends."""
     on = np.ones(len(points), bool)
@@ -139,18 +119,10 @@ def _walked(ground: Ground, points: Array, frames: Array, axis: int, distance: f
     return points, frames
 
 
-def polar(text: str, origin: Array, frame: Array, own: bool) -> list[Place]:
+def polar(given: spec.Polar, origin: Array, frame: Array, own: bool) -> list[Place]:
     """Places around an axis; the first one is left out where the feature is there already."""
-    first, _, rest = text.partition(",")
-    count = _counted(first.strip(), f"polar: {text!r}", POLAR)
-    if rest.strip().lower() in AXES:
-        centre, axis = np.zeros(3), np.array(AXES[rest.strip().lower()])
-    else:
-        six = np.array(numbers(rest, "polar", POLAR, (6,)))
-        centre, axis = six[:3], six[3:]
+    centre, axis, count = np.array(given.centre), np.array(given.axis), given.count
     size = float(np.linalg.norm(axis))
-    if size == 0:
-        raise UsageError(f"polar: {text!r} has no direction", POLAR)
     found = []
     for k in range(1 if own else 0, count):
         turn = _rotation(axis / size, 2 * np.pi * k / count)
@@ -159,17 +131,12 @@ def polar(text: str, origin: Array, frame: Array, own: bool) -> list[Place]:
     return found
 
 
-def along(ground: Ground, text: str) -> list[Place]:
+def along(ground: Ground, given: spec.Along) -> list[Place]:
     """Places along an edge, in the middles of equal parts of it."""
-    name, _, rest = text.partition(",")
-    number = whole(name.strip().removeprefix("edge#").removeprefix("#")) or 0
-    model = ground.model
+    number, count, offset, model = given.edge, given.count, given.offset, ground.model
     if not 1 <= number <= len(model.edges):
         known = f"edges edge#1 to edge#{len(model.edges)}" if model.edges else "no edges"
-        raise UsageError(f"along: {name!r}: the model has {known}", ALONG)
-    first, comma, last = rest.partition(",")
-    count = _counted(first.strip(), f"along: {text!r}", ALONG)
-    offset = numbers(last, "along", ALONG, (1,))[0] if comma else 0.0
+        raise UsageError(f"along: edge#{number}: the model has {known}", spec.ALONG)
     edge = model.edges[number - 1]
     side = next((s for s in edge.sides if s.face in ground.chosen and s.uv is not None), None)
     if side is None or edge.degenerate:

@@ -8,12 +8,13 @@ from typing import Annotated, ClassVar, Literal
 from msgspec import Meta
 
 from mracad.errors import UsageError
-from mracad.spec.files import FeatureText, File, PlaceText
+from mracad.spec import places
+from mracad.spec.files import File, Naming
 from mracad.spec.quantity import Angle, Length, band_of
 from mracad.spec.steps.base import Selection
 
 _Feature = Annotated[
-    FeatureText,
+    places.Feature,
     Meta(
         description="The feature: near:X,Y,Z,radius:R (a disc, mm), #3@u0:u1,v0:v1 (a rectangle of parameters) or "
         "a file made by mracad feature extract."
@@ -100,7 +101,7 @@ class Move(Single, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
     function: ClassVar[str] = "mracad.edit.feature.edits:move"
 
-    to: Annotated[str, Meta(description="Where to: X,Y,Z (mm) or #face@u,v.")]
+    to: Annotated[places.Spot, Meta(description="Where to: X,Y,Z (mm) or #face@u,v.")]
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -118,28 +119,28 @@ class Repeat(Single, frozen=True, kw_only=True, forbid_unknown_fields=True):
     function: ClassVar[str] = "mracad.edit.feature.edits:repeat"
 
     at: Annotated[
-        tuple[PlaceText, ...],
+        tuple[places.Place, ...],
         Meta(
             description="A place: X,Y,Z (mm, brought to the nearest selected face), #face@u,v, or @places.csv with "
             "lines x,y,z[,rotate[,size[,height]]]; repeatable."
         ),
     ] = ()
     grid: Annotated[
-        str | None,
+        Annotated[str, places.grid] | None,
         Meta(
             description="NxM,DX,DY: a grid of N by M places, DX and DY (mm) apart along the feature's own axes; its "
             "first one is the feature's place, or that of the first --at."
         ),
     ] = None
     polar: Annotated[
-        str | None,
+        Annotated[str, places.polar] | None,
         Meta(
             description="N,AXIS: N places around an axis, the feature's among them: 6,z or 6,X,Y,Z,DX,DY,DZ (a point "
             "and a direction)."
         ),
     ] = None
     along: Annotated[
-        str | None,
+        Annotated[str, places.along] | None,
         Meta(description="EDGE,N[,OFFSET]: N places evenly along edge#4, OFFSET (mm) inside its first selected face."),
     ] = None
     overlap: Annotated[
@@ -176,7 +177,7 @@ class Transfer(Copied, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
     source: Annotated[File, Meta(description="The file that the detail is taken from.")]
     from_: Annotated[
-        FeatureText,
+        Annotated[str, Naming(ending=".feature")],
         Meta(
             description="What to take: a face (#3 or its name) with all its detail in --band, or a feature as for "
             "mracad repeat."
@@ -193,6 +194,11 @@ class Transfer(Copied, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        if places.is_feature(self.from_):
+            places.feature(self.from_, "from")
+            places.spot(self.to, "to")
+        elif self.band is None:
+            raise UsageError("band: the detail of a face needs one", "give --band 0mm:20mm")
         self.share()
 
     def share(self) -> tuple[float, float]:

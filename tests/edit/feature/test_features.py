@@ -298,7 +298,7 @@ ERRORS = [
     (["--at", "110,50,0"], 4, "place 1 (110,50,0) is 10 mm off"),
     (["--at", "#1@500,2"], 4, "place 1 (#1@500,2) is off the face"),
     (["--at", "#4@1,2"], 2, "place 1 (#4@1,2): '#4'"),
-    (["--at", "1,2"], 2, "place 1 (1,2): '1,2' is not right"),
+    (["--at", "1,2"], 2, "at: '1,2' is not right"),
     (["--at", "95,50,0"], 4, "place 1 (95,50,0): edges or holes"),
     (["--at", "60,60,0", "--feature", "near:25,25,0,radius:60"], 4, "larger than its face"),
     (["--at", "60,60,0", "--feature", "#1@20:120,20:50"], 4, "outside the face"),

@@ -15,10 +15,10 @@ from msgspec import Meta
 
 from mracad.errors import UsageError
 from mracad.spec import recipe, schema
-from mracad.spec.files import PlaceText
+from mracad.spec.places import Place
 from mracad.spec.steps import STEPS, Check, Repeat, Selection, Smooth
 from mracad.spec.text import toml
-from tests.batch.runs import models
+from tests.job.batch.runs import models
 
 TEXT = """# a recipe
 [[step]]
@@ -115,7 +115,7 @@ class Engrave(Selection, frozen=True, kw_only=True, forbid_unknown_fields=True):
     function: ClassVar[str] = "mracad.edit.smooth:smooth"
     quiet: ClassVar[str] = "blank"
 
-    stencil: Annotated[PlaceText, Meta(description="Its outline.")]
+    stencil: Annotated[Place, Meta(description="Its outline.")]
 
 
 def test_a_new_edit_is_known_everywhere_by_its_declaration(tmp_path, monkeypatch, capsys):
@@ -240,13 +240,17 @@ def test_a_record_refuses_what_toml_cannot_hold():
 @pytest.mark.parametrize(
     ("line", "files", "there"),
     [
-        ("transfer --source wood --from wood --to woodpanel", ("wood",), ("x/wood", "wood", "woodpanel")),
         (
-            "transfer --source a.step --from b.feature --to #1",
-            ("a.step", "b.feature"),
-            ("x/a.step", "x/b.feature", "#1"),
+            "transfer --source wood --from wood --to panel --band 0mm:9mm",
+            ("wood",),
+            ("x/wood", "wood", "panel"),
         ),
-        ("transfer --source 1 --from #1 --to 1,1,1", ("1",), ("x/1", "#1", "1,1,1")),
+        (
+            "transfer --source a.step --from b.feature --to 1,1,1",
+            ("a.step", "b.feature"),
+            ("x/a.step", "x/b.feature", "1,1,1"),
+        ),
+        ("transfer --source 1 --from #1 --to 1 --band 0mm:9mm", ("1",), ("x/1", "#1", "1")),
     ],
 )
 def test_the_files_of_a_transfer_are_told_by_their_options(line, files, there):

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.batch.runs import batch, environment, outputs, recipe, shams, start
+from tests.job.batch.runs import batch, environment, outputs, recipe, shams, start
 
 pytest.importorskip("distributed")
 

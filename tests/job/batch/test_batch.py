@@ -17,7 +17,7 @@ from mracad.errors import FileError, UsageError
 from mracad.job.batch.find import find
 from mracad.job.batch.manifest import NAME, Manifest
 from mracad.spec.recipe import load
-from tests.batch.runs import RECIPE, batch, environment, kills, models, outputs, recipe, shams, start
+from tests.job.batch.runs import RECIPE, batch, environment, kills, models, outputs, recipe, shams, start
 
 
 def test_five_bad_files_of_a_hundred_cost_five(tmp_path):

@@ -12,7 +12,7 @@ from mracad.errors import CrashError, LimitError, UsageError
 from mracad.job.batch.pool import Pool
 from mracad.job.batch.settings import Limits
 from mracad.job.batch.work import Product
-from tests.batch.tasks import MB, made, work
+from tests.job.batch.tasks import MB, made, work
 
 
 def test_bad_tasks_cost_themselves_alone():

@@ -1,0 +1,205 @@
+"""Places, features and patterns as texts, read: what they mean on a model says :mod:`mracad.edit.feature`."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Annotated
+
+from mracad.errors import UsageError
+from mracad.spec.files import Naming
+from mracad.spec.quantity import NUMBER
+
+PLACE = "write a place as X,Y,Z in millimetres or #FACE@u,v"
+FEATURE = "write a feature as near:X,Y,Z,radius:R (mm), #FACE@u0:u1,v0:v1 or the name of a .feature file"
+GRID = "write it as NxM,DX,DY: 4x3,25,25"
+POLAR = "write it as N,x|y|z or N,X,Y,Z,DX,DY,DZ: 6,z"
+ALONG = "write it as EDGE,N or EDGE,N,OFFSET: edge#4,10,15"
+
+FAR = 1e12
+"""Numbers of this size are no places and no distances, mm."""
+
+MOST_PLACES = 10_000
+"""Places that one edit takes."""
+
+AXES = {"x": (0.0, 0.0, 0.0, 1.0, 0.0, 0.0), "y": (0.0, 0.0, 0.0, 0.0, 1.0, 0.0), "z": (0.0, 0.0, 0.0, 0.0, 0.0, 1.0)}
+
+
+@dataclass(frozen=True)
+class Point:
+    """A point in space, mm."""
+
+    xyz: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class OnFace:
+    """A place by the parameters of a face, which is named or numbered (``#3``)."""
+
+    face: str
+    uv: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Listed:
+    """The places in a CSV file."""
+
+    path: str
+
+
+@dataclass(frozen=True)
+class Disc:
+    """What lies within a radius (mm) of a place."""
+
+    middle: Point | OnFace
+    radius: float
+
+
+@dataclass(frozen=True)
+class Rectangle:
+    """What lies between two corners in the parameters of a face."""
+
+    face: str
+    low: tuple[float, float]
+    high: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Stored:
+    """A feature in a file."""
+
+    path: str
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Numbers of places, and the steps between them, mm."""
+
+    counts: tuple[int, int]
+    steps: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Polar:
+    """Places around an axis: a point on it (mm), and its direction."""
+
+    count: int
+    centre: tuple[float, ...]
+    axis: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Along:
+    """Places along an edge (its number), beside it by an offset, mm."""
+
+    edge: int
+    count: int
+    offset: float
+
+
+def numbers(text: str, counts: Sequence[int]) -> tuple[float, ...] | None:
+    """Finite numbers between commas; None where these are no such, or other than ``counts`` of them."""
+    parts = [part.strip() for part in text.split(",")]
+    right = len(parts) in counts and all(re.fullmatch(NUMBER, part) and abs(float(part)) < FAR for part in parts)
+    return tuple(map(float, parts)) if right else None
+
+
+def whole(text: str) -> int | None:
+    """A whole number written in digits; None for anything else, and for what nothing has so many of."""
+    return int(text) if re.fullmatch(r"[0-9]{1,9}", text) else None
+
+
+def spot(text: str, name: str) -> Point | OnFace:
+    """A place from ``X,Y,Z``, ``near:X,Y,Z`` or ``#3@u,v``; raises UsageError."""
+    face, at, rest = text.partition("@")
+    found = numbers(rest, (2,)) if at else numbers(text.removeprefix("near:"), (3,))
+    if found is None:
+        raise _wrong(name, text, PLACE)
+    return OnFace(face, found) if at else Point(found)
+
+
+def place(text: str, name: str) -> Point | OnFace | Listed:
+    """The same, or ``@FILE``; raises UsageError."""
+    return Listed(text[1:]) if text.startswith("@") else spot(text, name)
+
+
+def feature(text: str, name: str) -> Disc | Rectangle | Stored:
+    """A feature from ``near:X,Y,Z,radius:R``, ``#3@u0:u1,v0:v1`` or ``FILE.feature``; raises UsageError."""
+    if text.endswith(".feature"):
+        return Stored(text)
+    if disc := re.fullmatch(rf"near:(.*),\s*radius:\s*({NUMBER})\s*(?:mm)?", text):
+        radius = float(disc[2])
+        if not 0 < radius < FAR:
+            raise UsageError(f"{name}: radius {radius:g} is not greater than zero", FEATURE)
+        return Disc(spot(disc[1], name), radius)
+    box = re.fullmatch(rf"(.+)@({NUMBER}):({NUMBER}),({NUMBER}):({NUMBER})", text.replace(" ", ""))
+    if not box:
+        raise _wrong(name, text, FEATURE)
+    u0, u1, v0, v1 = map(float, box.groups()[1:])
+    if not (u0 < u1 and v0 < v1):
+        raise UsageError(f"{name}: the window {text} is empty", FEATURE)
+    return Rectangle(box[1], (u0, v0), (u1, v1))
+
+
+def is_feature(text: str) -> bool:
+    """Whether a text means a feature, and not a face."""
+    return text.startswith("near:") or "@" in text or text.endswith(".feature")
+
+
+def grid(text: str, name: str) -> Grid:
+    """A grid from ``NxM,DX,DY``; raises UsageError."""
+    match = re.fullmatch(r"\s*([0-9]+)\s*[xX]\s*([0-9]+)\s*,(.*)", text)
+    steps = numbers(match[3], (2,)) if match else None
+    if match is None or steps is None:
+        raise _wrong(name, text, GRID)
+    wide, high = (_count(match[i], name, text, GRID) for i in (1, 2))
+    _count(str(wide * high), name, text, GRID)
+    return Grid((wide, high), steps)
+
+
+def polar(text: str, name: str) -> Polar:
+    """Places around an axis from ``N,AXIS``; raises UsageError."""
+    first, _, rest = text.partition(",")
+    count = _count(first.strip(), name, text, POLAR)
+    six = AXES.get(rest.strip().lower()) or numbers(rest, (6,))
+    if six is None:
+        raise _wrong(name, text, POLAR)
+    if not any(six[3:]):
+        raise UsageError(f"{name}: {text!r} has no direction", POLAR)
+    return Polar(count, six[:3], six[3:])
+
+
+def along(text: str, name: str) -> Along:
+    """Places along an edge from ``EDGE,N[,OFFSET]``; raises UsageError."""
+    edge, _, rest = text.partition(",")
+    first, comma, last = rest.partition(",")
+    number = whole(edge.strip().removeprefix("edge#").removeprefix("#"))
+    offset = numbers(last, (1,)) if comma else (0.0,)
+    if number is None or offset is None:
+        raise _wrong(name, text, ALONG)
+    return Along(number, _count(first.strip(), name, text, ALONG), offset[0])
+
+
+def _count(text: str, name: str, whole_text: str, hint: str) -> int:
+    """How many places are asked for; raises UsageError."""
+    count = whole(text)
+    if not count:
+        raise _wrong(name, whole_text, hint)
+    if count > MOST_PLACES:
+        raise UsageError(f"{name}: {whole_text!r}: more than {MOST_PLACES} places", "do them in several edits")
+    return count
+
+
+def _wrong(name: str, text: str, hint: str) -> UsageError:
+    return UsageError(f"{name}: {text!r} is not right", hint)
+
+
+Place = Annotated[str, Naming(prefix="@"), place]
+"""The type of a field that is a place, or names a file of places."""
+
+Spot = Annotated[str, spot]
+"""The type of a field that is a place."""
+
+Feature = Annotated[str, Naming(ending=".feature"), feature]
+"""The type of a field that is a feature, or names the file of one."""
