@@ -19,7 +19,7 @@ from mracad.edit.moved import Moved, Result
 from mracad.edit.pose import Scene, beside_rims
 from mracad.edit.target import Sheet, Wish
 from mracad.edit.tolerances import Tolerances
-from mracad.edit.trial import ENOUGH, Trial, Verdict, worth
+from mracad.edit.trial import ENOUGH, Trial, Verdict, rank
 from mracad.seam.cause import Cause, Still
 from mracad.seam.interface import Joints
 from mracad.seam.natural import Seam
@@ -229,18 +229,18 @@ def _attempt(
         first = len(found)
         for wanted in batch:
             found.append(trial.judged(wanted, target, found))
-        if max(found, key=worth).least <= ENOUGH:
+        if max(found, key=rank).least <= ENOUGH:
             for each in found[first:]:
                 found.append(trial.eased(each, target, found))
-        if max(found, key=worth).least > ENOUGH:
+        if max(found, key=rank).least > ENOUGH:
             break
     for _ in range(BLENDS if len(found) > 1 and len(members) > 1 else 0):
         chosen = [(max(found, key=lambda each: each.gains[i]), i) for i in range(len(members))]
-        now = max(found, key=worth)
+        now = max(found, key=rank)
         if sum(each.gains[i] for each, i in chosen) <= PROMISE * now.gain:
             break
         found.append(trial.blended(chosen, target, found))
-        if max(found, key=worth) is now:
+        if max(found, key=rank) is now:
             break
     moved = _confirmed(trial, members, found, target)
     if any(each.amount for each in moved.values()) or not scene.tolerances.fairer:
@@ -252,15 +252,15 @@ def _attempt(
 def _confirmed(trial: Trial, members: Mapping[int, Sheet], found: Sequence[Verdict], target: Array) -> dict[int, Moved]:
     """What is worth most once it has been looked at closer."""
     best: dict[int, Moved] = {}
-    most, wanted = -1.0, sum(trial.problem.gains(target, target, [1.0] * len(members)))
-    for verdict in sorted(found, key=worth, reverse=True)[:CANDIDATES]:
-        if worth(verdict) <= most:
+    most, wanted = (-1.0, 0.0), sum(trial.problem.gains(target, target, [1.0] * len(members)))
+    for verdict in sorted(found, key=rank, reverse=True)[:CANDIDATES]:
+        if rank(verdict) <= most:
             break
         verdict = trial.settled(verdict, target)
         moved = [each.confirmed(trial.tolerances) for each in _moved(trial, members, verdict)]
         verdict = trial.left(verdict, [each.amount for each in moved], target)
-        if worth(verdict) > most:
-            most = worth(verdict)
+        if rank(verdict) > most:
+            most = rank(verdict)
             best = {each.sheet.index: replace(each, gain=verdict.gain, wanted=wanted) for each in moved}
     return best
 

@@ -107,7 +107,7 @@ class Trial:
             within = [bounded(net, part, bound, self.width).reshape(-1, 3) for net, part in both]
             delta = self.problem.nearest(np.concatenate(within))
         tried = Tried(self.watch, self.nets, self._split(delta))
-        return self._verdict(tried, target, self._floor(delta, target, others), BISECTIONS[0])
+        return self._verdict(tried, target, self._floor(delta, target, others), BISECTIONS[len(self.nets) > 1])
 
     def settled(self, verdict: Verdict, target: Array) -> Verdict:
         """The same, its amounts found closely."""
@@ -141,7 +141,7 @@ class Trial:
                 break
             easier = self.problem.nearest(share * delta, stiffness(self.width))
             found.append(self.judged(easier, target, [*others, *found]))
-        return max(found, key=worth)
+        return max(found, key=rank)
 
     def blended(self, chosen: Sequence[tuple[Verdict, int]], target: Array, others: Sequence[Verdict]) -> Verdict:
         """For each surface another verdict on it, by place, made to meet as smoothly as can be."""
@@ -219,6 +219,11 @@ def _beating(best: float, half: float, whole: float) -> float:
     gain = (4 * half - whole) * amounts + 2 * (whole - 2 * half) * amounts**2
     more = amounts[gain * np.where(amounts > ENOUGH, WHOLE, 1.0) > best]
     return float(more[0]) if len(more) else np.inf
+
+
+def rank(verdict: Verdict) -> tuple[float, float]:
+    """What it counts for, and where some of the surfaces may not move at all, by what the others gain."""
+    return worth(verdict), sum(verdict.gains)
 
 
 def bounded(net: Net, offset: Array, bound: float, width: float) -> Array:

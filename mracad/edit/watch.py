@@ -15,8 +15,8 @@ from mracad.model.brep import Face
 
 Array = np.ndarray
 
-BISECTIONS = 3, 6
-"""Steps in which an amount is found: roughly among several displacements, and closely."""
+BISECTIONS = 3, 5
+"""Steps in which an amount is found: roughly among several displacements of one surface; else closely."""
 
 SINGULAR = 1e5
 """Curvature over the wavelength from which on a face is singular."""
@@ -44,8 +44,9 @@ class Watch:
         spreads them within a reach (mm), at so many points a span."""
         every = [(place, net, base, face) for place, (net, base, faces) in enumerate(surfaces) for face in faces]
         looked = [(net, (face,), net.u, net.v) for _, net, _, face in every]
+        bases = [base for *_, base, _ in every] if np.isfinite(reach) else ()
         return cls(
-            surveys(looked, points, SINGULAR / width, reach, [base for *_, base, _ in every]),
+            surveys(looked, points, SINGULAR / width, reach, bases),
             [(place, face.index) for place, *_, face in every],
         )
 
