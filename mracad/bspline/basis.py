@@ -105,9 +105,14 @@ def gauss(kv: KnotVector, points: int) -> tuple[Array, Array, Array]:
     offset, weight : ndarray (s, points)
         Parameters relative to the span's first knot, and quadrature weights in parameter units.
     """
+    return kv.span_index, *gauss_pieces(kv.breaks, points)
+
+
+def gauss_pieces(breaks: Array, points: int) -> tuple[Array, Array]:
+    """Gauss–Legendre points on pieces between breaks, from their beginnings, and weights, ``(s, points)`` both."""
     nodes, weights = legendre(points)
-    lengths = np.diff(kv.breaks)[:, None]
-    return kv.span_index, 0.5 * lengths * (nodes + 1), 0.5 * lengths * weights
+    lengths = np.diff(breaks)[:, None]
+    return 0.5 * lengths * (nodes + 1), 0.5 * lengths * weights
 
 
 @kept(32)

@@ -15,6 +15,7 @@ from mracad.bspline.curve import check_weights, euclidean, homogeneous
 from mracad.bspline.knots import Array, KnotVector, Side
 from mracad.bspline.refine import refinement
 from mracad.bspline.rows import Rows
+from mracad.bspline.vectors import cross
 from mracad.errors import UsageError
 
 _BLOCK = 1 << 19
@@ -196,12 +197,6 @@ class Net:
 def pairs(us: ArrayLike, vs: ArrayLike) -> Array:
     """All pairs of parameters ``(m n, 2)``, those of v fastest."""
     return np.stack(np.meshgrid(us, vs, indexing="ij"), axis=-1).reshape(-1, 2)
-
-
-def cross(a: Array, b: Array) -> Array:
-    """Cross products of vectors ``(…, 3)``: those of numpy, whose general treatment of axes costs more than they."""
-    i, j = [1, 2, 0], [2, 0, 1]
-    return np.asarray(a[..., i] * b[..., j] - a[..., j] * b[..., i])
 
 
 def curvature(derivatives: tuple[Array, ...], direction: Array) -> Array:

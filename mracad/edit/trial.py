@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mracad.bspline.surface import Net, cross
+from mracad.bspline.surface import Net
+from mracad.bspline.vectors import cross
 from mracad.edit.jumps import Jumps
 from mracad.edit.pose import Scene, pose
 from mracad.edit.target import Sheet, eased, stiffness

@@ -13,9 +13,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mracad.bspline.vectors import between
 from mracad.model.adjacency import GAP, TORN, coinciding
 from mracad.model.brep import Edge, Model, Side
-from mracad.seam.sides import between, views
+from mracad.seam.sides import views
 
 Array = np.ndarray
 _Pair = tuple[Edge, bool, tuple[Side, Side]]

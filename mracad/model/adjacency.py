@@ -16,6 +16,8 @@ from dataclasses import replace
 import numpy as np
 
 from mracad.model.brep import Edge, Model, Side
+from mracad.model.sampling import between, hermite, slopes
+from mracad.model.sampling import length as polygon
 
 Array = np.ndarray
 
@@ -92,7 +94,7 @@ def _candidates(
     middle of i are near points of j."""
     if len(free) < 2:
         return
-    lines = [_hermite(e.points, _slopes(e), *_between(len(e.points))) for e in free]
+    lines = [hermite(e.points, slopes(e.points, e.tangents), *between(len(e.points))) for e in free]
     share = [max(OF_MODEL * model.diagonal, 2 * e.tolerance, PRECISION * model.diagonal) * gap for e in free]
     steps = np.array([np.linalg.norm(np.diff(line, axis=0), axis=1).max() for line in lines]) + np.max(share)
     low = np.array([line.min(axis=0) for line in lines]) - steps[:, None]
@@ -110,7 +112,7 @@ def _candidates(
 
 def length(edge: Edge) -> float:
     """Length of an edge, mm, as the polygon of its samples."""
-    return float(np.linalg.norm(np.diff(edge.points, axis=0), axis=1).sum())
+    return polygon(edge.points)
 
 
 def apart(edge: Edge, other: Edge) -> float:
@@ -131,33 +133,13 @@ def _carried(points: Array, edge: Edge) -> tuple[Array, Array | None]:
     off = ((points[:, None] - start - along[..., None] * chord) ** 2).sum(axis=2)
     segment = off.argmin(axis=1)
     s = along[np.arange(len(points)), segment][:, None]
-    on = _hermite(edge.points, _slopes(edge), segment, s)
+    on = hermite(edge.points, slopes(edge.points, edge.tangents), segment, s)
     apart = points - on
     tangent = chord[segment] / np.sqrt(square[segment])[:, None]
     shift = (apart * tangent).sum(axis=1, keepdims=True)
     inner = ((s > low[segment][:, None]) & (s < high[segment][:, None])).astype(float)
     uv = edge.sides[0].uv
-    return apart - inner * shift * tangent, None if uv is None else _hermite(uv, np.gradient(uv, axis=0), segment, s)
-
-
-def _slopes(edge: Edge) -> Array:
-    """Derivatives of the edge's curve per sample step, ``(k, 3)``."""
-    return np.asarray(edge.tangents * np.linalg.norm(np.gradient(edge.points, axis=0), axis=1, keepdims=True))
-
-
-def _between(samples: int) -> tuple[Array, Array]:
-    """Segments and fractions that put eight points on each segment of a sampled curve, both ends included."""
-    at = np.linspace(0, samples - 1, 8 * (samples - 1) + 1)
-    segment = np.minimum(at.astype(int), samples - 2)
-    return segment, (at - segment)[:, None]
-
-
-def _hermite(values: Array, slopes: Array, segment: Array, s: Array) -> Array:
-    """Cubic Hermite interpolation of samples at fraction ``s`` (k, 1) of ``segment`` (k,); slopes are per step."""
-    p, q, m, n = values[segment], values[segment + 1], slopes[segment], slopes[segment + 1]
-    return np.asarray(
-        (1 + 2 * s) * (1 - s) ** 2 * p + s * (1 - s) ** 2 * m + s * s * (3 - 2 * s) * q + s * s * (s - 1) * n
-    )
+    return apart - inner * shift * tangent, None if uv is None else hermite(uv, np.gradient(uv, axis=0), segment, s)
 
 
 def _baked(points: Array, other: Edge) -> Side:

@@ -15,6 +15,7 @@ from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
 from mracad.model.brep import Edge, Face
 from mracad.model.cells import inside_grid
+from mracad.model.sampling import between, hermite, slopes
 
 Array = np.ndarray
 
@@ -27,7 +28,6 @@ PER_SPAN, MOST = 2, 64
 STEPS = 4
 """Of Newton's method."""
 
-_FINE = 8  # points between two samples of an edge
 _FEW = 16  # knots of an edge that its samples do justice to
 
 
@@ -104,15 +104,7 @@ def _quarters(breaks: Array) -> Array:
 
 def _lines(points: Array, tangents: Array) -> Array:
     """Points along edges, close to each other, ``(e, q, 3)``, from their samples ``(e, k, 3)``."""
-    count = points.shape[1]
-    slopes = tangents * np.linalg.norm(np.gradient(points, axis=1), axis=2, keepdims=True)
-    at = np.linspace(0, count - 1, _FINE * (count - 1) + 1)
-    k = np.minimum(at.astype(int), count - 2)
-    s = (at - k)[:, None]
-    p, q, m, n = points[:, k], points[:, k + 1], slopes[:, k], slopes[:, k + 1]
-    return np.asarray(
-        (1 + 2 * s) * (1 - s) ** 2 * p + s * (1 - s) ** 2 * m + s * s * (3 - 2 * s) * q + s * s * (s - 1) * n
-    )
+    return hermite(points, slopes(points, tangents), *between(points.shape[1]))
 
 
 def _peaks(lines: Array) -> Array:

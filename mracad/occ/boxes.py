@@ -14,7 +14,7 @@ from mracad.model.boxes import box as nurbs_box
 from mracad.model.boxes import rims
 from mracad.model.brep import Face, Model
 from mracad.occ.document import Document
-from mracad.occ.topology import box, inside, matrix
+from mracad.occ.topology import box, inside, nodes, placed
 
 Array = np.ndarray
 
@@ -90,8 +90,7 @@ def _meshed(shape: TopoDS_Face, chord: float, outer: Array) -> Array:
     mesh = BRep_Tool.Triangulation_s(TopoDS.Face_s(copy), location := TopLoc_Location())
     if mesh is None:
         return outer
-    frame = matrix(location)
-    points = np.array([mesh.Node(i).Coord() for i in range(1, mesh.NbNodes() + 1)]) @ frame[:3, :3].T + frame[:3, 3]
+    points = nodes(mesh, location)
     return np.clip(np.array([points.min(axis=0), points.max(axis=0)]), outer[0], outer[1])
 
 
@@ -109,4 +108,4 @@ def _placed(model: Model, document: Document) -> tuple[Array, list[Array]]:
 def _corners(bounds: Array, frame: Array) -> Array:
     """The eight corners of a box, placed."""
     each = np.array([bounds[[a, b, c], [0, 1, 2]] for a in (0, 1) for b in (0, 1) for c in (0, 1)])
-    return each @ frame[:3, :3].T + frame[:3, 3]
+    return placed(each, frame)

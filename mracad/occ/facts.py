@@ -26,7 +26,7 @@ from mracad.occ.check import check
 from mracad.occ.document import Document
 from mracad.occ.measure import mass
 from mracad.occ.settings import quiet
-from mracad.occ.topology import box, edge_uses, inside, matrix
+from mracad.occ.topology import box, edge_uses, inside, matrix, placed
 from mracad.occ.view import pcurve, view
 
 Array = np.ndarray
@@ -185,5 +185,4 @@ def _middle(points: Array, placement: TopLoc_Location, corners: Array) -> Array:
     """The middle of points that are placed; of the box where there are none."""
     if not len(points):
         return (corners[:3] + corners[3:]) / 2
-    frame = matrix(placement)
-    return points.mean(axis=0) @ frame[:3, :3].T + frame[:3, 3]
+    return placed(points.mean(axis=0), matrix(placement))

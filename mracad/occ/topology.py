@@ -8,6 +8,7 @@ import numpy as np
 from OCP.Bnd import Bnd_Box
 from OCP.BRep import BRep_Builder
 from OCP.BRepBndLib import BRepBndLib
+from OCP.Poly import Poly_Triangulation
 from OCP.TopAbs import TopAbs_EDGE, TopAbs_SOLID
 from OCP.TopExp import TopExp, TopExp_Explorer
 from OCP.TopLoc import TopLoc_Location
@@ -49,6 +50,16 @@ def matrix(location: TopLoc_Location) -> Array:
         transform = location.Transformation()
         out[:3] = [[transform.Value(i, j) for j in (1, 2, 3, 4)] for i in (1, 2, 3)]
     return out
+
+
+def nodes(mesh: Poly_Triangulation, location: TopLoc_Location) -> Array:
+    """The points of a face's mesh, ``(n, 3)``."""
+    return placed(np.array([mesh.Node(i).Coord() for i in range(1, mesh.NbNodes() + 1)]), matrix(location))
+
+
+def placed(points: Array, frame: Array) -> Array:
+    """Points ``(…, 3)`` where a frame puts them."""
+    return np.asarray(points @ frame[:3, :3].T + frame[:3, 3])
 
 
 def box(shape: TopoDS_Shape, tight: bool = False) -> Array:

@@ -14,7 +14,7 @@ from mracad.errors import UsageError
 from mracad.model.facts import Triangles
 from mracad.occ.document import Document
 from mracad.occ.settings import quiet
-from mracad.occ.topology import box, compound, matrix
+from mracad.occ.topology import box, compound, nodes
 
 Array = np.ndarray
 SMALLEST = 1e-6, 0.5
@@ -95,13 +95,11 @@ def _collected(document: Document) -> Triangles:
             if mesh is None:
                 missing.append(index)
                 continue
-            frame = matrix(location)
-            nodes = np.array([mesh.Node(i).Coord() for i in range(1, mesh.NbNodes() + 1)])
-            own.append(nodes @ frame[:3, :3].T + frame[:3, 3])
+            own.append(nodes(mesh, location))
             three = np.array([mesh.Triangle(i).Get() for i in range(1, mesh.NbTriangles() + 1)]) - 1 + count
             corners.append(three[:, ::-1] if face.Orientation() == TopAbs_REVERSED else three)
             owners.append((index, number, len(three)))
-            count += len(nodes)
+            count += len(own[-1])
         if own:
             points.append(np.concatenate(own))
             leader = _weld(points[-1])

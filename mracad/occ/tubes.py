@@ -46,7 +46,7 @@ def tubes(face: TopoDS_Face) -> TopoDS_Shell | None:
     rims = [edge for edge in edge_uses(face) if not BRep_Tool.IsClosed_s(edge, face)]
     if any(BRep_Tool.Degenerated_s(edge) for edge in rims):
         return None
-    paths = [_path(edge, face) for edge in rims]
+    paths = [along(edge, face) for edge in rims]
     if not paths:
         return None
     gaps = [_gaps([path[:, axis] for path in paths], periods[axis]) for axis in (0, 1)]
@@ -84,7 +84,7 @@ def tubes(face: TopoDS_Face) -> TopoDS_Shell | None:
     return shell
 
 
-def _path(edge: TopoDS_Edge, face: TopoDS_Face) -> Array:
+def along(edge: TopoDS_Edge, face: TopoDS_Face) -> Array:
     """Parameters of the face along an edge, ``(n, 2)``."""
     curve = BRepAdaptor_Curve2d(edge, face)
     at = np.linspace(curve.FirstParameter(), curve.LastParameter(), _SAMPLES)

@@ -17,7 +17,8 @@ from OCP.TopAbs import TopAbs_FORWARD, TopAbs_REVERSED
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS, TopoDS_Edge, TopoDS_Face
 
-from mracad.bspline.surface import Net, cross, curvature
+from mracad.bspline.surface import Net, curvature
+from mracad.bspline.vectors import cross, unit
 from mracad.errors import FileError, UsageError
 from mracad.model.brep import Edge, Face, Model, Side, Surface, Trim
 from mracad.model.sampling import SAMPLES, shares
@@ -249,7 +250,7 @@ def _along(edge: TopoDS_Edge) -> tuple[Array, Array]:
         curve.D1(t, point, tangent)
         rows.append(point.Coord() + tangent.Coord())
     table = np.array(rows)
-    return table[:, :3], _unit(table[:, 3:])
+    return table[:, :3], unit(table[:, 3:])
 
 
 def _beside(found: _Found, uses: list[_Use], along: list[tuple[Array, Array]]) -> dict[int, tuple[Array, Array, Array]]:
@@ -272,7 +273,7 @@ def _beside(found: _Found, uses: list[_Use], along: list[tuple[Array, Array]]) -
     if bent:
         feet, su, sv, *second = np.concatenate(jets).swapaxes(0, 1)
         sign = np.repeat([signs[use.face] for use in bent], SAMPLES)
-        normals = _unit(cross(su, sv))
+        normals = unit(cross(su, sv))
         tangents = np.concatenate([along[use.edge][1] for use in bent])
         bends = sign * curvature((su, sv, *second), cross(normals, tangents))
         split = (np.split(values, len(bent)) for values in (feet, sign[:, None] * normals, bends))
@@ -334,9 +335,3 @@ def _parameters(use: _Use) -> Array:
         line = use.pcurve.Lin2d()
         return np.array(line.Location().Coord()) + place[:, None] * np.array(line.Direction().Coord())
     return np.array([point.Coord() for point in map(use.pcurve.Value, place.tolist())])
-
-
-def _unit(vectors: Array) -> Array:
-    """Vectors of length 1; a vanishing one stays zero."""
-    lengths = np.linalg.norm(vectors, axis=1, keepdims=True)
-    return vectors / np.where(lengths > 0, lengths, 1.0)

@@ -15,7 +15,6 @@ from functools import partial
 
 import numpy as np
 from OCP.BRep import BRep_Builder, BRep_Tool
-from OCP.BRepAdaptor import BRepAdaptor_Curve2d
 from OCP.BRepBuilderAPI import BRepBuilderAPI_Copy
 from OCP.BRepCheck import BRepCheck_Analyzer
 from OCP.BRepGProp import BRepGProp
@@ -25,8 +24,6 @@ from OCP.Geom import (
     Geom_BezierSurface,
     Geom_BSplineSurface,
     Geom_ElementarySurface,
-    Geom_RectangularTrimmedSurface,
-    Geom_Surface,
 )
 from OCP.GProp import GProp_GProps
 from OCP.ShapeAnalysis import ShapeAnalysis_ShapeTolerance
@@ -43,10 +40,11 @@ from OCP.XCAFDoc import XCAFDoc_ShapeTool
 from mracad.errors import EditError
 from mracad.occ.convert import conversion, lay
 from mracad.occ.document import Conversion, Document, Part
+from mracad.occ.geometry import basis as untrimmed
 from mracad.occ.instance import say
 from mracad.occ.labels import labels
 from mracad.occ.topology import edge_uses, inside
-from mracad.occ.tubes import tubes
+from mracad.occ.tubes import along, tubes
 
 Array = np.ndarray
 Copier = Callable[[TopoDS_Shape], TopoDS_Shape]
@@ -59,7 +57,6 @@ _OTHER = 1e-2  # that of faces of which one is surely mistaken for another
 _EXACT = 1e-7  # relative error of areas; those of the kernel's quick way are off by up to a hundredth on NURBS faces
 _LOOSER = 2.0, 1e-5  # a face read back may have so many times the tolerance, or so much (memory units)
 _ALL_THE_WAY = 0.9  # share of the whole range of a parameter
-_SAMPLES = 32  # points along an edge
 _PRECISION = 1e-7
 
 
@@ -128,7 +125,7 @@ def writable(document: Document, copier: Copier) -> Iterator[tuple[CutFace, ...]
 def _closes(face: TopoDS_Face) -> bool:
     """Whether a face goes right round a surface that is no plain one, and a reader has to guess how."""
     forward = TopoDS.Face_s(face.Oriented(TopAbs_FORWARD))
-    basis = _basis(BRep_Tool.Surface_s(forward, TopLoc_Location()))
+    basis = untrimmed(BRep_Tool.Surface_s(forward, TopLoc_Location()))
     if isinstance(basis, Geom_ElementarySurface):
         return False
     edges = list(edge_uses(forward))
@@ -136,10 +133,6 @@ def _closes(face: TopoDS_Face) -> bool:
     if natural and isinstance(basis, _NURBS):
         return False
     return any(BRep_Tool.IsClosed_s(edge, forward) for edge in edges)
-
-
-def _basis(surface: Geom_Surface) -> Geom_Surface:
-    return surface.BasisSurface() if isinstance(surface, Geom_RectangularTrimmedSurface) else surface
 
 
 def _kept(face: TopoDS_Shape, copy: TopoDS_Shape) -> bool:
@@ -216,7 +209,7 @@ def _mended(document: Document, index: int, twin: TopoDS_Shape, copier: Copier, 
 
 def _on_nurbs(document: Document, index: int) -> Conversion | None:
     """The NURBS form of a face that has another one."""
-    if isinstance(_basis(BRep_Tool.Surface_s(document.faces[index], TopLoc_Location())), _NURBS):
+    if isinstance(untrimmed(BRep_Tool.Surface_s(document.faces[index], TopLoc_Location())), _NURBS):
         return None
     try:
         return conversion(document, index)
@@ -261,7 +254,7 @@ def _parts(face: TopoDS_Face, context: ShapeBuild_ReShape, axis: int) -> TopoDS_
     """A face cut across a direction in which its surface closes, u (0) or v (1)."""
     location = TopLoc_Location()
     surface = BRep_Tool.Surface_s(face, location)
-    basis = _basis(surface)
+    basis = untrimmed(surface)
     if not (basis.IsUClosed(), basis.IsVClosed())[axis]:
         return None
     bounds = BRepTools.UVBounds_s(face)
@@ -299,7 +292,7 @@ def _away(face: TopoDS_Face, axis: int, low: float, high: float) -> float:
     """The middle of the widest stretch of a parameter into which no boundary comes but those that go all the way."""
     taken = [(high, high)]
     for edge in edge_uses(face):
-        values = _along(edge, face, axis)
+        values = along(edge, face)[:, axis]
         if not BRep_Tool.IsClosed_s(edge, face) and np.ptp(values) < _ALL_THE_WAY * (high - low):
             taken.append((values.min(), values.max()))
     best, start = (0.0, (low + high) / 2), low
@@ -307,10 +300,3 @@ def _away(face: TopoDS_Face, axis: int, low: float, high: float) -> float:
         best = max(best, (first - start, (first + start) / 2))
         start = max(start, last)
     return best[1]
-
-
-def _along(edge, face: TopoDS_Face, axis: int) -> Array:
-    """A parameter of the face along an edge."""
-    curve = BRepAdaptor_Curve2d(edge, face)
-    at = np.linspace(curve.FirstParameter(), curve.LastParameter(), _SAMPLES)
-    return np.array([curve.Value(t).Coord()[axis] for t in at.tolist()])

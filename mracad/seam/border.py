@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mracad.bspline.knots import Side as Limit
-from mracad.bspline.surface import cross
+from mracad.bspline.vectors import between, cross
 from mracad.model.brep import Edge, Model, Side
 from mracad.model.sampling import shares
 from mracad.seam.hold import ISO, local_span
-from mracad.seam.sides import between, inner_side
+from mracad.seam.sides import inner_side
 
 Array = np.ndarray
 Jet = tuple[Array, ...]

@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from mracad.bspline.basis import gauss_pieces
 from mracad.bspline.functions import functions
 from mracad.bspline.surface import Net
 from mracad.seam.conditions import laid_out
@@ -167,6 +168,5 @@ def _sites(sides: Sequence[Trace], nets: Mapping[int, Net]) -> tuple[Array, Arra
     breaks = np.unique(np.concatenate([crossings(t, (nets[t.surface].u, nets[t.surface].v)) for t in sides]))
     breaks = breaks[np.append(True, np.diff(breaks) > 1e-9)]
     highest = max(knots.degree for side in sides for knots in (nets[side.surface].u, nets[side.surface].v))
-    place, weight = np.polynomial.legendre.leggauss(highest + MORE)
-    step = np.diff(breaks)[:, None]
-    return (breaks[:-1, None] + step * (place + 1) / 2).ravel(), (step * weight / 2).ravel()
+    place, weight = gauss_pieces(breaks, highest + MORE)
+    return (breaks[:-1, None] + place).ravel(), weight.ravel()

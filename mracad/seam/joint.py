@@ -16,10 +16,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from mracad.bspline.vectors import between
 from mracad.model.brep import Model
 from mracad.seam.border import SHARES, Border, Jet, outward
 from mracad.seam.cause import Cause, Still
-from mracad.seam.sides import between
 from mracad.seam.wishes import Wishes
 
 Array = np.ndarray

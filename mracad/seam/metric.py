@@ -11,7 +11,8 @@ import numpy as np
 
 from mracad.bspline.crease import crease_lines
 from mracad.bspline.gram import gram
-from mracad.bspline.surface import Net, cross
+from mracad.bspline.surface import Net
+from mracad.bspline.vectors import cross
 from mracad.model.cells import Quadrature
 from mracad.seam.energy import Forms, forms
 from mracad.seam.solve import Problem, Space

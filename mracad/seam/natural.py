@@ -7,13 +7,14 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from mracad.bspline.vectors import across, between
 from mracad.model.adjacency import apart, coinciding, length, reach, touching
 from mracad.model.brep import Edge, Model, Side
 from mracad.seam.border import SHARES, Border, border, jets, opened
 from mracad.seam.cause import Cause, Still
 from mracad.seam.hold import CONTINUITY, ISO
 from mracad.seam.joint import Joint, joint_of
-from mracad.seam.sides import across, between, views
+from mracad.seam.sides import views
 from mracad.seam.wishes import Wishes
 
 Array = np.ndarray

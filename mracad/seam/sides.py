@@ -8,7 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from mracad.bspline.knots import Side as Limit
-from mracad.bspline.surface import Net, cross, curvature
+from mracad.bspline.surface import Net, curvature
+from mracad.bspline.vectors import cross
 from mracad.model.brep import Edge, Face, Model, Side
 from mracad.seam.hold import ISO, local_span
 
@@ -58,17 +59,6 @@ def views(model: Model, uses: Sequence[tuple[Edge, Side]]) -> list[Array]:
 def _net(model: Model, face: Face) -> Net:
     assert face.surface is not None
     return model.surfaces[face.surface].net
-
-
-def between(one: Array, two: Array) -> Array:
-    """Angles between vectors ``(q, 3)``."""
-    return np.asarray(np.arctan2(np.linalg.norm(cross(one, two), axis=1), (one * two).sum(axis=1)))
-
-
-def across(vectors: Array, along: Array) -> Array:
-    """The part of vectors ``(q, 3)`` across directions ``along``."""
-    along = along / np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-300)
-    return np.asarray(vectors - (vectors * along).sum(axis=1, keepdims=True) * along)
 
 
 def from_inside(face: Face, net: Net, edge: int, uv: Array) -> tuple[Array, tuple[Limit, Limit]]:

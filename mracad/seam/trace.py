@@ -11,6 +11,7 @@ from mracad.bspline.curve import Curve
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.knots import Side as Limit
 from mracad.bspline.surface import Net
+from mracad.bspline.vectors import unit
 from mracad.model.brep import Face, Model, Trim
 from mracad.model.region import meeting
 from mracad.model.sampling import shares
@@ -161,8 +162,8 @@ def directions(ground: Mapping[int, Net], a: Trace, b: Trace, share: Array) -> l
     """For a and b the directions c, z and t ``(q, 2)`` in the parameter planes, t the unit tangent of a."""
     _, su, sv, *second = a.on(ground[a.surface], share, 2)
     way = a.way(share)
-    tangent = _unit(su * way[:, :1] + sv * way[:, 1:])
-    conormal = _unit(np.cross(np.cross(su, sv), tangent))
+    tangent = unit(su * way[:, :1] + sv * way[:, 1:])
+    conormal = unit(np.cross(np.cross(su, sv), tangent))
     _, tu, tv, *other = b.on(ground[b.surface], share, 2)
     ways = _components(su, sv, conormal), _components(tu, tv, conormal)
     bends = [_twice(x, y) for x, y in zip(ways, (second, other), strict=True)]
@@ -170,10 +171,6 @@ def directions(ground: Mapping[int, Net], a: Trace, b: Trace, share: Array) -> l
         (ways[0], np.zeros_like(way), _components(su, sv, tangent)),
         (ways[1], _components(tu, tv, bends[0] - bends[1]), _components(tu, tv, tangent)),
     ]
-
-
-def _unit(vectors: Array) -> Array:
-    return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-300))
 
 
 def _twice(way: Array, second: Sequence[Array]) -> Array:

@@ -16,12 +16,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from mracad.bspline.basis import gauss_pieces
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import curvature
+from mracad.bspline.vectors import across, between
 from mracad.model.brep import Edge, Face, Model, Trim
 from mracad.seam.cause import Cause, Still
 from mracad.seam.natural import Seam, runs_back
-from mracad.seam.sides import across, between
 from mracad.seam.trace import EVENLY, LOOKS, NEAR, Trace, along, crossings, trace_of
 from mracad.seam.wishes import Wishes
 
@@ -184,6 +185,5 @@ def fine_sites(traces: tuple[Trace, Trace], spaces: Mapping[int, tuple[KnotVecto
     """Fractions at which conditions are asked of fine spaces, and their weights: Gauss points of all spans."""
     breaks = np.sort(np.concatenate([crossings(trace, spaces[trace.surface]) for trace in traces]))
     breaks = breaks[np.append(True, np.diff(breaks) > NEAR)]
-    place, weight = np.polynomial.legendre.leggauss(GAUSS)
-    width = np.diff(breaks)[:, None]
-    return (breaks[:-1, None] + width * (place + 1) / 2).ravel(), (width * weight / 2).ravel()
+    place, weight = gauss_pieces(breaks, GAUSS)
+    return (breaks[:-1, None] + place).ravel(), weight.ravel()

@@ -7,7 +7,7 @@ from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
 from mracad.model.brep import Face, Model, Surface
 from mracad.model.displacement import Displacement, Offset
-from mracad.model.sampling import shares
+from mracad.model.sampling import between, hermite, shares
 
 QUARTER = np.array([[0.0, -1, 0, 5], [1, 0, 0, 6], [0, 0, 1, 7], [0, 0, 0, 1]])
 
@@ -56,3 +56,14 @@ def test_samples_are_the_zeros_of_a_chebyshev_polynomial():
         share = shares(count)
         assert share[0] > 0 and share[-1] < 1 and (np.diff(share) > 0).all()
         np.testing.assert_allclose(np.polynomial.Chebyshev.basis(count)(2 * share - 1), 0, atol=1e-12)
+
+
+def test_cubics_are_interpolated_exactly():
+    t = np.arange(5.0)
+    values = np.stack([t**3, 1 - t, t**2], axis=1)
+    rates = np.stack([3 * t**2, -np.ones(5), 2 * t], axis=1)
+    segment, s = between(5)
+    at = segment[:, None] + s
+    wanted = np.concatenate([at**3, 1 - at, at**2], axis=1)
+    np.testing.assert_allclose(hermite(values, rates, segment, s), wanted, atol=1e-12)
+    np.testing.assert_allclose(hermite(values[None], rates[None], segment, s)[0], wanted, atol=1e-12)

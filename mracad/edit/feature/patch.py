@@ -10,6 +10,7 @@ import numpy as np
 
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net, pairs
+from mracad.bspline.vectors import unit
 from mracad.model.brep import Face, Model
 from mracad.model.outline import FLAT, outline
 from mracad.model.region import face_region
@@ -94,12 +95,12 @@ class Patch:
     def evaluate(self, uv: Array) -> tuple[Array, Array, Array, Array]:
         """Points, derivatives and unit normals (outward) at parameters ``(q, 2)``."""
         s, su, sv = self.net.evaluate(uv, 1)
-        return s, su, sv, _unit(self.signs(uv)[:, None] * np.cross(su, sv))
+        return s, su, sv, unit(self.signs(uv)[:, None] * np.cross(su, sv))
 
     def lattice(self, us: Array, vs: Array) -> tuple[Array, Array]:
         """Points and unit normals (outward) at all pairs of parameters, ``(m, n, 3)``."""
         points, su, sv = self.net.grid(us, vs, 1)
-        return points, _unit(self.signs(pairs(us, vs)).reshape(*points.shape[:2], 1) * np.cross(su, sv))
+        return points, unit(self.signs(pairs(us, vs)).reshape(*points.shape[:2], 1) * np.cross(su, sv))
 
     @cached_property
     def seeds(self) -> tuple[Array, Array]:
@@ -181,7 +182,3 @@ class Patch:
 def touched(net: Net, faces: Iterable[Face]) -> Array:
     """Knot cells of a net that faces touch, a mask."""
     return np.asarray(np.logical_or.reduce([face_region(net, face).inside for face in faces]))
-
-
-def _unit(vectors: Array) -> Array:
-    return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-300))

@@ -14,6 +14,7 @@ from mracad.inspect.seams import seams as measured
 from mracad.inspect.verdict import Finding, Layer
 from mracad.model.brep import Model
 from mracad.model.facts import Mass
+from mracad.model.sampling import length
 
 STEEPER = 0.01
 """Degrees by which the angle of a smooth seam must have grown to be no longer smooth: a reader lays curves anew."""
@@ -203,11 +204,7 @@ def _along(piece: Array, line: Array, slack: float) -> bool:
     square = np.maximum((chord**2).sum(axis=1), np.finfo(float).tiny)
     share = np.clip(((middle - start) * chord).sum(axis=1) / square, 0.0, 1.0)
     apart = np.linalg.norm(start + share[:, None] * chord - middle, axis=1).min()
-    return bool(apart <= max(_ALONG * _length(piece), 2.0 * slack))
-
-
-def _length(line: Array) -> float:
-    return float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum())
+    return bool(apart <= max(_ALONG * length(piece), 2.0 * slack))
 
 
 # Counts and sizes ------------------------------------------------------------------------------------------------
@@ -249,7 +246,7 @@ def topology(ref: Subject, new: Subject, unsewn: str) -> Layer:
 
 def _free(model: Model) -> float:
     """The length of all free edges, mm."""
-    return sum(_length(edge.points) for edge in model.edges if edge.free and len(edge.points))
+    return sum(length(edge.points) for edge in model.edges if edge.free and len(edge.points))
 
 
 def validity(ref: Subject, new: Subject) -> Layer:

@@ -1,0 +1,29 @@
+"""Vectors in space, many at once."""
+
+from __future__ import annotations
+
+import numpy as np
+
+Array = np.ndarray
+
+
+def cross(a: Array, b: Array) -> Array:
+    """Cross products of vectors ``(…, 3)``: those of numpy, whose general treatment of axes costs more than they."""
+    i, j = [1, 2, 0], [2, 0, 1]
+    return np.asarray(a[..., i] * b[..., j] - a[..., j] * b[..., i])
+
+
+def unit(vectors: Array) -> Array:
+    """Vectors ``(…, 3)`` of length 1; a vanishing one stays zero."""
+    return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-300))
+
+
+def between(one: Array, two: Array) -> Array:
+    """Angles between vectors ``(q, 3)``."""
+    return np.asarray(np.arctan2(np.linalg.norm(cross(one, two), axis=1), (one * two).sum(axis=1)))
+
+
+def across(vectors: Array, along: Array) -> Array:
+    """The part of vectors ``(q, 3)`` across directions ``along``."""
+    along = unit(along)
+    return np.asarray(vectors - (vectors * along).sum(axis=1, keepdims=True) * along)
