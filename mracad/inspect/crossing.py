@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from itertools import pairwise
 
 import numpy as np
 
@@ -85,8 +86,8 @@ def _near(spots: Array, parts: Array) -> Iterable[Array]:
     starts, ends = np.concatenate([[0], breaks]), np.concatenate([breaks, [len(which)]])
     position = np.arange(len(which))
     partners = np.repeat(ends, ends - starts) - position - 1  # members of the cell after this one
-    limits = np.searchsorted(np.cumsum(partners), np.arange(0, partners.sum() + _BLOCK, _BLOCK))
-    for begin, end in zip(limits[:-1], np.append(limits[1:-1], len(which)), strict=True):
+    limits = np.searchsorted(np.cumsum(partners), np.arange(0, partners.sum(), _BLOCK))
+    for begin, end in pairwise([*limits.tolist(), len(which)]):
         count = partners[begin:end]
         a = np.repeat(position[begin:end], count)
         b = a + 1 + np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)

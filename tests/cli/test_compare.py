@@ -8,10 +8,8 @@ import numpy as np
 import pytest
 from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox, BRepPrimAPI_MakeCylinder
 
-from mracad.bspline.closest import distances
-from mracad.occ.step import read_step, write_step
+from mracad.occ.step import write_step
 from mracad.occ.units import UNITS, Units
-from mracad.occ.view import view
 from tests.occ import shapes
 
 SAMPLES = ("assembly", "blade", "bottle", "trimmed")
@@ -156,17 +154,6 @@ def test_reports(mracad, samples, tmp_path):
     assert mracad("compare", *words).code == 2  # they exist
     assert mracad("compare", *words, "--overwrite").code == 1
     assert mracad("compare", *words[:2], "--max-deviation", "nonsense").code == 2
-
-
-def test_nearest_points_are_exact_on_every_kind_of_net(samples):
-    for name in ("panel", "bottle", "blade"):
-        model = view(read_step(samples / f"{name}.step"))
-        net = model.surfaces[0].net
-        grid = [np.linspace(*k.domain, 14)[1:-1] for k in (net.u, net.v)]
-        uv = np.stack(np.meshgrid(*grid), -1).reshape(-1, 2)
-        height = 1e-4 * model.diagonal
-        off = distances(net, net.evaluate(uv) + height * net.normals(uv))
-        assert np.abs(off - height).max() < 1e-9 * height
 
 
 def test_wrong_units_are_corrected_on_either_side(mracad, samples, tmp_path):
