@@ -79,3 +79,25 @@ class Smooth(Fitting, frozen=True, kw_only=True, forbid_unknown_fields=True):
         super().__post_init__()
         if (self.scale is None) == (self.level is None):
             raise UsageError("smooth needs either a scale or a level", "give --scale 5mm, --scale 2% or --level 2.5")
+
+
+class OffsetFaces(Fitting, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Move NURBS faces along their normals by a length, with the seams between them and their free edges."""
+
+    function: ClassVar[str] = "mracad.edit.offset:offset"
+
+    distance: Annotated[Length | None, Meta(description="How far outward (a length).")] = None
+    inward: Annotated[bool, Meta(description="Move them inward instead.")] = False
+
+    @property
+    def done(self) -> str:
+        return f"offset {'inward' if self.inward else 'outward'} by {self.distance}"
+
+    @property
+    def quiet(self) -> str:
+        return "left as they are"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.distance is None:
+            raise UsageError("distance: it is not said how far", "give --distance 2mm")

@@ -1,0 +1,107 @@
+"""Offsets: faces moved along their outward normals by a length, with the seams between them.
+
+The wish is δ = d n at the Greville points; free edges and poles go along, and beside what is held it fades.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from mracad.bspline.fit import Knots, divided, middles, missing, offsets_over, spans, through
+from mracad.bspline.surface import Net, pairs
+from mracad.edit.result import Edit
+from mracad.edit.target import Sheet, stiffness
+from mracad.edit.whole import edited
+from mracad.model.brep import Model
+from mracad.seam.interface import Joints
+from mracad.seam.ladders import Creases
+from mracad.seam.solve import Problem
+from mracad.seam.space import MOST_POINTS
+from mracad.spec.quantity import length
+from mracad.spec.select import Scope
+from mracad.spec.steps.smooth import OffsetFaces
+
+Array = np.ndarray
+
+MISSED, LEAST = 1e-4, 0.25
+"""Shares of the distance: by which splines may miss it, and to which their spans are divided at least."""
+
+FADE = 8.0
+"""Distances within which an offset fades beside what is held: a face is tilted by 13° at most there."""
+
+
+@dataclass(frozen=True)
+class Outward:
+    """The wish of an offset.
+
+    Attributes
+    ----------
+    distance : float
+        Along outward normals, mm.
+    refine : bool
+        Whether knots may be set where splines through d n need them.
+    """
+
+    distance: float
+    refine: bool = True
+    spread: ClassVar[float] = math.inf
+    fairs: ClassVar[bool] = False
+
+    def wavelength(self, net: Net, creases: Creases) -> float:
+        """Within which it fades, mm."""
+        return FADE * abs(self.distance)
+
+    def space(self, net: Net) -> Net:
+        """The surface with spans divided until splines through d n miss it by next to nothing."""
+
+        def more(knots: Knots) -> Sequence[Array]:
+            uv, fine = middles(*knots), net.over(*knots)
+            delta = offsets_over(net, knots, through(fine, self._offsets(fine)))
+            sites = [(uv, spans(kv, uv[:, axis])) for axis, kv in enumerate(knots)]
+            size = abs(self.distance)
+            extra = missing(net, delta, sites, lambda at: self._moved(net, at), MISSED * size, (LEAST * size,) * 2)
+            points = math.prod(kv.count + len(each) for kv, each in zip(knots, extra, strict=True))
+            return extra if points <= MOST_POINTS else ()
+
+        return net.over(*divided((net.u, net.v), more)) if self.refine else net
+
+    def target(self, problem: Problem, sheets: Mapping[int, Sheet], joined: Joints) -> Array:
+        """d n, ``(points, 3)``."""
+        found = []
+        for i, space in problem.spaces.items():
+            sign = -1.0 if sheets[i].faces[0].reversed else 1.0
+            found.append(sign * through(space.net, self._offsets(space.net)).reshape(-1, 3))
+        return np.concatenate(found)
+
+    def _offsets(self, net: Net) -> Array:
+        """d n at the Greville points, ``(nu, nv, 3)``; where there is no normal, none."""
+        return self._moved(net, pairs(net.u.greville(), net.v.greville())).reshape(net.poles.shape)
+
+    def _moved(self, net: Net, uv: Array) -> Array:
+        return np.asarray(self.distance * np.nan_to_num(net.normals(uv)))
+
+    def ways(self, problem: Problem, target: Array, width: float) -> Iterable[Iterable[Array]]:
+        """The nearest that seams allow; beside what is held, faded."""
+        if problem.rimmed:
+            target = problem.fading(width) * target
+        yield [problem.nearest(target, stiff, beyond=True) for stiff in (0.0, stiffness(width / 8))]
+
+
+def offset(
+    model: Model,
+    options: OffsetFaces,
+    *,
+    scope: Scope | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> Edit:
+    """Move the NURBS faces of a model along their normals; parameters and errors as for
+    :func:`mracad.edit.whole.edited`."""
+    assert options.distance is not None
+    distance = length(options.distance, model.diagonal, "distance")
+    wish = Outward(-distance if options.inward else distance, options.refine == "auto")
+    return edited(model, options, wish, scope, progress)
