@@ -4,11 +4,11 @@ import json
 
 import numpy as np
 import pytest
+from mracad.constraint.cause import Still
 from mracad_cli.__main__ import main
 from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox, BRepPrimAPI_MakeSphere, BRepPrimAPI_MakeTorus
 
 from mracad.bspline.surface import pairs
-from mracad.constraint.cause import Still
 from mracad.edit.offset import offset
 from mracad.errors import UsageError
 from mracad.inspect.seams import seams
