@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 from OCP.BRep import BRep_Tool
 from OCP.Geom import Geom_BSplineSurface
@@ -22,11 +21,8 @@ from OCP.TopTools import TopTools_IndexedMapOfShape
 from OCP.XCAFDoc import XCAFDoc_DocumentTool, XCAFDoc_ShapeTool
 
 from mracad.errors import FileError
-from mracad.occ.labels import components, label_colour, label_key, label_name, labels, usages
+from mracad.occ.labels import Title, components, label_colour, label_key, label_name, labels, usages
 from mracad.occ.units import Units, metres
-
-if TYPE_CHECKING:
-    from mracad.occ.titles import Title
 
 
 @dataclass(eq=False)

@@ -13,6 +13,20 @@ from OCP.TopLoc import TopLoc_Location
 from OCP.XCAFDoc import XCAFDoc_ColorTool, XCAFDoc_ColorType, XCAFDoc_ShapeTool
 
 
+@dataclass(frozen=True)
+class Title:
+    """What a file says of a product or an instance; an identifier of None is a number that is free."""
+
+    identifier: str | None
+    name: str
+    description: str = ""
+
+    @property
+    def shown(self) -> str:
+        """The name, or else the identifier."""
+        return self.name if self.name.strip() else self.identifier or ""
+
+
 def label_key(label: TDF_Label) -> str:
     """A text that names a label within its document."""
     tags = []

@@ -6,8 +6,8 @@ import itertools
 import re
 from collections.abc import Iterator, Mapping
 
+from mracad.occ.labels import Title
 from mracad.occ.literals import decoded, encoded, escaped
-from mracad.occ.titles import Title
 
 _STYLES = b" = MECHANICAL_DESIGN_GEOMETRIC_PRESENTATION_REPRESENTATION("
 _ENTITY = re.compile(rb"#(\d+) = (?:[^';]|'[^']*')*;\n")

@@ -10,13 +10,12 @@ import itertools
 import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
 
 from OCP.TDataStd import TDataStd_Name
 from OCP.TDF import TDF_Label
 
 from mracad.occ.document import Document
-from mracad.occ.labels import components, label_key, label_name, labels, name_label
+from mracad.occ.labels import Title, components, label_key, label_name, labels, name_label
 from mracad.occ.literals import decoded
 
 _STRING = rb"'([^']*+(?:''[^']*+)*+)'"
@@ -26,20 +25,6 @@ _STATED = tuple(  # each begins with its word, for which the text is searched fa
 )
 _WORD = re.compile(rb"[A-Z]+(?:_[A-Z]+)*")
 _MARK = "mracad title "
-
-
-@dataclass(frozen=True)
-class Title:
-    """What a file says of a product or an instance; an identifier of None is a number that is free."""
-
-    identifier: str | None
-    name: str
-    description: str = ""
-
-    @property
-    def shown(self) -> str:
-        """The name, or else the identifier."""
-        return self.name if self.name.strip() else self.identifier or ""
 
 
 def marked(text: bytes) -> tuple[bytes, list[Title]]:
