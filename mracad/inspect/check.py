@@ -179,16 +179,11 @@ def tolerances(model: Model, validity: Validity, limit: float | None) -> Layer:
 def mesh(found: Triangles, open_faces: set[int]) -> Layer:
     """Whether the mesh of what is closed is watertight."""
     findings = [Finding("no-mesh", (face,)) for face in found.missing]
-    sides = unpaired(found.corners)
-    faces = np.repeat(found.faces, 3)
-    ends = np.sort(
-        np.concatenate([found.corners[:, [i, (i + 1) % 3]] for i in range(3)], axis=1).reshape(-1, 2), axis=1
-    )
     lookup: dict[tuple[int, int], set[int]] = defaultdict(set)
-    for (a, b), face in zip(ends.tolist(), faces.tolist(), strict=True):
+    for (a, b), face in zip(np.sort(found.sides, axis=1).tolist(), np.repeat(found.faces, 3).tolist(), strict=True):
         lookup[a, b].add(face)
     holes: dict[tuple[int, ...], tuple[float, float, float]] = {}
-    for a, b in np.sort(sides, axis=1).tolist():
+    for a, b in np.sort(unpaired(found.sides), axis=1).tolist():
         owners = lookup[a, b]
         if not owners <= open_faces:
             x, y, z = found.points[[a, b]].mean(axis=0).tolist()

@@ -11,9 +11,8 @@ Array = np.ndarray
 _BLOCK = 200_000  # pairs of triangles looked at in one go
 
 
-def unpaired(corners: Array) -> Array:
-    """Sides ``(k, 2)`` of triangles that are not used exactly once in each direction."""
-    sides = np.concatenate([corners[:, [i, (i + 1) % 3]] for i in range(3)])
+def unpaired(sides: Array) -> Array:
+    """Those of the sides ``(k, 2)`` of triangles that are not there exactly once in each direction."""
     unique, counts = np.unique(sides, axis=0, return_counts=True)
     known = {tuple(side): count for side, count in zip(unique.tolist(), counts.tolist(), strict=True)}
     bad = [(a, b) for (a, b), count in known.items() if count != 1 or known.get((b, a)) != 1]

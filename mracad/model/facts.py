@@ -176,6 +176,11 @@ class Triangles:
     parts: Array
     missing: tuple[int, ...]
 
+    @property
+    def sides(self) -> Array:
+        """The sides of the triangles as point numbers, three after three, ``(3 m, 2)``."""
+        return np.asarray(self.corners[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2))
+
 
 @dataclass(frozen=True)
 class Stated:

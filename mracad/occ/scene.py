@@ -109,7 +109,7 @@ class _Bodies:
 
 def _open(document: Document, mesh: Triangles) -> tuple[int, ...]:
     """Faces of closed solids at which a side of a triangle is not met by one the other way round."""
-    sides = mesh.corners[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    sides = mesh.sides
     keys = sides.min(axis=1) * len(mesh.points) + sides.max(axis=1)
     _, place = np.unique(keys, return_inverse=True)
     unmet = np.bincount(place, np.where(sides[:, 0] < sides[:, 1], 1.0, -1.0))[place] != 0

@@ -75,7 +75,7 @@ def triangles(document: Document, chord: float | None = None, angle: float | Non
 def _folds(mesh: Triangles) -> int:
     """How many sides of triangles are there more than once in one direction: the kernel's default now and then folds a
     mesh over itself."""
-    sides = mesh.corners[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    sides = mesh.sides
     return len(sides) - len(np.unique(sides[:, 0] * len(mesh.points) + sides[:, 1]))
 
 
