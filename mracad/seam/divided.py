@@ -17,7 +17,7 @@ import numpy as np
 
 from mracad.seam.constrained import LEAST, MET, MOST
 from mracad.seam.factor import Definite
-from mracad.seam.strips import Layout, coloured
+from mracad.seam.strips import Division, Layout, coloured
 
 Array = np.ndarray
 
@@ -108,11 +108,7 @@ class Divided:
         More of A.
     rows : scipy.sparse matrix (conditions, points)
     free : ndarray of bool (points,)
-    layout : Layout
-    joined : mapping
-        See :func:`mracad.seam.strips.joints`.
-    strips : sequence of ndarray of int
-        See :func:`mracad.seam.strips.strips`.
+    division : Division
     """
 
     def __init__(
@@ -122,12 +118,11 @@ class Divided:
         soft: Any,
         rows: Any,
         free: Array,
-        layout: Layout,
-        joined: dict[tuple[int, int], Array],
-        strips: Sequence[Array],
+        division: Division,
     ) -> None:
         from scipy.sparse import csr_array, diags_array, vstack
 
+        layout, strips = division.layout, division.strips
         self.size = len(free)
         diagonal = diagonal if soft is None else diagonal + soft.diagonal()
         self.scale = free / np.sqrt(diagonal + LEAST * diagonal[free].max(initial=0.0) + 1e-300)
@@ -138,7 +133,7 @@ class Divided:
         self.rows = (diags_array(1.0 / self.length) @ rows[self.there]).tocsr()
         self.rows.eliminate_zeros()
         tied, near = np.zeros(self.size, bool), np.zeros(self.size, bool)
-        for marked, sets in ((tied, joined.values()), (near, strips)):
+        for marked, sets in ((tied, division.joined.values()), (near, strips)):
             for points in sets:
                 marked[points] = True
         apart = None if soft is None else diags_array(self.scale) @ _apart(soft, layout) @ diags_array(self.scale)

@@ -27,7 +27,7 @@ from mracad.bspline.surface import Net
 from mracad.seam.constrained import Constrained
 from mracad.seam.divided import Divided
 from mracad.seam.energy import Forms
-from mracad.seam.strips import Layout, joints, strips
+from mracad.seam.strips import Division, Layout, joints, strips
 
 Array = np.ndarray
 
@@ -225,7 +225,7 @@ class Problem:
             if along is not None:
                 diagonals = [each.diagonal() for each in (self.mass, self.bending, self.creases)]
                 diagonal = diagonals[0] + stiffness * (diagonals[1] + diagonals[2])
-                return Divided(parts, diagonal, soft, self.rows, free, layout, joined, along)
+                return Divided(parts, diagonal, soft, self.rows, free, Division(layout, joined, along))
         form = Blocks(list(parts)).tocsr()
         return Constrained(form if soft is None else form + soft, self.rows, free)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -33,6 +33,24 @@ class Layout:
     def owner(self) -> Array:
         """Number of the surface of each point, ``(points,)``."""
         return np.repeat(np.arange(len(self.reach)), np.diff(self.ends))
+
+
+@dataclass(frozen=True, eq=False)
+class Division:
+    """What surfaces are solved in.
+
+    Attributes
+    ----------
+    layout : Layout
+    joined : mapping of (int, int) to ndarray of int
+        See :func:`joints`.
+    strips : sequence of ndarray of int
+        See :func:`strips`.
+    """
+
+    layout: Layout
+    joined: Mapping[tuple[int, int], Array]
+    strips: Sequence[Array]
 
 
 def joints(layout: Layout, rows: Any, soft: Any, free: Array) -> dict[tuple[int, int], Array]:
