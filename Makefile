@@ -62,9 +62,10 @@ bench: $(VENV)/dev
 bench-batch: $(VENV)/dev
 	$(BIN)/python benchmarks/batch.py
 
-# The page of steps, from their declaration
+# The page of steps, from their declaration, and the picture of the rooms, from the imports
 docs: $(VENV)/ready
 	$(BIN)/python -c 'from mracad.spec.schema import page; print(page(), end="")' > docs/steps.md
+	$(BIN)/python docs/house.py > docs/house.svg
 
 samples: $(VENV)/ready
 	$(BIN)/python samples/make.py samples

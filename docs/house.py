@@ -17,7 +17,8 @@ WIDTH, HEIGHT, GAP, ROW = 128, 34, 26, 92
 
 def layers() -> list[list[str]]:
     """The rooms, row by row, as the contract on imports has them."""
-    contracts = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["importlinter"]["contracts"]
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    contracts = project["tool"]["importlinter"]["contracts"]
     rows = next(each["layers"] for each in contracts if each["name"] == "Arrows go down")
     return [[room.strip() for room in row.replace(":", "|").split("|")] for row in rows]
 
@@ -53,17 +54,18 @@ def svg(rows: list[list[str]], arrows: dict[str, set[str]]) -> str:
         left = (wide - step * (len(row) - 1) - WIDTH) / 2
         at |= {room: (left + k * step, GAP + down * ROW) for k, room in enumerate(row)}
     lines = [
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {wide} {len(rows) * ROW + GAP}" font-family="sans-serif">',
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {wide} {len(rows) * ROW + GAP}" '
+        'font-family="sans-serif">',
         '<defs><marker id="tip" viewBox="0 0 8 8" refX="8" refY="4" markerWidth="7" markerHeight="7" orient="auto">'
         '<path d="M0 0L8 4L0 8z" fill="#667"/></marker></defs>',
         '<rect width="100%" height="100%" fill="#fff"/>',
     ]
-    for room, (x, y) in at.items():
-        for to in sorted(arrows[room]):
-            lines.append(
-                f'<line x1="{x + WIDTH / 2:g}" y1="{y + HEIGHT}" x2="{at[to][0] + WIDTH / 2:g}" y2="{at[to][1] - 1}" '
-                'stroke="#667" marker-end="url(#tip)"/>'
-            )
+    lines += [
+        f'<line x1="{x + WIDTH / 2:g}" y1="{y + HEIGHT}" x2="{at[to][0] + WIDTH / 2:g}" y2="{at[to][1] - 1}" '
+        'stroke="#667" marker-end="url(#tip)"/>'
+        for room, (x, y) in at.items()
+        for to in sorted(arrows[room])
+    ]
     for room, (x, y) in at.items():
         lines.append(f'<rect x="{x:g}" y="{y}" width="{WIDTH}" height="{HEIGHT}" rx="5" fill="#e8eef6" stroke="#456"/>')
         name = room.removeprefix("mracad.")
