@@ -4,7 +4,6 @@ import json
 
 import numpy as np
 import pytest
-from mracad.constraint.cause import Still
 from mracad_cli.__main__ import main
 from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox, BRepPrimAPI_MakeSphere, BRepPrimAPI_MakeTorus
 
@@ -14,6 +13,7 @@ from mracad.errors import UsageError
 from mracad.inspect.seams import seams
 from mracad.occ.step import read_step
 from mracad.occ.view import view
+from mracad.seam.cause import Still
 from mracad.spec.steps.smooth import OffsetFaces
 from tests import zoo
 from tests.edit import halves
