@@ -225,7 +225,7 @@ def _edges(document: Document, found: _Found, edges: Container[int] | None) -> I
             if not seen[index] or (lost[index] and found.surface_of[use.face] is None):
                 sides.append(Side(use.face, points=_NONE, normals=_NONE))
             elif found.surface_of[use.face] is None:
-                feet, normals, bends = beside[id(use)]
+                feet, normals, bends = beside[use]
                 sides.append(Side(use.face, points=feet, normals=normals, curvatures=bends))
             else:
                 sides.append(Side(use.face, uv=_parameters(use)))
@@ -253,9 +253,11 @@ def _along(edge: TopoDS_Edge) -> tuple[Array, Array]:
     return table[:, :3], unit(table[:, 3:])
 
 
-def _beside(found: _Found, uses: list[_Use], along: list[tuple[Array, Array]]) -> dict[int, tuple[Array, Array, Array]]:
-    """Points, outward normals and curvatures across an edge of faces that do not move, by the ``id`` of their uses."""
-    sides: dict[int, tuple[Array, Array, Array]] = {}
+def _beside(
+    found: _Found, uses: list[_Use], along: list[tuple[Array, Array]]
+) -> dict[_Use, tuple[Array, Array, Array]]:
+    """Points, outward normals and curvatures across an edge of faces that do not move, by their uses."""
+    sides: dict[_Use, tuple[Array, Array, Array]] = {}
     grounds = {face: BRepAdaptor_Surface(found.faces[face], False) for face in {use.face for use in uses}}
     signs = {face: -1.0 if found.faces[face].Orientation() == TopAbs_REVERSED else 1.0 for face in grounds}
     bent, jets = [], []
@@ -266,7 +268,7 @@ def _beside(found: _Found, uses: list[_Use], along: list[tuple[Array, Array]]) -
             origin = np.array(plane.Location().Coord())
             normal = np.array(plane.Axis().Direction().Coord()) * signs[use.face] * (1.0 if plane.Direct() else -1.0)
             feet = points - ((points - origin) @ normal)[:, None] * normal
-            sides[id(use)] = feet, np.tile(normal, (SAMPLES, 1)), np.zeros(SAMPLES)
+            sides[use] = feet, np.tile(normal, (SAMPLES, 1)), np.zeros(SAMPLES)
         else:
             bent.append(use)
             jets.append(_jets(surface, _parameters(use)))
@@ -277,7 +279,7 @@ def _beside(found: _Found, uses: list[_Use], along: list[tuple[Array, Array]]) -
         tangents = np.concatenate([along[use.edge][1] for use in bent])
         bends = sign * curvature((su, sv, *second), cross(normals, tangents))
         split = (np.split(values, len(bent)) for values in (feet, sign[:, None] * normals, bends))
-        sides |= {id(use): side for use, side in zip(bent, zip(*split, strict=True), strict=True)}
+        sides |= dict(zip(bent, zip(*split, strict=True), strict=True))
     return sides
 
 
