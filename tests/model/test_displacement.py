@@ -6,7 +6,7 @@ import pytest
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
 from mracad.model.brep import Face, Model, Surface
-from mracad.model.displacement import Displacement, Offset
+from mracad.model.displacement import Displacement, Offset, lifted
 from mracad.model.sampling import between, hermite, shares
 
 QUARTER = np.array([[0.0, -1, 0, 5], [1, 0, 0, 6], [0, 0, 1, 7], [0, 0, 0, 1]])
@@ -67,3 +67,20 @@ def test_cubics_are_interpolated_exactly():
     wanted = np.concatenate([at**3, 1 - at, at**2], axis=1)
     np.testing.assert_allclose(hermite(values, rates, segment, s), wanted, atol=1e-12)
     np.testing.assert_allclose(hermite(values[None], rates[None], segment, s)[0], wanted, atol=1e-12)
+
+
+def test_offsets_over_finer_knots_and_higher_degrees_are_the_same_surface():
+    rng = np.random.default_rng(3)
+    k = KnotVector.clamped(np.linspace(0, 1, 4), 2)
+    own = Net(k, k, rng.normal(size=(5, 5, 3)), 1 + rng.random((5, 5)))
+    fine = own.over(k.elevated(3).refined([0.1, 0.1]), k.refined([0.7]))
+    poles = rng.normal(size=own.poles.shape)
+    uv = rng.random((50, 2))
+    moved = lifted(own, fine, poles)
+    wanted = Net(k, k, poles, own.weights).evaluate(uv)
+    assert np.abs(Net(fine.u, fine.v, moved, fine.weights).evaluate(uv) - wanted).max() < 1e-12
+    assert lifted(own, own, poles) is poles
+    offset = Offset.of(own, fine, moved)
+    assert offset.degrees == (3, 2) and offset.u_knots.tolist() == [0.1, 0.1] and offset.v_knots.tolist() == [0.7]
+    again = offset.over(own)
+    assert (again.u, again.v) == (fine.u, fine.v)

@@ -8,9 +8,10 @@ from mracad.bspline.gram import gram
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.refine import refinement
 from mracad.bspline.rows import LARGE
+from mracad.bspline.surface import Net
 from mracad.errors import UsageError
 from mracad.wavelet.ladder import rungs_by_level
-from mracad.wavelet.project import projection
+from mracad.wavelet.project import at_scale, band, projection
 from tests.bspline.spaces import random_knots
 from tests.wavelet.pairs import pairs
 
@@ -137,3 +138,18 @@ def test_large_arrays():
         c = np.random.default_rng(0).standard_normal((LARGE // 10, fine.count, 3))
         parts = [s.apply(part, 1) for part in np.array_split(c, 20)]
         np.testing.assert_allclose(s.apply(c, 1), np.concatenate(parts), atol=1e-12)
+
+
+def test_a_net_at_a_scale_and_the_band_between_two():
+    """A coarse wave stays, a fine one goes; bands add up to what was taken away."""
+    k = KnotVector.clamped(np.linspace(0.0, 100.0, 101), 3)
+    x, y = np.meshgrid(k.greville(), k.greville(), indexing="ij")
+    net = Net(k, k, np.stack([x, y, np.sin(2 * np.pi * x / 60) + np.sin(2 * np.pi * y / 4)], axis=-1))
+    uv = np.random.default_rng(0).uniform(15, 85, (400, 2))
+    left = at_scale(net, 20.0).evaluate(uv)[:, 2] - np.sin(2 * np.pi * uv[:, 0] / 60)
+    assert np.abs(left).max() < 0.05
+    coarse, middle = band(net, 8.0, 20.0)
+    _, fine = band(net, 0.0, 8.0)
+    assert np.abs(coarse.poles + middle.poles + fine.poles - net.poles).max() < 1e-10
+    kept = at_scale(net, 20.0, (frozenset(k.breaks.tolist()), frozenset()))
+    assert kept.u == k and np.abs(kept.poles[..., 2].mean(axis=1) - net.poles[..., 2].mean(axis=1)).max() < 0.05
