@@ -80,7 +80,7 @@ def by_content(data: bytes, name: str) -> Format:
         return FORMATS["binbrep"]
     if start[72:73] == b"S" and start[73:80].strip().isdigit():
         return FORMATS["iges"]
-    raise FileError(f"'{name}' is none of STEP, IGES, BREP and BinBREP", "export it as one of them")
+    raise FileError(f"'{name}' is not a STEP, IGES, BREP or BinBREP file", "export it as one of them")
 
 
 _GEOMETRY_ONLY = frozenset({"assembly", "names", "colours", "layers", "materials", "annotations"})

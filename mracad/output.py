@@ -90,7 +90,9 @@ def put(data: bytes, target: str | os.PathLike | BinaryIO, prefix: str = PREFIX)
         target.write(data)
         target.flush()
     except OSError as error:
-        raise FileError(f"cannot write the output: {error.strerror or error}", "check where it leads") from error
+        raise FileError(
+            f"cannot write the output: {error.strerror or error}", "check where standard output goes"
+        ) from error
 
 
 def holds(path: Path, data: bytes) -> bool:

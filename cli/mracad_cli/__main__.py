@@ -16,6 +16,7 @@ from mracad.job.wire import internal
 from mracad.spec.fields import nearest
 from mracad_cli import commands
 from mracad_cli.command import Group, run
+from mracad_cli.say import json_text, say
 from mracad_cli.steps import edit_command, edits
 
 
@@ -69,8 +70,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         failure = MracadError("interrupted", "nothing was written", Code.INTERRUPTED)
     except MemoryError as error:
         failure = internal(error)
-    from mracad_cli.render.json import json_text
-    from mracad_cli.render.text import say
 
     if "--json" in words:
         body = {"code": int(failure.code), "message": failure.message, "hint": failure.hint}

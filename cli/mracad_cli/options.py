@@ -173,13 +173,13 @@ path = click.Path()
 input_unit = click.option(
     "--input-unit",
     metavar="UNIT",
-    help="Length unit of the file's numbers, where it names a wrong one: mm, m, in …",
+    help="Length unit of the file, if it states a wrong one: mm, m, in …",
 )
 encoding = click.option(
     "--encoding",
     metavar="NAME",
-    help="Character set of the file's texts: utf-8, gb18030, cp932, latin-1 …  [default: UTF-8 where that fits, else "
-    "the most likely one]",
+    help="Character set of the texts in the file: utf-8, gb18030, cp932, latin-1 …  [default: UTF-8 if that fits, "
+    "else the most likely one]",
 )
 schema = click.option(
     "--schema",
@@ -188,7 +188,9 @@ schema = click.option(
 )
 overwrite = click.option("--overwrite", is_flag=True, help="Replace an existing output.")
 if_changed = click.option(
-    "--if-changed", is_flag=True, help="Replace an existing output only where its content changes, as make likes it."
+    "--if-changed",
+    is_flag=True,
+    help="Replace an existing output only if its content changes, so that make sees no change.",
 )
 verify = click.option(
     "--verify",
@@ -196,7 +198,7 @@ verify = click.option(
     default="on",
     show_default=True,
     callback=lambda ctx, param, value: value == "on",
-    help="Read outputs back before they take their place, and judge them; off: write them as they come.",
+    help="Read each output back and check it before it is put in place; off: write without checking.",
 )
 depfile = click.option("--depfile", metavar="F.d", type=path, help="Write what the outputs depend on, for make.")
 record = click.option(
@@ -267,7 +269,7 @@ editing = gathered(
 reports = gathered(
     "reports",
     Reports,
-    click.option("--junit", metavar="F.xml", type=path, help="Write the verdict as JUnit, a case a layer."),
+    click.option("--junit", metavar="F.xml", type=path, help="Write the verdict as JUnit, one case per layer."),
     click.option("--sarif", metavar="F.sarif", type=path, help="Write the findings as SARIF."),
     click.option("--overwrite", is_flag=True, help="Replace existing reports."),
 )
@@ -288,14 +290,14 @@ printing = apply(
         type=Quantity(TIME),
         expose_value=False,
         callback=_kept,
-        help="End the command after this time (90s, 10min): exit code 5.",
+        help="Time limit of the command: 90s, 10min. Exit code 5 beyond it.",
     ),
     click.option(
         "--memory-limit",
         type=Quantity(MEMORY),
         expose_value=False,
         callback=_kept,
-        help="Memory that the command may hold: 500MB, 2GB.",
+        help="Memory limit of the command: 500MB, 2GB.",
     ),
     debug,
 )

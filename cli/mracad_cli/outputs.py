@@ -12,7 +12,7 @@ from mracad import note
 from mracad.errors import FileError, UsageError
 from mracad.formats import FORMATS, by_ending
 from mracad_cli.options import Reading, Reports, Writing
-from mracad_cli.render.text import say
+from mracad_cli.say import json_text, say
 
 if TYPE_CHECKING:
     from mracad.job.judge import Judged
@@ -140,8 +140,8 @@ def deliver_verdict(judged: Judged, command: str, reports: Reports) -> int:
 
     found = judged.verdict, judged.failed
     files = {reports.junit: junit.verdict(*found, command)} if reports.junit else {}
-    files |= {reports.sarif: json.json_text(sarif.verdict(*found, command), 1) + "\n"} if reports.sarif else {}
-    deliver(files, [json.json_text(json.verdict(*found))] if reports.as_json else text.verdict_lines(*found))
+    files |= {reports.sarif: json_text(sarif.verdict(*found, command), 1) + "\n"} if reports.sarif else {}
+    deliver(files, [json_text(json.verdict(*found))] if reports.as_json else text.verdict_lines(*found))
     return 0 if judged.passed else 1
 
 

@@ -15,6 +15,7 @@ from mracad_cli.command import Command
 from mracad_cli.options import Editing, Reading, Writing
 from mracad_cli.outputs import check_outputs, deliver_models, depfile_text, load, read
 from mracad_cli.progress import Progress
+from mracad_cli.say import json_text
 
 if TYPE_CHECKING:
     from mracad.job.produce import Production, Target
@@ -66,13 +67,13 @@ def run_steps(
     records = {place: record_of(steps, place) for place in places}
     document, done = produced(reading, writing, [] if editing.dry_run else targets, steps, title(steps))
     body = _body(document.name, steps, done, recipe) | {"warnings": document.warnings, **json.written(done.made)}
-    files: dict[str, str | None] = {editing.report: json.json_text(body, 1) + "\n"} if editing.report else {}
+    files: dict[str, str | None] = {editing.report: json_text(body, 1) + "\n"} if editing.report else {}
     if done.made:
         files |= records
         needs = [reading.file, *needed(steps, recipe)]
         files |= {editing.depfile: depfile_text(writing.outputs, needs)} if editing.depfile else {}
     seconds = None if editing.dry_run else time.perf_counter() - start
-    lines = [json.json_text(body)] if editing.as_json else _lines(steps, done, recipe, seconds)
+    lines = [json_text(body)] if editing.as_json else _lines(steps, done, recipe, seconds)
     deliver_models(writing, done.made, files, lines)
     return 0 if done.passed else 1
 

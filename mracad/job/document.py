@@ -255,7 +255,7 @@ class _Left:
         if self.rounds > ROUNDS + 1:
             names = " ".join(f"#{face + 1}" for face in sorted(faces)[:6]) + (" …" if len(faces) > 6 else "")
             raise EditError(
-                f"{self.name}: {names} would come out worse, though {len(self.faces)} faces were left for that",
+                f"{self.name}: {names} would come out worse even with {len(self.faces)} other faces left as they are",
                 "leave them out with --faces '!#N', or use --amount 0.5",
             )
         if self.rounds > ROUNDS:
@@ -309,7 +309,10 @@ def _refuse_if_asked(model: Model, result: Edit, named: Collection[int]) -> None
     left = [outcome for outcome in asked if outcome.status == "left"]
     if left and not any(outcome.status == "edited" for outcome in asked):
         names = " ".join(f"#{o.face + 1}" for o in left[:6]) + (" …" if len(left) > 6 else "")
-        raise EditError(f"{model.name}: {names}: {left[0].words}", "leave out what cannot be done, or all of --faces")
+        raise EditError(
+            f"{model.name}: {names}: {left[0].words}",
+            "leave these faces out, or give no --faces to edit what can be edited",
+        )
 
 
 def _named(result: Edit, spoiled: Mapping[int, Spoilt]) -> Edit:

@@ -78,7 +78,7 @@ def run(
         os.close(reader)
     if not finished:
         _end(child)
-        raise TimeLimitError(f"time limit of {seconds:g} s exceeded{note}", "give more with --time-limit")
+        raise TimeLimitError(f"time limit of {seconds:g} s exceeded{note}", "raise --time-limit")
     _, status, usage = os.wait4(child, 0)
     if asked and not data.startswith(wire.DONE):
         _terminated()
@@ -91,7 +91,9 @@ def run(
     raise CrashError(f"the CAD kernel crashed ({what}){note}", "the model may be damaged: see mracad check")
 
 
-_OUT_OF_MEMORY = ("failed to map segment", "error return without exception set", "bad_alloc")
+_OUT_OF_MEMORY = (
+    "failed to map segment", "error return without exception set", "bad_alloc", "Unable to create type object",
+)  # fmt: skip
 """What libraries say that ran out of memory: the loader, and compiled modules while they are loaded."""
 
 
@@ -203,4 +205,4 @@ def _peak(value: int) -> int:
 
 
 def _out_of_memory(memory: int) -> LimitError:
-    return LimitError(f"memory limit of {memory / 1e6:g} MB exceeded", "give more with --memory-limit")
+    return LimitError(f"memory limit of {memory / 1e6:g} MB exceeded", "raise --memory-limit")

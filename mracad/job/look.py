@@ -18,7 +18,7 @@ from mracad.spec.steps import Selection
 def looked_at(document: Document, options: Selection) -> tuple[Model, Scope]:
     """The view of a document for an edit, and what the edit may move.
 
-    Selected faces that are not NURBS are seen as such.  An instance is made a part of its own first.
+    Selected faces that are not NURBS are converted.  An instance is made a separate part first.
     """
     own = isolate(document, options.instance) if options.instance else None
     model = view(document)

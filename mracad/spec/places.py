@@ -115,7 +115,7 @@ def spot(text: str, name: str) -> Point | OnFace:
     face, at, rest = text.partition("@")
     found = numbers(rest, (2,)) if at else numbers(text.removeprefix("near:"), (3,))
     if found is None:
-        raise _wrong(name, text, PLACE)
+        raise _wrong(name, text, "a place", PLACE)
     return OnFace(face, found) if at else Point(found)
 
 
@@ -135,7 +135,7 @@ def feature(text: str, name: str) -> Disc | Rectangle | Stored:
         return Disc(spot(disc[1], name), radius)
     box = re.fullmatch(rf"(.+)@({NUMBER}):({NUMBER}),({NUMBER}):({NUMBER})", text.replace(" ", ""))
     if not box:
-        raise _wrong(name, text, FEATURE)
+        raise _wrong(name, text, "a feature", FEATURE)
     u0, u1, v0, v1 = map(float, box.groups()[1:])
     if not (u0 < u1 and v0 < v1):
         raise UsageError(f"{name}: the window {text} is empty", FEATURE)
@@ -152,7 +152,7 @@ def grid(text: str, name: str) -> Grid:
     match = re.fullmatch(r"\s*([0-9]+)\s*[xX]\s*([0-9]+)\s*,(.*)", text)
     steps = numbers(match[3], (2,)) if match else None
     if match is None or steps is None:
-        raise _wrong(name, text, GRID)
+        raise _wrong(name, text, "a grid", GRID)
     wide, high = (_count(match[i], name, text, GRID) for i in (1, 2))
     _count(str(wide * high), name, text, GRID)
     return Grid((wide, high), steps)
@@ -164,7 +164,7 @@ def polar(text: str, name: str) -> Polar:
     count = _count(first.strip(), name, text, POLAR)
     six = AXES.get(rest.strip().lower()) or numbers(rest, (6,))
     if six is None:
-        raise _wrong(name, text, POLAR)
+        raise _wrong(name, text, "a circle of places", POLAR)
     if not any(six[3:]):
         raise UsageError(f"{name}: {text!r} has no direction", POLAR)
     return Polar(count, six[:3], six[3:])
@@ -177,7 +177,7 @@ def along(text: str, name: str) -> Along:
     number = whole(edge.strip().removeprefix("edge#").removeprefix("#"))
     offset = numbers(last, (1,)) if comma else (0.0,)
     if number is None or offset is None:
-        raise _wrong(name, text, ALONG)
+        raise _wrong(name, text, "a row of places", ALONG)
     return Along(number, _count(first.strip(), name, text, ALONG), offset[0])
 
 
@@ -185,14 +185,14 @@ def _count(text: str, name: str, whole_text: str, hint: str) -> int:
     """How many places are asked for; raises UsageError."""
     count = whole(text)
     if not count:
-        raise _wrong(name, whole_text, hint)
+        raise _wrong(name, whole_text, "a number of places", hint)
     if count > MOST_PLACES:
         raise UsageError(f"{name}: {whole_text!r}: more than {MOST_PLACES} places", "do them in several edits")
     return count
 
 
-def _wrong(name: str, text: str, hint: str) -> UsageError:
-    return UsageError(f"{name}: {text!r} is not right", hint)
+def _wrong(name: str, text: str, noun: str, hint: str) -> UsageError:
+    return UsageError(f"{name}: {text!r} is not {noun}", hint)
 
 
 Place = Annotated[str, Naming(prefix="@"), place]

@@ -155,7 +155,7 @@ class Recipe:
             use = table.values.get("use")
             if not isinstance(use, str):
                 hint = f'write use = "{next(iter(STEPS))}"'
-                raise UsageError(f"{table.place('use')}: the step does not say what it uses", hint)
+                raise UsageError(f"{table.place('use')}: the step has no 'use'", hint)
             if use not in STEPS:
                 raise UsageError(f"{table.place('use')}: no step {use!r}", nearest(use, STEPS))
             known = [*OWN, *map(dashed, STEPS[use].__struct_fields__)]
@@ -166,7 +166,7 @@ class Recipe:
         for index, name in enumerate(self.ids):
             if name in self.ids[:index]:
                 place = self.tables[index].place("id")
-                raise UsageError(f"{place}: another step has the id {name!r}", "give it another")
+                raise UsageError(f"{place}: another step has the id {name!r}", "give one of them another id")
 
 
 def load(path: str | os.PathLike[str]) -> Recipe:

@@ -120,7 +120,7 @@ def select(
         text = word.removeprefix("!")
         if text.startswith("edge#"):
             if exclude:
-                raise UsageError(f"{word!r}: edges cannot be left out", "name the edges that are meant, as edge#4")
+                raise UsageError(f"{word!r}: edges cannot be left out", "name the edges to hold instead, as edge#4")
             edges.add(_number(text, text[5:], len(model.edges), "edges"))
             continue
         found = _faces(model, text, cadquery)

@@ -43,7 +43,7 @@ def options(struct: type[Given], values: Mapping[str, Any], place: Callable[[str
             plain[field.name] = field.read(value)
         for name, field in known.items():
             if field.default is msgspec.NODEFAULT and name not in plain:
-                raise UsageError(f"{dashed(name)}: it is missing", f"give --{dashed(name)}")
+                raise UsageError(f"{dashed(name)}: a value is missing", f"give --{dashed(name)}")
         return struct(**plain)
     except UsageError as error:
         if not place:

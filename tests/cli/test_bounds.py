@@ -11,13 +11,13 @@ COPIES = [
     (("--at", "5,7,0", "--size", "1e-9"), 4, "closer than"),
     (("--at", "@tiny.csv"), 4, "closer than"),
     (("--at", "5,7,0", "--spin", "inf"), 2, "spin"),
-    (("--at", "1e999,0,0"), 2, "not right"),
+    (("--at", "1e999,0,0"), 2, "not a place"),
     (("--polar", "3000000,z"), 2, "more than 10000 places"),
-    (("--polar", "²,z"), 2, "not right"),
-    (("--polar", "9" * 5000 + ",z"), 2, "not right"),
+    (("--polar", "²,z"), 2, "not a number of places"),
+    (("--polar", "9" * 5000 + ",z"), 2, "not a number of places"),
     (("--grid", "200x200,1,1"), 2, "more than 10000 places"),
     (("--along", "edge#1,3000000"), 2, "more than 10000 places"),
-    (("--along", "edge#²,2"), 2, "not right"),
+    (("--along", "edge#²,2"), 2, "not a row"),
 ]
 OTHERS = [
     (("smooth", "IN", "--scale", "4mm", "--faces", "#²", "--dry-run"), 2, "not a face number"),

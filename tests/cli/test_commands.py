@@ -27,7 +27,7 @@ def test_coupled_seams_move_and_are_counted(mracad, samples, tmp_path):
     out = tmp_path / "out.step"
     result = mracad("smooth", samples / "panel.step", "--scale", "16mm", "--edges", "coupled", "-o", out)
     assert result.code == 0
-    assert result.out.splitlines()[2].endswith("; 7 of 17 edges moved with both faces (not: 10 free edge)")
+    assert result.out.splitlines()[2].endswith("; 7 of 17 edges moved with both faces (stayed: 10 × free edge)")
     after = judge(out)
     assert after.validity.valid and len(after.seams) == 7
     assert max(m.gap for m in after.seams) <= 1e-9 and max(m.angle for m in after.seams) <= 1e-5

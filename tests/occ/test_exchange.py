@@ -117,7 +117,7 @@ def test_bad_inputs_say_what_is_wrong(wavy, tmp_path):
         "missing.step": (None, "no such file"),
         "empty.step": (b"", "empty"),
         "cut.step": (text[: len(text) // 2], "truncated"),
-        "notes.step": (b"dear diary", "none of STEP"),
+        "notes.step": (b"dear diary", "not a STEP"),
         "nothing.step": (shapes.save(lines, tmp_path / "x.step").read_bytes(), "no faces"),
         "garbled.step": (text.replace(b"B_SPLINE_SURFACE_WITH_KNOTS", b"B_SPLINE_SURFACE_WITH_NOTHING"), "no faces"),
     }

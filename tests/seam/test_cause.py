@@ -26,4 +26,4 @@ def test_reports_say_them_as_text():
     found = json.loads(json.dumps([treatment(edge) for edge in edges]))
     assert found[0] == {"edge": 1, "faces": [1, 2], "how": "frozen", "reason": "plane neighbour"}
     assert [each["reason"] for each in found[1:]] == ["plane neighbour", "free edge", ""]
-    assert edge_words(edges).endswith("(not: 2 plane neighbour, 1 free edge)")
+    assert edge_words(edges).endswith("(stayed: 2 × plane neighbour, 1 × free edge)")

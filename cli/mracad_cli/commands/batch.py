@@ -1,7 +1,7 @@
-"""Take many models through a recipe, each in a worker process within limits; done again, only what changed.
+"""Run a recipe on many models, each in a worker process with limits; run it again to do only what changed.
 
-IN are files, folders (all models below them) or patterns; - reads a list from standard input. A file that crashes
-its worker, hangs or takes too much memory fails alone. Exit code 1 when any file failed; run again to go on.
+IN are files, folders (all models below them) or patterns; - reads a list from standard input. If a file crashes its
+worker, hangs or needs too much memory, only that file fails. Exit code 1 if any file failed; run again to go on.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ from mracad_cli import options
 from mracad_cli.command import Unguarded
 from mracad_cli.outputs import check_reports, deliver, depfile_text
 from mracad_cli.progress import Progress
+from mracad_cli.say import json_text, say
 from mracad_cli.steps import needed, plan
 
 if TYPE_CHECKING:
@@ -61,7 +62,9 @@ _placing = options.gathered(
     "place",
     Place,
     click.option("-O", "--folder", metavar="DIR", required=True, type=options.path, help="Folder to write into."),
-    click.option("-j", "--jobs", type=click.IntRange(min=1), metavar="N", help="Workers.  [default: one a core]"),
+    click.option(
+        "-j", "--jobs", type=click.IntRange(min=1), metavar="N", help="Number of workers.  [default: one per core]"
+    ),
     click.option(
         "--cluster",
         metavar="ADDRESS",
@@ -97,7 +100,7 @@ _settings = options.gathered(
         default=0,
         show_default=True,
         metavar="N",
-        help="Try a file again after a crash or a limit.",
+        help="How often to try a file again after a crash or a limit.",
     ),
     options.input_unit,
     options.encoding,
@@ -114,7 +117,7 @@ _reports = options.gathered(
     click.option("--junit", metavar="F.xml", type=options.path, help="Write the summary as JUnit XML, for CI."),
     options.depfile,
     click.option("--dry-run", is_flag=True, help="List the steps and the files; do nothing."),
-    click.option("--json", "as_json", is_flag=True, help="Print each result as a JSON line when it is there."),
+    click.option("--json", "as_json", is_flag=True, help="Print each result as a JSON line as soon as it is ready."),
 )
 
 
@@ -127,7 +130,6 @@ def command(
 ) -> int:
     from mracad.job.batch.find import find
     from mracad.spec.recipe import load
-    from mracad_cli.render.json import json_text
 
     steps = load(recipe).with_values(assignments)
     steps.steps("model.step")  # what is wrong in it is said before anything is read
@@ -161,12 +163,12 @@ def _run(recipe: Recipe, items: Sequence[Item], place: Place, settings: Settings
     body: dict[str, Any] = {"recipe": recipe.name, "files": len(items), **counts, "seconds": seconds}
     files: dict[str, str] = {}
     if reports.report:
-        files[reports.report] = json.json_text({**body, "each": json.plain(outcomes)}, 1) + "\n"
+        files[reports.report] = json_text({**body, "each": json.plain(outcomes)}, 1) + "\n"
     if reports.junit:
         files[reports.junit] = junit.batch(recipe.name, outcomes, seconds)
     if reports.depfile:
         files[reports.depfile] = _depfile(recipe, items, Path(place.folder))
-    said = [json.json_text({"summary": body})] if reports.as_json else text.batch_lines(outcomes, seconds)
+    said = [json_text({"summary": body})] if reports.as_json else text.batch_lines(outcomes, seconds)
     deliver(files, said)
     return 1 if counts["failed"] else 0
 
@@ -175,8 +177,7 @@ def _outcomes(recipe: Recipe, items: Sequence[Item], place: Place, settings: Set
     """What became of the files, in the order in which they were done."""
     from mracad.job.batch.manifest import Manifest
     from mracad.job.batch.run import run
-    from mracad_cli.render.json import json_text, plain
-    from mracad_cli.render.text import say
+    from mracad_cli.render.json import plain
 
     outcomes: list[Outcome] = []
     failed = 0

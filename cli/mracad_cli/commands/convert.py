@@ -8,6 +8,7 @@ from mracad_cli import options
 from mracad_cli.command import Command
 from mracad_cli.options import Reading, Writing
 from mracad_cli.outputs import check_outputs, deliver_models
+from mracad_cli.say import json_text
 from mracad_cli.steps import produced
 
 
@@ -24,6 +25,6 @@ def command(reading: Reading, writing: Writing, as_json: bool) -> int:
     valid = f"valid: {found.words}; " if found else ""
     line = f"{document.name}: {valid}wrote {text.sizes(done.made)}, {time.perf_counter() - start:.1f} s"
     if as_json:
-        line = json.json_text({"file": document.name, "warnings": document.warnings, **json.written(done.made)})
+        line = json_text({"file": document.name, "warnings": document.warnings, **json.written(done.made)})
     deliver_models(writing, done.made, {}, [line])
     return 0

@@ -12,6 +12,7 @@ from mracad_cli import options
 from mracad_cli.command import Group
 from mracad_cli.options import Reading
 from mracad_cli.outputs import check_target, deliver, read
+from mracad_cli.say import json_text, say
 
 OTHERS = "instance hold keep edges"
 """Options of edits that nothing is edited with here."""
@@ -28,8 +29,8 @@ def list_(reading: Reading, chosen: Selection, as_json: bool) -> None:
     """Propose features: places where the detail of a face stands out, with size, height and scales."""
     from mracad.edit.feature.find import found
     from mracad.job.look import looked_at
-    from mracad_cli.render.json import json_text, plain
-    from mracad_cli.render.text import mm, say
+    from mracad_cli.render.json import plain
+    from mracad_cli.render.text import mm
 
     model, scope = looked_at(read(reading), chosen)
     features = found(model, scope.chosen)
@@ -56,7 +57,6 @@ def extract(reading: Reading, chosen: Extract, output: str, overwrite: bool, as_
     from mracad.edit.feature.detail import save
     from mracad.edit.feature.extract import feature_of
     from mracad.job.look import looked_at
-    from mracad_cli.render.json import json_text
     from mracad_cli.render.text import mm
 
     path = Path(output)

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
@@ -14,17 +11,7 @@ from mracad_cli import options
 from mracad_cli.command import Command
 from mracad_cli.options import Reading
 from mracad_cli.progress import Progress
-from mracad_cli.render import json, text
-from mracad_cli.render.text import say
-
-if TYPE_CHECKING:
-    import numpy as np
-
-    from mracad.inspect.scales import FaceScales
-    from mracad.inspect.seams import SeamMeasure
-    from mracad.model.brep import Face, Model
-    from mracad.model.facts import Validity
-    from mracad.occ.document import Document
+from mracad_cli.say import json_text, say
 
 
 @click.command(cls=Command, help=__doc__)
@@ -58,6 +45,7 @@ def command(reading: Reading, scale: str, keep: Any, everything: bool, as_json: 
     from mracad.occ.check import check
     from mracad.occ.view import view
     from mracad_cli.outputs import read
+    from mracad_cli.render import info
 
     with Progress() as progress:
         progress("reading", 0, 1)
@@ -70,166 +58,5 @@ def command(reading: Reading, scale: str, keep: Any, everything: bool, as_json: 
         measures = seams(model)
         progress("checking", 0, 1)
         valid = check(document)
-    seen = Seen(document, model, width, keep, found, measures, valid)
-    say(*([json.json_text(_body(seen))] if as_json else _lines(seen, everything)))
-
-
-@dataclass(frozen=True)
-class Seen:
-    """What there is to say of a model."""
-
-    document: Document
-    model: Model
-    width: float
-    keep: str
-    scales: Mapping[int, FaceScales]
-    seams: list[SeamMeasure]
-    valid: Validity
-
-
-def _body(seen: Seen) -> dict[str, Any]:
-    from mracad.inspect.seams import summary
-    from mracad.occ.boxes import face_boxes
-    from mracad.occ.instance import instances
-
-    model = seen.model
-    return {
-        "file": model.name,
-        "unit": model.unit,
-        "schema": model.schema,
-        "products": list(model.products),
-        "instances": list(instances(seen.document)),
-        "diagonal": model.diagonal,
-        "scale": seen.width,
-        "faces": [
-            {**_facts(model, face, own), **_judged(face, seen.scales.get(face.index))}
-            for face, own in zip(model.faces, face_boxes(seen.document, model), strict=True)
-        ],
-        "seams": {**json.plain(summary(seen.seams)), "each": [json.seam(m) for m in seen.seams]},
-        "valid": json.validity(seen.valid),
-    }
-
-
-def _lines(seen: Seen, everything: bool) -> list[str]:
-    from mracad.inspect.seams import summary
-    from mracad.occ.instance import instances
-
-    model, kinds = seen.model, Counter(face.kind for face in seen.model.faces)
-    said = [f"{model.name}: {model.schema or 'unknown schema'}, unit {model.unit}, diagonal {text.mm(model.diagonal)}"]
-    if model.products:
-        said.append(f"products: {len(model.products)}: {', '.join(name or '(no name)' for name in model.products)}")
-    if everything:
-        said += [f"  {path}" for path in instances(seen.document)]
-    said.append(f"faces: {len(model.faces)}: " + ", ".join(f"{n} {kind}" for kind, n in kinds.most_common()))
-    said.append(text.seam_line(summary(seen.seams)))
-    said += [f"valid: {text.verdict(seen.valid.valid)}", *(f"  {failure}" for failure in seen.valid.failures[:10])]
-    shown = [face for face in model.faces if everything or face.surface is not None]
-    if shown:
-        said.append(f"detail below {text.mm(seen.width)}, free with all edges held at {seen.keep.upper()}")
-        head = ["face", "type", "degree", "net", "shape", "free", "spans mm", "at this scale", "from", "name"]
-        said += _table([head, *(_row(model, face, seen.scales.get(face.index)) for face in shown)])
-    if everything and seen.seams:
-        head = ["edge", "faces", "gap mm", "angle °", "curvature jump 1/mm", "relative", "at"]
-        said += _table([head, *map(_seam_row, seen.seams)])
-    return said
-
-
-def _seam_row(m: SeamMeasure) -> Sequence[str]:
-    return (
-        f"edge#{m.edge + 1}" + ("" if m.sewn else " (not sewn)"),
-        "#{} #{}".format(*(i + 1 for i in m.faces)),
-        f"{m.gap:.2g}",
-        f"{m.angle:.3g}",
-        f"{m.bend:.2g}",
-        f"{m.relative_bend:.2g}",
-        " ".join(f"{x:.4g}" for x in m.where),
-    )
-
-
-def _facts(model: Model, face: Face, box: np.ndarray) -> dict[str, Any]:
-    """What a face is, and its box; lengths in millimetres."""
-    facts: dict[str, Any] = {
-        "face": face.index + 1,
-        "name": face.name,
-        "product": face.product,
-        "colour": face.colour,
-        "kind": face.kind,
-        "instances": face.instances,
-        "box": box.tolist(),
-    }
-    if face.surface is not None:
-        net = model.surfaces[face.surface].net
-        facts |= {
-            "degree": [net.u.degree, net.v.degree],
-            "net": list(net.poles.shape[:2]),
-            "rational": net.weights is not None,
-            "periodic": [net.u.periodic, net.v.periodic],
-            "shared": len(model.surfaces[face.surface].faces) > 1,
-        }
-    return facts
-
-
-def _judged(face: Face, scales: FaceScales | None) -> dict[str, Any]:
-    """What there is to smooth on a face at the given scale, and what stands against it."""
-    status, reason = _status(face, scales)
-    return {
-        "smoothing": status,
-        "reason": reason,
-        "detail": scales.detail if scales else 0.0,
-        "detail_rms": scales.rms if scales else 0.0,
-        "free_poles": scales.free if scales else 0,
-        "visible_poles": scales.points if scales else 0,
-        "spans": list(scales.spans) if scales else [0.0, 0.0],
-        "finest_scale": scales.finest if scales else 0.0,
-        "crease_lines": scales.creases if scales else 0,
-    }
-
-
-def _status(face: Face, scales: FaceScales | None) -> tuple[str, str]:
-    """A word for what smoothing at the given scale would meet, and the reason where it would change nothing."""
-    from mracad.inspect.scales import LEAST
-
-    if scales is None:
-        return "analytic", f"{face.kind}, not a NURBS face"
-    if not scales.coarser:
-        creases = scales.creases and not scales.finest
-        return "unchanged", "crease lines only" if creases else "no span finer than the scale"
-    if scales.detail <= LEAST:
-        return "unchanged", "no detail"
-    return "changes", ""
-
-
-def _row(model: Model, face: Face, scales: FaceScales | None) -> Sequence[str]:
-    name = face.name or face.product
-    status, reason = _status(face, scales)
-    if scales is None or face.surface is None:
-        return f"#{face.index + 1}", face.kind, "", "", "", "", "", reason, "", name
-    net = model.surfaces[face.surface].net
-    shape = [
-        word
-        for word, true in (
-            ("rational", net.weights is not None),
-            ("periodic", net.u.periodic or net.v.periodic),
-            (f"{scales.creases} crease lines", scales.creases),
-        )
-        if true
-    ]
-    change = f"changes by {scales.detail:.2g} mm, rms {scales.rms:.2g}"
-    return (
-        f"#{face.index + 1}",
-        face.kind,
-        f"{net.u.degree}x{net.v.degree}",
-        "x".join(map(str, net.poles.shape[:2])),
-        " ".join(shape),
-        f"{scales.free}/{scales.points}",
-        f"{scales.spans[0]:.3g}–{scales.spans[1]:.3g}",
-        change if status == "changes" else reason,
-        f"{scales.finest:.3g} mm" if scales.finest else "never",
-        name,
-    )
-
-
-def _table(rows: Sequence[Sequence[str]]) -> list[str]:
-    """Aligned columns."""
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    return ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
+    seen = info.Seen(document, model, width, keep, found, measures, valid)
+    say(*([json_text(info.body(seen))] if as_json else info.lines(seen, everything)))

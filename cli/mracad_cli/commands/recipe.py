@@ -6,6 +6,7 @@ import click
 
 from mracad_cli import options
 from mracad_cli.command import Group
+from mracad_cli.say import json_text, say
 from mracad_cli.steps import plan
 
 
@@ -20,8 +21,6 @@ def command() -> None:
 def check(file: str, assignments: tuple[str, ...], as_json: bool) -> None:
     """Say what a recipe would do; exit code 2 when something in it is wrong."""
     from mracad.spec.recipe import load
-    from mracad_cli.render.json import json_text
-    from mracad_cli.render.text import say
 
     found = load(file).with_values(assignments)
     steps = found.steps("model.step")
@@ -33,6 +32,5 @@ def check(file: str, assignments: tuple[str, ...], as_json: bool) -> None:
 def schema() -> None:
     """Print the JSON schema of recipes, for editors and validators."""
     from mracad.spec import schema
-    from mracad_cli.render.json import json_text
 
     print(json_text(schema.schema(), 1))

@@ -1,4 +1,4 @@
-"""Carry the detail of a face, or a feature, of one STEP file onto another; units may differ."""
+"""Copy the detail of a face, or a feature, from one file to another; units may differ."""
 
 from __future__ import annotations
 

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import math
-import sys
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -24,26 +21,6 @@ if TYPE_CHECKING:
     from mracad.job.produce import Made
     from mracad.model.facts import Validity
     from mracad.seam.natural import Treatment
-
-
-def json_text(value: Any, indent: int | None = None) -> str:
-    """JSON that any reader takes: what is not finite is null, signs that cannot be written as they are, escaped."""
-    body = _finite(value)
-    text = json.dumps(body, indent=indent, ensure_ascii=False)
-    try:
-        for encoding in {"utf-8", sys.stdout.encoding or "utf-8"}:
-            text.encode(encoding)
-    except UnicodeEncodeError:
-        return json.dumps(body, indent=indent)
-    return text
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _finite(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(item) for item in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def plain(value: Any) -> Any:

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, TextIO
+from typing import TYPE_CHECKING
 
 from mracad.job.words import notes, placed
 from mracad.spec.steps import Selection
@@ -176,10 +175,10 @@ def edge_words(edges: tuple[Treatment, ...]) -> str:
     moved = sum(e.how != "frozen" for e in edges)
     loose = sum(e.how == "to tolerance" for e in edges)
     why = Counter(str(e.reason) for e in edges if e.reason)
-    reasons = ", ".join(f"{count} {reason}" for reason, count in why.most_common(REASONS))
+    reasons = ", ".join(f"{count} × {reason}" for reason, count in why.most_common(REASONS))
     reasons += ", …" if len(why) > REASONS else ""
     words = f"{moved} of {plural(len(edges), 'edge')} moved with both faces"
-    return words + (f", {loose} to tolerance" if loose else "") + (f" (not: {reasons})" if why else "")
+    return words + (f", {loose} to tolerance" if loose else "") + (f" (stayed: {reasons})" if why else "")
 
 
 def seam_line(new: SeamSummary, old: SeamSummary | None = None) -> str:
@@ -190,20 +189,6 @@ def seam_line(new: SeamSummary, old: SeamSummary | None = None) -> str:
         gap = f"{gap} (was {mm(old.gap)})"
     line = f"seams: {new.smooth} smooth of {new.seams}, angle ≤ {angle}, curvature jump ≤ {bend}; gap ≤ {gap}"
     return line + (f"; {new.unsewn} not sewn" if new.unsewn else "")
-
-
-_CONTROL = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029]")
-
-
-def printable(line: str) -> str:
-    """A line for a terminal: control characters, which names may hold, are spelled as in JSON (``\\u001b``)."""
-    return _CONTROL.sub(lambda match: f"\\u{ord(match[0]):04x}", line)
-
-
-def say(*lines: str, file: TextIO | None = None) -> None:
-    """Print lines, on standard output unless ``file`` is given."""
-    for line in lines:
-        print(printable(line), file=file)
 
 
 def verdict_lines(found: Verdict, failed: Sequence[Layer]) -> list[str]:

@@ -103,5 +103,5 @@ def isolated(limits: Limits, fn: Callable[..., Any], *args: Any, **kwargs: Any) 
 def lost(error: Exception) -> Exception:
     """The error of a task; in the words of the local pool where the cluster lost it."""
     if isinstance(error, CancelledError) or type(error).__module__.startswith("distributed"):
-        return CrashError(f"the cluster lost it ({type(error).__name__})", "see the logs of its workers")
+        return CrashError(f"the cluster lost the task ({type(error).__name__})", "see the logs of its workers")
     return error

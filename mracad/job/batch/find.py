@@ -50,7 +50,7 @@ def find(words: Iterable[str], folder: Path, format: str = "") -> list[Item]:
             if Path(source).resolve() == own / output:
                 raise UsageError(f"'{source}' would be replaced by its own output", "choose another folder with -O")
     if not found:
-        raise FileError("there is nothing to do: no files are named", "give files, folders or patterns")
+        raise FileError("no input files are named", "give files, folders or patterns")
     return [Item(source, output, format or _format(output)) for output, source in found.items()]
 
 

@@ -102,7 +102,7 @@ class Manifest:
         try:
             self._note(output, key, data)
         except OSError as error:
-            raise FileError(f"cannot write '{self._file.name}': {error.strerror}", "make room for it") from error
+            raise FileError(f"cannot write '{self._file.name}': {error.strerror}", "free some disk space") from error
         with contextlib.suppress(OSError):  # writing says it better
             (self.folder / output).parent.mkdir(parents=True, exist_ok=True)
         self._put({output: data, **beside}, if_changed)

@@ -1,4 +1,4 @@
-"""Workers in processes of their own: a crash, a hang or a hunger for memory costs the one task that brought it.
+"""Workers in processes of their own: a task that crashes, hangs or needs too much memory fails alone.
 
 The pool is an :class:`concurrent.futures.Executor`.  Each worker is a process that imports what it needs once and
 then does one task after another, told over a pipe; a thread of the pool waits on each, and one more watches the time
@@ -151,11 +151,9 @@ class Pool(Executor):
             for worker in list(self._workers):
                 if time.monotonic() > worker.deadline:
                     hint = "raise --time-limit, or look into the file"
-                    worker.kill(
-                        LimitError(f"not done within the time limit of {worker.seconds:g} s{worker.note}", hint)
-                    )
+                    worker.kill(LimitError(f"exceeded the time limit of {worker.seconds:g} s{worker.note}", hint))
                 elif (used := worker.used()) > self._memory:
-                    text = f"over the memory limit of {self._memory / 1e6:.0f} MB (at {used / 1e6:.0f} MB)"
+                    text = f"exceeded the memory limit of {self._memory / 1e6:.0f} MB (used {used / 1e6:.0f} MB)"
                     worker.kill(LimitError(text, "raise --memory-limit, or use fewer workers"))
 
 
@@ -243,10 +241,10 @@ class _Worker:
             return self.reason
         if code == -getattr(signal, "SIGKILL", 9):
             return CrashError(
-                f"the worker was killed (out of memory, maybe){self.note}", "try again with fewer workers"
+                f"the worker was killed (perhaps out of memory){self.note}", "try again with fewer workers"
             )
         name = signal.Signals(-code).name if code < 0 else f"exit code {code}"
-        return CrashError(f"the worker crashed ({name}){self.note}", "the file breaks the CAD kernel: export it again")
+        return CrashError(f"the worker crashed ({name}){self.note}", "the file crashes the CAD kernel: export it again")
 
 
 def _occupied(process: psutil.Process) -> int:

@@ -199,7 +199,7 @@ class _Batch:
     def _check_target(self, item: Item) -> None:
         target = self.manifest.folder / item.output
         if target.exists() and not (self.settings.overwrite or self.manifest.made(item.output)):
-            raise UsageError(f"'{target}' exists, and no batch has made it", "give --overwrite to replace it")
+            raise UsageError(f"'{target}' exists and was not made by a batch", "give --overwrite to replace it")
 
     def _key(self, work: Work) -> str:
         """A hash of everything that the output depends on."""
@@ -233,9 +233,7 @@ def _bytes(path: str) -> bytes:
     try:
         return Path(path).read_bytes()
     except OSError as error:
-        raise FileError(
-            f"cannot read '{path}': {error.strerror or error}", "look at its path and permissions"
-        ) from error
+        raise FileError(f"cannot read '{path}': {error.strerror or error}", "check its path and permissions") from error
 
 
 def _failed(item: Item, error: MracadError, task: _Task | None = None) -> Outcome:

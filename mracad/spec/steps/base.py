@@ -64,8 +64,8 @@ class Selection(Options, frozen=True, kw_only=True, forbid_unknown_fields=True):
     instance: Annotated[
         str | None,
         Meta(
-            description="Edit one instance of a part that stands in several places, as plate/bolt#2 (see info --all); "
-            "it becomes a part of its own. Default: a part is edited, wherever it stands."
+            description="Edit only one instance of a shared part, such as plate/bolt#2 (see info --all); it becomes "
+            "a separate part. Default: edit the part everywhere."
         ),
     ] = None
     hold: Annotated[
@@ -75,14 +75,15 @@ class Selection(Options, frozen=True, kw_only=True, forbid_unknown_fields=True):
     keep: Annotated[
         Literal["as-is", "g0", "g1", "g2"],
         Meta(
-            description="Continuity that every edge keeps: as-is, what it has; or position, tangent plane or curvature."
+            description="Continuity to keep along edges: as-is keeps what each has; g0 position, g1 tangent plane, "
+            "g2 curvature."
         ),
     ] = "as-is"
     edges: Annotated[
         Literal["coupled", "frozen"],
         Meta(
-            description="Edges between two edited faces: coupled, they move and stay as smooth as they were where that "
-            "is possible; frozen, none moves."
+            description="Edges between two edited faces: coupled lets them move, as smooth as before where possible; "
+            "frozen keeps them in place."
         ),
     ] = "coupled"
 

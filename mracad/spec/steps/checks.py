@@ -12,7 +12,7 @@ from mracad.spec.steps.base import Options
 
 
 class Check(Options, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Check validity and continuity; what fails it stops a recipe, and a command ends with exit code 1."""
+    """Check validity and continuity; a failure stops a recipe, and gives exit code 1."""
 
     function: ClassVar[str] = "mracad.job.check:check"
 
@@ -21,31 +21,31 @@ class Check(Options, frozen=True, kw_only=True, forbid_unknown_fields=True):
         Annotated[Angle, Meta(ge=0.0)] | None,
         Meta(description="Largest angle (degrees) along seams that are meant to be smooth."),
     ] = None
-    kink: Annotated[Angle, Meta(description="A seam with a smaller angle (degrees) is meant to be smooth.", ge=0.0)] = (
+    kink: Annotated[Angle, Meta(description="Seams with a smaller angle (degrees) are meant to be smooth.", ge=0.0)] = (
         1.0
     )
     expect: Annotated[
         CountText | None,
         Meta(
-            description="How many seams are to be smooth: a number, or the report (JSON) of an earlier check or edit."
+            description="Expected number of smooth seams: a number, or the report (JSON) of an earlier check or edit."
         ),
     ] = None
     max_tolerance: Annotated[Length | None, Meta(description="Largest tolerance of edges and vertices.")] = None
-    min_wall: Annotated[Length | None, Meta(description="Least thickness of the walls of solids.")] = None
+    min_wall: Annotated[Length | None, Meta(description="Smallest wall thickness of solids.")] = None
     layer_limit: Annotated[
         Annotated[Time, Meta(gt=0.0)] | None,
-        Meta(description="Time for each layer (90s, 2min); one that takes longer says nothing."),
+        Meta(description="Time limit of each layer (90s, 2min); a layer that exceeds it gives no result."),
     ] = None
     fail_on: Annotated[
         tuple[
             Literal["invalid", "unknown", "free-edges", "unsewn", "file", "self-intersection", "mesh", "nothing"], ...
         ],
-        Meta(description="What fails the check beside the limits; repeatable."),
+        Meta(description="What fails the check, besides the limits; repeatable."),
     ] = ("invalid",)
 
 
 class Compare(Options, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Compare with a reference; what differs beyond its limit stops a recipe, and a command ends with exit code 1."""
+    """Compare with a reference; a difference beyond its limit stops a recipe, and gives exit code 1."""
 
     function: ClassVar[str] = "mracad.job.compare:compare"
 
@@ -54,18 +54,18 @@ class Compare(Options, frozen=True, kw_only=True, forbid_unknown_fields=True):
     ] = None
     reference_unit: Annotated[
         str | None,
-        Meta(description="Length unit of the numbers in the reference, where it names a wrong one: mm, m, in …"),
+        Meta(description="Length unit of the reference, if it states a wrong one: mm, m, in …"),
     ] = None
-    max_deviation: Annotated[Length, Meta(description="How far any face or outline may lie from its partner.")] = (
-        "1e-6mm"
-    )
-    max_gap_growth: Annotated[Length | None, Meta(description="How much wider the gap of any seam may become.")] = None
+    max_deviation: Annotated[
+        Length, Meta(description="Largest distance between matched faces and between their outlines.")
+    ] = "1e-6mm"
+    max_gap_growth: Annotated[Length | None, Meta(description="Largest growth of the gap of any seam.")] = None
     max_angle_growth: Annotated[
         Annotated[Angle, Meta(ge=0.0)] | None,
-        Meta(description="How much larger the angle (degrees) of any seam may become."),
+        Meta(description="Largest growth of the angle (degrees) of any seam."),
     ] = None
     max_volume_change: Annotated[
-        Annotated[Share, Meta(ge=0.0)] | None, Meta(description="How much of the volume (percent) may come or go.")
+        Annotated[Share, Meta(ge=0.0)] | None, Meta(description="Largest change of the volume (percent).")
     ] = None
     ignore: Annotated[
         tuple[
@@ -75,5 +75,5 @@ class Compare(Options, frozen=True, kw_only=True, forbid_unknown_fields=True):
             ],
             ...,
         ],
-        Meta(description="What may differ in any way; repeatable."),
+        Meta(description="What to leave out of the comparison; repeatable."),
     ] = ()  # fmt: skip

@@ -35,14 +35,14 @@ class Featured(Selection, frozen=True, kw_only=True, forbid_unknown_fields=True)
     base: Annotated[
         Literal["surroundings", "level"],
         Meta(
-            description="What the feature stands above: surroundings, a thin plate through what lies around the "
-            "window; level, the face without its --band."
+            description="What the feature is measured from: surroundings, a thin plate fitted to what lies around "
+            "the window; level, the face without its --band."
         ),
     ] = "surroundings"
     band: Annotated[
         str | None,
         Meta(
-            description="Wavelengths that belong to a feature above a level: 0.5mm:20mm; 0mm:20mm for all up to 20 mm."
+            description="Wavelengths of the detail to take, such as 0.5mm:20mm; 0mm:20mm takes everything up to 20 mm."
         ),
     ] = None
 
@@ -59,7 +59,7 @@ class Featured(Selection, frozen=True, kw_only=True, forbid_unknown_fields=True)
 
 
 class Extract(Featured, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Save a feature to a file: a library of details that mracad repeat and mracad transfer lay elsewhere."""
+    """Save a feature to a file, for mracad repeat and mracad transfer."""
 
     feature: _Feature
 
@@ -70,24 +70,26 @@ class Copied(Featured, frozen=True, kw_only=True, forbid_unknown_fields=True):
     edges: Annotated[
         Literal["frozen", "coupled"],
         Meta(
-            description="Edges between two edited faces: coupled, they move with a copy that lies over them and stay "
-            "as smooth as they were, where that is possible; frozen, none moves."
+            description="Edges between two edited faces: coupled lets them move with a copy that crosses them, as "
+            "smooth as before where possible; frozen keeps them in place."
         ),
     ] = "coupled"
-    rotate: Annotated[Angle, Meta(description="Turn of each copy about the outward normal (degrees).")] = 0.0
+    rotate: Annotated[Angle, Meta(description="Rotation of each copy about the outward normal (degrees).")] = 0.0
     size: Annotated[
-        float, Meta(description="Factor on the size of each copy along the face; its height stays.", gt=0.0)
+        float, Meta(description="Scale factor of each copy along the face; its height does not change.", gt=0.0)
     ] = 1.0
-    height: Annotated[float, Meta(description="Factor on the height of each copy; negative makes a dent of it.")] = 1.0
+    height: Annotated[
+        float, Meta(description="Scale factor of the height of each copy; a negative one turns a bump into a dent.")
+    ] = 1.0
     mirror: Annotated[bool, Meta(description="Mirror each copy.")] = False
     clip: Annotated[
-        bool, Meta(description="Let edges and holes that do not move take parts of copies, instead of refusing them.")
+        bool, Meta(description="Let fixed edges and holes cut off parts of copies, instead of refusing such copies.")
     ] = False
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.height == 0:
-            raise UsageError("height: a copy of height 0 is none", "give --height 0.5, or a negative one for a dent")
+            raise UsageError("height: it must not be zero", "give --height 0.5, or a negative one for a dent")
 
 
 class Single(Copied, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -97,7 +99,7 @@ class Single(Copied, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
 
 class Move(Single, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Move a detail feature: the coarse surface is left clean at its place, and it is present at another one."""
+    """Move a detail feature to another place; the surface that it leaves is clean."""
 
     function: ClassVar[str] = "mracad.edit.feature.edits:move"
 
@@ -114,7 +116,7 @@ class Move(Single, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
 
 class Repeat(Single, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Repeat a detail feature at other places of the same or other faces, over seams where they lie in its way."""
+    """Copy a detail feature to other places, on the same or other faces and across seams."""
 
     function: ClassVar[str] = "mracad.edit.feature.edits:repeat"
 
@@ -146,24 +148,23 @@ class Repeat(Single, frozen=True, kw_only=True, forbid_unknown_fields=True):
     overlap: Annotated[
         Literal["add", "max", "replace"],
         Meta(
-            description="Where copies overlap: add them, take the one that is larger there, or let the later one "
-            "replace the earlier."
+            description="Where copies overlap: add them, keep the larger one, or let later copies replace earlier ones."
         ),
     ] = "add"
     jitter: Annotated[
         Length | None, Meta(description="Move each copy at random by up to this length along the face.")
     ] = None
     spin: Annotated[
-        Angle, Meta(description="Turn each copy at random by up to so many degrees either way.", ge=0.0, le=360.0)
+        Angle, Meta(description="Turn each copy at random by up to this angle (degrees) either way.", ge=0.0, le=360.0)
     ] = 0.0
-    seed: Annotated[int, Meta(description="Of the random numbers.", ge=0)] = 0
+    seed: Annotated[int, Meta(description="Seed of the random numbers.", ge=0)] = 0
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if not (self.at or self.grid or self.polar or self.along):
-            raise UsageError("at: it is not said where the copies are to go", "give --at, --grid, --polar or --along")
+            raise UsageError("at: no place is given for the copies", "give --at, --grid, --polar or --along")
         if sum(x is not None for x in (self.grid, self.polar, self.along)) > 1:
-            raise UsageError("grid, polar and along exclude each other", "give one of them")
+            raise UsageError("grid, polar and along cannot be combined", "give one of them")
 
     @property
     def done(self) -> str:
@@ -171,7 +172,7 @@ class Repeat(Single, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
 
 class Transfer(Copied, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Carry the detail of a face, or a feature, of another file onto this one; units may differ."""
+    """Copy the detail of a face, or a feature, from another file to this one; units may differ."""
 
     function: ClassVar[str] = "mracad.edit.feature.edits:transfer"
 
@@ -187,8 +188,8 @@ class Transfer(Copied, frozen=True, kw_only=True, forbid_unknown_fields=True):
     mode: Annotated[
         str,
         Meta(
-            description="For the detail of a face: add it, replace the face's own detail in the band by it, or "
-            "blend=0.3, a mix with so much of it."
+            description="How the detail of a face is applied: add it, replace the face's own detail in the band, or "
+            "blend=0.3 for a mix with 30% of it."
         ),
     ] = "add"
 
@@ -198,7 +199,7 @@ class Transfer(Copied, frozen=True, kw_only=True, forbid_unknown_fields=True):
             places.feature(self.from_, "from")
             places.spot(self.to, "to")
         elif self.band is None:
-            raise UsageError("band: the detail of a face needs one", "give --band 0mm:20mm")
+            raise UsageError("band: the detail of a face cannot be transferred without one", "give --band 0mm:20mm")
         self.share()
 
     def share(self) -> tuple[float, float]:

@@ -16,30 +16,33 @@ class Fitting(Selection, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
     fit_g1: Annotated[
         Annotated[Angle, Meta(ge=0.0, le=45.0)] | None,
-        Meta(description="Make seams tangent that are meant to be: those between edited faces under this angle (°)."),
+        Meta(description="Make seams between edited faces tangent where their angle (°) is below this."),
     ] = None
     close_gaps: Annotated[
         bool,
-        Meta(description="Pull gaps along seams between edited faces shut."),
+        Meta(description="Close gaps along seams between edited faces."),
     ] = False
     gap_tolerance: Annotated[
         Length,
-        Meta(description="Gap (a length) that a seam along a trim curve may have after it moved, unless it was wider."),
+        Meta(
+            description="Largest gap that a seam along a trim curve may have after the edit, unless it was wider "
+            "before."
+        ),
     ] = "1e-4mm"
     refine: Annotated[
         Literal["auto", "never"],
         Meta(
-            description="Control points where a face has too few of them for the edit: auto, knots are inserted "
-            "there, exactly; never, the face makes do with its own."
+            description="Where a face has too few control points for the edit: auto inserts knots, without changing "
+            "the face's shape; never uses only its own."
         ),
     ] = "auto"
     amount: Annotated[
         float,
-        Meta(description="How much of the edit: 1 is all of it, 0 none.", ge=0.0, le=1.0),
+        Meta(description="How much of the edit to apply: 1 is all of it, 0 none.", ge=0.0, le=1.0),
     ] = 1.0
     max_deviation: Annotated[
         Length | None,
-        Meta(description="Bound on the deviation along the normal (a length): the edit is scaled back locally."),
+        Meta(description="Largest deviation along the normal; where an edit would exceed it, it is scaled back."),
     ] = None
 
 
@@ -51,8 +54,8 @@ class Smooth(Fitting, frozen=True, kw_only=True, forbid_unknown_fields=True):
     scale: Annotated[
         Length | None,
         Meta(
-            description="Wavelength (5mm, 0.2in, or 2% of the model's diagonal): ripples up to half of it go, "
-            "ripples of three times it stay."
+            description="Wavelength (5mm, 0.2in, or 2% of the model's diagonal): ripples up to half as long are "
+            "removed, ripples three times as long stay."
         ),
     ] = None
     level: Annotated[

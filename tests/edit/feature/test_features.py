@@ -298,7 +298,7 @@ ERRORS = [
     (["--at", "110,50,0"], 4, "place 1 (110,50,0) is 10 mm off"),
     (["--at", "#1@500,2"], 4, "place 1 (#1@500,2) is off the face"),
     (["--at", "#4@1,2"], 2, "place 1 (#4@1,2): '#4'"),
-    (["--at", "1,2"], 2, "at: '1,2' is not right"),
+    (["--at", "1,2"], 2, "at: '1,2' is not a place"),
     (["--at", "95,50,0"], 4, "place 1 (95,50,0): edges or holes"),
     (["--at", "60,60,0", "--feature", "near:25,25,0,radius:60"], 4, "larger than its face"),
     (["--at", "60,60,0", "--feature", "#1@20:120,20:50"], 4, "outside the face"),
@@ -306,7 +306,7 @@ ERRORS = [
     (["--at", "@bad.csv"], 3, "bad.csv:3: '30,forty,0'"),
     (["--at", "@none.csv"], 3, "none.csv"),
     (["--at", "1,1,1", "--feature", "none.feature"], 3, "none.feature"),
-    ([], 2, "not said where"),
+    ([], 2, "no place is given"),
     (["--grid", "3by3,1,1"], 2, "grid: '3by3,1,1'"),
     (["--along", "edge#9,3"], 2, "edge#1 to edge#4"),
 ]

@@ -46,7 +46,7 @@ def test_what_one_task_was_at_is_not_said_of_the_next():
     with Pool(1, Limits(1.0)) as pool:
         assert pool.submit(work, "note").result() == "note"
         error = pool.submit(work, "hang").exception()
-    assert str(error).startswith("not done within the time limit of 1 s;")
+    assert str(error).startswith("exceeded the time limit of 1 s;")
 
 
 def test_what_a_child_of_a_worker_holds_counts():

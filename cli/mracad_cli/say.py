@@ -1,0 +1,42 @@
+"""Lines on a terminal, and JSON; nothing here loads a numerical library."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+import sys
+from typing import Any, TextIO
+
+_CONTROL = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029]")
+
+
+def printable(line: str) -> str:
+    """A line for a terminal: control characters, which names may hold, are spelled as in JSON (``\\u001b``)."""
+    return _CONTROL.sub(lambda match: f"\\u{ord(match[0]):04x}", line)
+
+
+def say(*lines: str, file: TextIO | None = None) -> None:
+    """Print lines, on standard output unless ``file`` is given."""
+    for line in lines:
+        print(printable(line), file=file)
+
+
+def json_text(value: Any, indent: int | None = None) -> str:
+    """JSON that any reader takes: what is not finite is null, signs that cannot be written as they are, escaped."""
+    body = _finite(value)
+    text = json.dumps(body, indent=indent, ensure_ascii=False)
+    try:
+        for encoding in {"utf-8", sys.stdout.encoding or "utf-8"}:
+            text.encode(encoding)
+    except UnicodeEncodeError:
+        return json.dumps(body, indent=indent)
+    return text
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _finite(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
