@@ -6,11 +6,8 @@ import math
 from collections import Counter
 from collections.abc import Iterable, Iterator
 
-from OCP.Adaptor3d import Adaptor3d_CurveOnSurface
 from OCP.BRep import BRep_Tool
-from OCP.BRepAdaptor import BRepAdaptor_Curve, BRepAdaptor_Curve2d, BRepAdaptor_Surface
 from OCP.BRepCheck import BRepCheck_Analyzer, BRepCheck_NoError
-from OCP.BRepLib import BRepLib_ValidateEdge
 from OCP.ShapeAnalysis import ShapeAnalysis_ShapeTolerance
 from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_FORWARD, TopAbs_SHELL, TopAbs_SOLID, TopAbs_VERTEX, TopAbs_WIRE
 from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Shape
@@ -18,7 +15,7 @@ from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Shape
 from mracad.model.facts import Failure, Validity
 from mracad.occ.document import Document
 from mracad.occ.settings import quiet, threads
-from mracad.occ.topology import compound, edge_uses, inside
+from mracad.occ.topology import compound, edge_uses, inside, validated
 
 _KINDS = {
     TopAbs_SOLID: "solid", TopAbs_SHELL: "shell", TopAbs_FACE: "face", TopAbs_WIRE: "wire", TopAbs_EDGE: "edge",
@@ -99,15 +96,8 @@ def _statuses(analyzer: BRepCheck_Analyzer, shape: TopoDS_Shape, context: TopoDS
 def _distance(face: TopoDS_Face) -> float:
     """Largest distance between the 3D curves of a face's edges and their curves on it, memory units."""
     forward = TopoDS.Face_s(face.Oriented(TopAbs_FORWARD))
-    surface = BRepAdaptor_Surface(forward, False)
-    worst = 0.0
-    for edge in edge_uses(forward):
-        if not BRep_Tool.Degenerated_s(edge):
-            on_face = Adaptor3d_CurveOnSurface(BRepAdaptor_Curve2d(edge, forward), surface)
-            validate = BRepLib_ValidateEdge(BRepAdaptor_Curve(edge), on_face, True)
-            validate.Process()
-            worst = max(worst, validate.GetMaxDistance())
-    return worst
+    edges = (edge for edge in edge_uses(forward) if not BRep_Tool.Degenerated_s(edge))
+    return max((validated(edge, forward, True).GetMaxDistance() for edge in edges), default=0.0)
 
 
 def looks(document: Document) -> Iterator[tuple[int, int, bool]]:

@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 
-from OCP.Adaptor3d import Adaptor3d_CurveOnSurface
 from OCP.BRep import BRep_Builder, BRep_Tool
-from OCP.BRepAdaptor import BRepAdaptor_Curve, BRepAdaptor_Curve2d, BRepAdaptor_Surface
-from OCP.BRepLib import BRepLib, BRepLib_ValidateEdge
+from OCP.BRepAdaptor import BRepAdaptor_Curve
+from OCP.BRepLib import BRepLib
 from OCP.gp import gp_Pnt, gp_Vec
 from OCP.TopAbs import TopAbs_FORWARD
 from OCP.TopExp import TopExp
@@ -16,7 +15,7 @@ from OCP.TopoDS import TopoDS, TopoDS_Edge, TopoDS_Face
 from OCP.TopTools import TopTools_MapOfShape
 
 from mracad.occ.document import Document
-from mracad.occ.topology import edge_uses
+from mracad.occ.topology import edge_uses, validated
 
 _TOLERANCE = 1e-7  # memory units
 _ABOVE = 1 + 1e-6  # so much more than the kernel finds is a tolerance that it takes
@@ -48,7 +47,11 @@ def following(document: Document, edges: Mapping[int, int], faces: Collection[in
     ]
     old = [_ends(*each) for each in chosen]
     tolerances = [_own(edge) for edge, _ in chosen]
-    near = [(edge, face) for edge, face in _uses(document, faces) if _checked(edge, face).CheckTolerance(_own(edge))]
+    near = [
+        (edge, face)
+        for edge, face in _uses(document, faces)
+        if validated(edge, face, BRep_Tool.SameParameter_s(edge)).CheckTolerance(_own(edge))
+    ]
     yield
     for (edge, _), tolerance in zip(chosen, tolerances, strict=True):
         builder.UpdateEdge(edge, None, _TOLERANCE)
@@ -65,7 +68,7 @@ def following(document: Document, edges: Mapping[int, int], faces: Collection[in
                 place = BRep_Tool.Pnt_s(vertex).Translated(gp_Vec(before, now))
                 builder.UpdateVertex(vertex, place, BRep_Tool.Tolerance_s(vertex))
     for edge, face in near:
-        found = _checked(edge, face)
+        found = validated(edge, face, BRep_Tool.SameParameter_s(edge))
         if not found.CheckTolerance(_own(edge)):
             builder.UpdateEdge(edge, _ABOVE * found.GetMaxDistance())
     for part in document.parts if near else ():
@@ -80,14 +83,6 @@ def _uses(document: Document, faces: Collection[int]) -> Iterator[tuple[TopoDS_E
 
 def _own(edge: TopoDS_Edge) -> float:
     return float(BRep_Tool.Tolerance_s(edge))
-
-
-def _checked(edge: TopoDS_Edge, face: TopoDS_Face) -> BRepLib_ValidateEdge:
-    """How far an edge and its curve on a face are apart, as the kernel's check sees it."""
-    on_face = Adaptor3d_CurveOnSurface(BRepAdaptor_Curve2d(edge, face), BRepAdaptor_Surface(face, False))
-    found = BRepLib_ValidateEdge(BRepAdaptor_Curve(edge), on_face, BRep_Tool.SameParameter_s(edge))
-    found.Process()
-    return found
 
 
 def _ends(edge: TopoDS_Edge, face: TopoDS_Face) -> tuple[gp_Pnt, gp_Pnt]:

@@ -5,9 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 
 import numpy as np
+from OCP.Adaptor3d import Adaptor3d_CurveOnSurface
 from OCP.Bnd import Bnd_Box
 from OCP.BRep import BRep_Builder
+from OCP.BRepAdaptor import BRepAdaptor_Curve, BRepAdaptor_Curve2d, BRepAdaptor_Surface
 from OCP.BRepBndLib import BRepBndLib
+from OCP.BRepLib import BRepLib_ValidateEdge
 from OCP.Poly import Poly_Triangulation
 from OCP.TopAbs import TopAbs_EDGE, TopAbs_SOLID
 from OCP.TopExp import TopExp, TopExp_Explorer
@@ -24,6 +27,14 @@ def edge_uses(face: TopoDS_Face) -> Iterator[TopoDS_Edge]:
     while explorer.More():
         yield TopoDS.Edge_s(explorer.Current())
         explorer.Next()
+
+
+def validated(edge: TopoDS_Edge, face: TopoDS_Face, together: bool) -> BRepLib_ValidateEdge:
+    """How far an edge and its curve on a face are apart, as the kernel sees it; at equal parameters if ``together``."""
+    on_face = Adaptor3d_CurveOnSurface(BRepAdaptor_Curve2d(edge, face), BRepAdaptor_Surface(face, False))
+    found = BRepLib_ValidateEdge(BRepAdaptor_Curve(edge), on_face, together)
+    found.Process()
+    return found
 
 
 def inside(shape: TopoDS_Shape, kind) -> Iterator[TopoDS_Shape]:
