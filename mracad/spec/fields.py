@@ -41,7 +41,7 @@ class Field:
     Attributes
     ----------
     owner : str
-        Name of the struct, in small letters: that of its command.
+        The command whose option it is.
     name : str
     type : type
         Of the value, or of each of ``many``: a plain type or a ``Literal``; it may be None, too, where that is the
@@ -143,7 +143,8 @@ def named(known: Mapping[str, Field], key: str) -> Field | None:
 def fields(struct: type[Struct]) -> dict[str, Field]:
     """The fields of a struct by name, in its order."""
     hints = typing.get_type_hints(struct, include_extras=True)
-    return {field.name: _field(struct.__name__.lower(), field, hints[field.name]) for field in structs.fields(struct)}
+    owner = getattr(struct, "function", "").partition(":")[2] or struct.__name__.lower()
+    return {field.name: _field(owner, field, hints[field.name]) for field in structs.fields(struct)}
 
 
 def _field(owner: str, field: structs.FieldInfo, hint: Any) -> Field:
