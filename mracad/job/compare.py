@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 from mracad.errors import UsageError
 from mracad.formats import unheld
-from mracad.inspect import compare as audit
+from mracad.inspect.compare import CompareLimits, Subject
+from mracad.inspect.compare import compare as differences
 from mracad.inspect.verdict import Verdict
 from mracad.job.judge import Judged, Original
 from mracad.spec.quantity import length
@@ -35,9 +36,9 @@ def compare(document: Document, options: Compare, original: Original | None = No
     else:
         raise UsageError("compare has nothing to compare with", "name a reference")
 
-    def limits(size: float) -> audit.CompareLimits:
+    def limits(size: float) -> CompareLimits:
         growth, volume = options.max_gap_growth, options.max_volume_change
-        return audit.CompareLimits(
+        return CompareLimits(
             deviation=length(options.max_deviation, size, "max-deviation"),
             gap_growth=None if growth is None else length(growth, size, "max-gap-growth"),
             angle_growth=options.max_angle_growth,
@@ -51,7 +52,7 @@ def compare(document: Document, options: Compare, original: Original | None = No
 def compared(
     ref: Document,
     new: Document,
-    limits: Callable[[float], audit.CompareLimits] | None = None,
+    limits: Callable[[float], CompareLimits] | None = None,
     ignore: Iterable[str] = (),
 ) -> Verdict:
     """Judge a new version of a document by a reference.
@@ -67,10 +68,10 @@ def compared(
     """
     place = "assembly" in unheld(ref.schema, new.schema)
     old, fresh = (_measured(document, place) for document in (ref, new))
-    return audit.compare(old, fresh, limits(old.model.diagonal) if limits else audit.CompareLimits(1e-6), ignore)
+    return differences(old, fresh, limits(old.model.diagonal) if limits else CompareLimits(1e-6), ignore)
 
 
-def _measured(document: Document, place: bool) -> audit.Subject:
+def _measured(document: Document, place: bool) -> Subject:
     """A document, measured; with ``place`` all of its instances where they stand."""
     from mracad.occ.check import check, lone_faces
     from mracad.occ.contents import contents
@@ -84,7 +85,7 @@ def _measured(document: Document, place: bool) -> audit.Subject:
     if whole:
         faces = (replace(face, colour=colour) for face, colour in zip(model.faces, whole.colours, strict=True))
         model = replace(model, faces=tuple(faces))
-    return audit.Subject(
+    return Subject(
         model=model,
         schema=document.schema,
         contents=contents(document),
