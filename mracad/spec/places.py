@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated
 
-from mracad.errors import UsageError
+from mracad.errors import FileError, UsageError
 from mracad.spec.files import Naming
 from mracad.spec.quantity import NUMBER
 
@@ -145,6 +145,44 @@ def feature(text: str, name: str) -> Disc | Rectangle | Stored:
 def is_feature(text: str) -> bool:
     """Whether a text means a feature, and not a face."""
     return text.startswith("near:") or "@" in text or text.endswith(".feature")
+
+
+def table(path: str) -> list[tuple[str, tuple[float, ...]]]:
+    """The rows of a CSV file: x, y, z and as the file goes on rotate (degrees), size, height; with their names.
+
+    A first line that begins with a letter is its heading; empty lines and those that begin with # do not count.
+
+    Raises
+    ------
+    FileError
+        When it cannot be read, or for a bad line.
+    """
+    try:
+        with open(path, encoding="utf-8") as file:
+            lines = file.read().splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        why = error.strerror if isinstance(error, OSError) else "it is not UTF-8 text"
+        raise FileError(f"cannot read '{path}': {why}", "give the path of a CSV file with columns x,y,z") from error
+    name = path.replace("\\", "/").rpartition("/")[2]
+    rows: list[tuple[str, tuple[float, ...]]] = []
+    for number, line in enumerate(lines, 1):
+        if not line.strip() or line.lstrip().startswith("#") or (not rows and re.match(r"\s*[\"A-Za-z]", line)):
+            continue
+        where = f"{name}:{number}"
+        row = numbers(line, (3, 4, 5, 6))
+        if row is None:
+            hint = "write x,y,z or x,y,z,rotate,size,height, with numbers in millimetres and degrees"
+            raise FileError(f"{where}: {line.strip()!r} is not a place", hint)
+        if any(factor <= 0 for factor in row[4:5]):
+            raise FileError(f"{where}: size {row[4]:g} is not greater than zero", "give a factor such as 1")
+        if any(factor == 0 for factor in row[5:6]):
+            raise FileError(f"{where}: a copy of height 0 is none", "leave the line out, or give a factor such as 1")
+        rows.append((where, row))
+        if len(rows) > MOST_PLACES:
+            raise FileError(f"'{path}' names more than {MOST_PLACES} places", "give several files, one edit each")
+    if not rows:
+        raise FileError(f"'{path}' names no places", "write lines x,y,z")
+    return rows
 
 
 def grid(text: str, name: str) -> Grid:

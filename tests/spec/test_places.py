@@ -2,7 +2,7 @@
 
 import pytest
 
-from mracad.errors import UsageError
+from mracad.errors import FileError, UsageError
 from mracad.spec.places import (
     Along,
     Disc,
@@ -18,6 +18,7 @@ from mracad.spec.places import (
     grid,
     place,
     polar,
+    table,
 )  # fmt: skip
 
 
@@ -63,3 +64,13 @@ def test_what_is_written_is_read(read, text, found):
 def test_what_is_not_right_is_refused_by_name(read, text):
     with pytest.raises(UsageError, match=r"^x: "):
         read(text, "x")
+
+
+def test_tables_of_places(tmp_path):
+    path = tmp_path / "places.csv"
+    path.write_text("x,y,z\n\n# none\n1,2,3\n4,5,6,90,2,-1\n")
+    assert table(str(path)) == [("places.csv:4", (1.0, 2.0, 3.0)), ("places.csv:5", (4.0, 5.0, 6.0, 90.0, 2.0, -1.0))]
+    for text in ("1,2\n", "1,2,3,0,0\n", "1,2,3,0,1,0\n", "x,y,z\n"):
+        path.write_text(text)
+        with pytest.raises(FileError):
+            table(str(path))

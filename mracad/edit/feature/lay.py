@@ -16,7 +16,7 @@ from mracad.edit.feature.exact import Shifts, shifted
 from mracad.edit.feature.fit import MISSED, holding, over_knots
 from mracad.edit.feature.ground import Ground
 from mracad.edit.feature.ideal import Copies
-from mracad.edit.feature.score import Copy, Outcome, compared, refuse
+from mracad.edit.feature.score import Copy, compared, refuse
 from mracad.edit.feature.seams import ALLOWED, Crossing, Wanted, crossing, held, refined, trace
 from mracad.edit.pose import WITHIN
 from mracad.model.brep import Model
@@ -130,11 +130,7 @@ def laid(copies: Copies, wishes: Wishes, coupled: bool, clip: bool, removed: Map
     shifts = shifted(copies)
     task = _task(copies, shifts, wishes, removed)
     attempt, moving, given_up = _settled(task, _crossings(task, copies) if coupled else [])
-    gone = {i: lifted(task.model.surfaces[i].net, attempt.wanted[i].net, each) for i, each in removed.items()}
-    outcomes = {
-        i: Outcome(each.net, attempt.done[i] - gone.get(i, 0.0), each.alone) for i, each in attempt.wanted.items()
-    }
-    found = compared(copies, outcomes, shifts.matched)
+    found = compared(copies, attempt.wanted, attempt.done, shifts.matched)
     refuse(copies, found, clip)
     exact, loose = (
         frozenset(edge for each in moving if isinstance(each.seam, kind) for edge in each.edges)

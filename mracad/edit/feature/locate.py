@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -11,9 +10,9 @@ import numpy as np
 from mracad.bspline.surface import Net
 from mracad.edit.feature.ground import SIDEWAYS, Feet, Ground
 from mracad.edit.feature.patch import Patch
-from mracad.errors import EditError, FileError, UsageError
+from mracad.errors import EditError, UsageError
 from mracad.model.brep import Model
-from mracad.spec.places import FEATURE, MOST_PLACES, PLACE, Disc, OnFace, Point, Rectangle, numbers, whole
+from mracad.spec.places import FEATURE, PLACE, Disc, OnFace, Point, Rectangle, whole
 
 Array = np.ndarray
 
@@ -68,44 +67,6 @@ def place(ground: Ground, given: Point | OnFace, label: str) -> Place:
     if not patch.within(uv) or not patch.inside(ground.model.faces[face], uv[None])[0]:
         raise EditError(f"{label} is off the face: {_domain(patch)}", "give parameters inside the face")
     return Place(label, np.asarray(patch.net.evaluate(uv[None]))[0], face, uv)
-
-
-def table(path: str) -> list[tuple[str, tuple[float, ...]]]:
-    """The rows of a CSV file: x, y, z and as the file goes on rotate (degrees), size, height; with their names.
-
-    A first line that begins with a letter is its heading; empty lines and those that begin with # do not count.
-
-    Raises
-    ------
-    FileError
-        When it cannot be read, or for a bad line.
-    """
-    try:
-        with open(path, encoding="utf-8") as file:
-            lines = file.read().splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        why = error.strerror if isinstance(error, OSError) else "it is not UTF-8 text"
-        raise FileError(f"cannot read '{path}': {why}", "give the path of a CSV file with columns x,y,z") from error
-    name = path.replace("\\", "/").rpartition("/")[2]
-    rows: list[tuple[str, tuple[float, ...]]] = []
-    for number, line in enumerate(lines, 1):
-        if not line.strip() or line.lstrip().startswith("#") or (not rows and re.match(r"\s*[\"A-Za-z]", line)):
-            continue
-        where = f"{name}:{number}"
-        row = numbers(line, (3, 4, 5, 6))
-        if row is None:
-            hint = "write x,y,z or x,y,z,rotate,size,height, with numbers in millimetres and degrees"
-            raise FileError(f"{where}: {line.strip()!r} is not a place", hint)
-        if any(factor <= 0 for factor in row[4:5]):
-            raise FileError(f"{where}: size {row[4]:g} is not greater than zero", "give a factor such as 1")
-        if any(factor == 0 for factor in row[5:6]):
-            raise FileError(f"{where}: a copy of height 0 is none", "leave the line out, or give a factor such as 1")
-        rows.append((where, row))
-        if len(rows) > MOST_PLACES:
-            raise FileError(f"'{path}' names more than {MOST_PLACES} places", "give several files, one edit each")
-    if not rows:
-        raise FileError(f"'{path}' names no places", "write lines x,y,z")
-    return rows
 
 
 def patch_of(ground: Ground, face: int, label: str) -> Patch:

@@ -10,7 +10,7 @@ import numpy as np
 
 from mracad.edit.feature.detail import Feature
 from mracad.edit.feature.ground import SIDEWAYS, Feet, Ground, axes
-from mracad.edit.feature.locate import Place, place, standing, table
+from mracad.edit.feature.locate import Place, place, standing
 from mracad.edit.feature.patch import Patch
 from mracad.errors import EditError, UsageError
 from mracad.model.brep import Face
@@ -81,7 +81,7 @@ def listed(ground: Ground, words: Sequence[str]) -> list[Place]:
         if not isinstance(given, spec.Listed):
             found.append(place(ground, given, f"place {len(found) + 1} ({word})"))
             continue
-        for name, row in table(given.path):
+        for name, row in spec.table(given.path):
             rotate, size, height = (*row[3:], *(0.0, 1.0, 1.0)[len(row) - 3 :])
             label = f"{name} ({','.join(f'{x:g}' for x in row[:3])})"
             point = ground.brought(np.array([row[:3]]))[0]

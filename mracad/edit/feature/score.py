@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mracad.bspline.surface import Net
 from mracad.edit.feature.detail import LOST
 from mracad.edit.feature.fit import between
 from mracad.edit.feature.ideal import Copies
 from mracad.edit.feature.locate import Place
 from mracad.edit.feature.patch import Patch
+from mracad.edit.feature.seams import Wanted
 from mracad.errors import EditError
 
 Array = np.ndarray
@@ -53,25 +53,6 @@ class Copy:
 
 
 @dataclass(frozen=True, eq=False)
-class Outcome:
-    """What copies became on a surface.
-
-    Attributes
-    ----------
-    net : Net
-        The surface undisplaced, in the space of the offsets.
-    done : ndarray (nu, nv, 3)
-        Offsets of its control points, without what is removed, in the surface's own frame, mm.
-    alone : ndarray (nu, nv, 3)
-        Those that the copies alone would be.
-    """
-
-    net: Net
-    done: Array
-    alone: Array
-
-
-@dataclass(frozen=True, eq=False)
 class Figures:
     """Points of a copy on a patch: distances (mm) from the ideal, what constraints took, what control points cannot
     hold, and faces, ``(q,)`` each."""
@@ -82,21 +63,24 @@ class Figures:
     faces: Array
 
 
-def compared(copies: Copies, outcomes: Mapping[int, Outcome], exact: Array) -> list[Copy]:
+def compared(copies: Copies, wanted: Mapping[int, Wanted], done: Mapping[int, Array], exact: Array) -> list[Copy]:
     """Every copy beside its ideal.
 
     Parameters
     ----------
     copies : Copies
-    outcomes : mapping of int to Outcome
-        By surface.
+    wanted : mapping of int to Wanted
+        By surface, what copies are on it and what else is.
+    done : mapping of int to ndarray (nu, nv, 3)
+        What became of all of that.
     exact : ndarray of bool (copies,)
         Which are exact shifts.
     """
     found: list[list[Figures]] = [[] for _ in copies.places]
-    for i, outcome in outcomes.items():
+    for i, each in wanted.items():
         if copies.on(copies.ground.patches[i]).any():
-            for k, figures in _figures(copies, copies.ground.patches[i], outcome):
+            left = done[i] - (each.offset - each.alone)
+            for k, figures in _figures(copies, copies.ground.patches[i], each, left):
                 found[k].append(figures)
     points = copies.feet.points
     return [copied(place.label, points[k], found[k], bool(exact[k])) for k, place in enumerate(copies.places)]
@@ -114,25 +98,25 @@ def copied(place: str, at: Array, found: Sequence[Figures], exact: bool = False)
     return Copy(place, (x, y, z), tuple(sorted(faces)), worst, rms, lost, short, exact)
 
 
-def _figures(copies: Copies, patch: Patch, outcome: Outcome) -> Iterator[tuple[int, Figures]]:
-    """The figures of copies on a patch."""
+def _figures(copies: Copies, patch: Patch, wanted: Wanted, done: Array) -> Iterator[tuple[int, Figures]]:
+    """The figures of copies on a patch, of which ``done`` is what became of them."""
     from scipy.spatial import cKDTree
 
-    net = outcome.net
-    both = np.concatenate([outcome.done @ patch.turn.T, outcome.alone @ patch.turn.T], axis=-1)
+    net = wanted.net
+    both = np.concatenate([done @ patch.turn.T, wanted.alone @ patch.turn.T], axis=-1)
     chosen = np.flatnonzero(copies.on(patch))
     for uv, _ in between(copies, patch, (net.u, net.v)):
         uv = uv[patch.covers(uv, net)]
         if not len(uv):
             continue
         points, _, _, normals = patch.evaluate(uv)
-        wanted, _ = copies.ideal(patch, points, normals)
+        ideal, _ = copies.ideal(patch, points, normals)
         on = np.full(len(uv), patch.faces[0].index)
         if len(patch.faces) > 1:
             on = copies.ground.faces(np.full(len(uv), patch.index), uv)
         values = np.asarray(net.with_poles(both).evaluate(uv))
-        done, alone = values[:, :3], values[:, 3:]
-        missed, lost, short = (np.linalg.norm(x, axis=1) for x in (done - wanted, done - alone, alone - wanted))
+        now, alone = values[:, :3], values[:, 3:]
+        missed, lost, short = (np.linalg.norm(x, axis=1) for x in (now - ideal, now - alone, alone - ideal))
         hits = cKDTree(points).query_ball_point(copies.charts.origin[chosen], copies.reach[chosen])
         for k, hit in zip(chosen.tolist(), hits, strict=True):
             if hit:

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from mracad.edit.feature.ground import Ground
-from mracad.edit.feature.locate import place, table, window
-from mracad.errors import EditError, FileError
+from mracad.edit.feature.locate import place, window
+from mracad.errors import EditError
 from mracad.spec import places as spec
 from tests.edit.feature import grounds
 from tests.edit.models import sheet
@@ -50,13 +50,3 @@ def test_places_off_the_face_are_told(ground):
         place(ground, spec.spot("#1@1.5,0.5", "at"), "here")
     with pytest.raises(EditError, match="outside the face"):
         area(ground, "#1@0.5:1.5,0.4:0.5")
-
-
-def test_tables_of_places(tmp_path):
-    path = tmp_path / "places.csv"
-    path.write_text("x,y,z\n\n# none\n1,2,3\n4,5,6,90,2,-1\n")
-    assert table(str(path)) == [("places.csv:4", (1.0, 2.0, 3.0)), ("places.csv:5", (4.0, 5.0, 6.0, 90.0, 2.0, -1.0))]
-    for text in ("1,2\n", "1,2,3,0,0\n", "1,2,3,0,1,0\n", "x,y,z\n"):
-        path.write_text(text)
-        with pytest.raises(FileError):
-            table(str(path))

@@ -6,31 +6,19 @@ from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
 
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
-from mracad.edit.feature.detail import save
 from mracad.edit.feature.edits import repeat
-from mracad.edit.feature.extract import feature_of
 from mracad.edit.feature.seams import crossing
 from mracad.errors import EditError
 from mracad.occ.view import view
 from mracad.seam.border import Border
 from mracad.seam.joint import Joint
 from mracad.seam.natural import Seam
-from mracad.spec.steps import Repeat, Single
+from mracad.spec.steps import Repeat
 from tests import zoo
 from tests.edit import panels
-from tests.edit.feature import grounds
 from tests.edit.feature.grounds import HEIGHT, SIGMA, bump
 from tests.edit.models import sheet
 from tests.occ import shapes
-
-WINDOW = "near:50,50,0,radius:20"
-
-
-@pytest.fixture(scope="module")
-def feature(tmp_path_factory):
-    path = tmp_path_factory.mktemp("feature") / "bump.feature"
-    path.write_bytes(save(feature_of(sheet(grounds.plane()), Single(feature=WINDOW), {0}, WINDOW)))
-    return str(path)
 
 
 def panel(more=()):

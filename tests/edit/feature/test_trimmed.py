@@ -5,9 +5,7 @@ import io
 import numpy as np
 import pytest
 
-from mracad.edit.feature.detail import save
 from mracad.edit.feature.edits import move, repeat
-from mracad.edit.feature.extract import feature_of
 from mracad.errors import EditError
 from mracad.inspect.seams import seams
 from mracad.job.document import run
@@ -17,20 +15,9 @@ from mracad.occ.view import view
 from mracad.seam.cause import Cause, Still
 from mracad.seam.interface import joints
 from mracad.seam.wishes import Wishes
-from mracad.spec.steps import Move, Repeat, Single
+from mracad.spec.steps import Move, Repeat
 from tests.edit import halves
-from tests.edit.feature import grounds
 from tests.edit.feature.grounds import HEIGHT, bump
-from tests.edit.models import sheet
-
-WINDOW = "near:50,50,0,radius:20"
-
-
-@pytest.fixture(scope="module")
-def feature(tmp_path_factory):
-    path = tmp_path_factory.mktemp("feature") / "bump.feature"
-    path.write_bytes(save(feature_of(sheet(grounds.plane()), Single(feature=WINDOW), {0}, WINDOW)))
-    return str(path)
 
 
 def document(sewn=True):
