@@ -82,11 +82,19 @@ def forms(jet: Array) -> Forms:
 
     They are the same bits however many points there are.
     """
+    _Work.done += jet.shape[2]
+    return forms_at_once(jet) if _Work.done < MANY else forms_one_by_one(jet)
+
+
+def forms_at_once(jet: Array) -> Forms:
+    """As :func:`forms`, by operations on all points."""
+    every = _figures(THIN, VOID, jet[1:])
+    return Forms(*(np.stack(each) if isinstance(each, tuple) else each for each in every))
+
+
+def forms_one_by_one(jet: Array) -> Forms:
+    """As :func:`forms`, by compiled code."""
     points = jet.shape[2]
-    _Work.done += points
-    if _Work.done < MANY:
-        every = _figures(THIN, VOID, jet[1:])
-        return Forms(*(np.stack(each) if isinstance(each, tuple) else each for each in every))
     density, bending, variation, largest = np.empty((4, points))
     regular = np.empty(points, bool)
     normal, shape = np.empty((2, 3, points))

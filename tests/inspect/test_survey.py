@@ -10,8 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
-from mracad.inspect import curvature
-from mracad.inspect.curvature import forms
+from mracad.inspect.curvature import forms_at_once, forms_one_by_one
 from mracad.inspect.roughness import Change, Growth, Rougher, Roughness, worse
 from mracad.inspect.survey import POINTS, RIPPLE, STEEP, changes, surveys
 from tests.model.shapes import circle, cylinder, face, graph, plane, rectangle, roof, sphere, torus
@@ -55,11 +54,10 @@ def test_a_sphere(radius):
     assert found.kink < 1e-5
 
 
-@pytest.mark.parametrize("many", [0, np.inf])
+@pytest.mark.parametrize("forms", [forms_at_once, forms_one_by_one])
 @pytest.mark.parametrize("size", [0.0, 1e-300, 1e-120, 1e-60])
-def test_what_rounding_leaves_of_a_pole_is_no_curvature(size, many, monkeypatch):
+def test_what_rounding_leaves_of_a_pole_is_no_curvature(size, forms):
     """S_u as good as nothing at right angles to S_v: powers of it would be no numbers, which nothing compares with."""
-    monkeypatch.setattr(curvature, "MANY", many)
     jet = np.random.default_rng(0).standard_normal((10, 3, 1))
     jet[1, :, 0], jet[2, :, 0] = (size, 0, 0), (0, 1, 0)
     found = forms(jet)
@@ -67,14 +65,11 @@ def test_what_rounding_leaves_of_a_pole_is_no_curvature(size, many, monkeypatch)
     assert (found.bending, found.variation, found.largest) == (0, 0, 0)
 
 
-def test_many_points_have_the_same_bits_as_few(monkeypatch):
+def test_many_points_have_the_same_bits_as_few():
     """What is compiled for many rounds as what is not: no verdict depends on what a process has done before."""
     jet = np.random.default_rng(1).standard_normal((10, 3, 1000))
     jet[1:3, :, 7], jet[2, :, 8], jet[3:, :, 9] = 0.0, 3 * jet[1, :, 8], 0.0
-    monkeypatch.setattr(curvature, "MANY", np.inf)
-    few = forms(jet)
-    monkeypatch.setattr(curvature, "MANY", 0)
-    many = forms(np.asfortranarray(jet))
+    few, many = forms_at_once(jet), forms_one_by_one(np.asfortranarray(jet))
     assert few.regular.sum() == 998
     for each in fields(few):
         assert getattr(few, each.name).tobytes() == getattr(many, each.name).tobytes()
