@@ -161,7 +161,7 @@ def layered(
     senses = file.senses if file else ()
     inward = {face for place, face in told.items() if senses[place] == model.faces[face].reversed} - known
     unseen = "" if known or not flipped else f"; {len(flipped)} faces of the file were turned round"
-    brep = _limited("brep", lambda: layers.brep(kernel_check(document), inward), allowed)
+    brep = limited("brep", lambda: layers.brep(kernel_check(document), inward), allowed)
     validity = kernel_check(document, faces=None if brep.status in ("pass", "fail") else ())
     open_faces = {edge.sides[0].face for edge in model.edges if edge.free}
     found = [
@@ -172,10 +172,10 @@ def layered(
         brep,
         layers.shells(model, validity, known | layers.turned(looks(document))),
         layers.seams(model, measures, allowed.seams),
-        _limited("self-intersection", lambda: _crossed(document, measures, model.diagonal), allowed, slow),
+        limited("self-intersection", lambda: _crossed(document, measures, model.diagonal), allowed, slow),
         layers.tolerances(model, validity, allowed.tolerance),
-        _limited("walls", lambda: _walls(document, allowed.wall), allowed),
-        _limited("mesh", lambda: layers.mesh(triangles(document), open_faces), allowed, slow),
+        limited("walls", lambda: _walls(document, allowed.wall), allowed),
+        limited("mesh", lambda: layers.mesh(triangles(document), open_faces), allowed, slow),
     ]
     return Verdict(name, tuple(found), _valid(found, validity.solids))
 
@@ -231,7 +231,7 @@ def _file(file: Stated, document: Document) -> Layer:
     )
 
 
-def _limited(name: str, make: Callable[[], Layer], limits: CheckLimits, slow: Collection[str] | None = None) -> Layer:
+def limited(name: str, make: Callable[[], Layer], limits: CheckLimits, slow: Collection[str] | None = None) -> Layer:
     """A layer that may take only so long, and whose crash is not the end; skipped when it is not in ``slow``."""
     if slow is not None and name not in slow:
         return Layer(name, "skipped", "not asked for")

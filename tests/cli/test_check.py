@@ -156,7 +156,7 @@ def test_a_tangent_seam_is_smooth(mracad, tmp_path):
 
 
 def test_a_layer_that_takes_too_long_says_nothing():
-    slow = checks._limited("brep", lambda: time.sleep(60), checks.CheckLimits(layer_seconds=0.1))
+    slow = checks.limited("brep", lambda: time.sleep(60), checks.CheckLimits(layer_seconds=0.1))
     assert slow == Layer("brep", "time limit", "more than 0.1 s")
 
 
@@ -166,7 +166,7 @@ def test_a_layer_holds_no_more_memory_than_the_check():
         return Layer("brep", "pass", str(len(held)))
 
     def check():
-        return checks._limited("brep", hungry, checks.CheckLimits(layer_seconds=60.0))
+        return checks.limited("brep", hungry, checks.CheckLimits(layer_seconds=60.0))
 
     assert guard.run(check, Layer).status == "pass"
     with pytest.raises(LimitError, match="memory limit of 500 MB"):
