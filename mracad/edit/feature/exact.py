@@ -39,10 +39,10 @@ class Shifts:
 
 def shifted(copies: Copies) -> Shifts:
     """The copies that are exact shifts of control points."""
-    result = Shifts(np.zeros(len(copies.places), bool), {})
-    source = _source(copies)
+    matched, source = np.zeros(len(copies.places), bool), _source(copies)
+    offsets: dict[int, Array] = {}
     if source is None:
-        return result
+        return Shifts(matched, offsets)
     origin, patch, delta = source
     rows, columns = (np.flatnonzero(delta.any(axis=(1 - axis, 2))) for axis in (0, 1))
     box = (int(rows[0]), int(rows[-1]) + 1), (int(columns[0]), int(columns[-1]) + 1)
@@ -56,10 +56,10 @@ def shifted(copies: Copies) -> Shifts:
         turn = _congruent(patch, target, box, steps, CONGRUENT * copies.height)
         if turn is None or np.abs(turn - copies.charts.axes[i].T @ origin.axes).max() > TURNED:
             continue
-        sums = result.offsets.setdefault(target.index, np.zeros(target.net.poles.shape))
+        sums = offsets.setdefault(target.index, np.zeros(target.net.poles.shape))
         sums[_there(target, box, steps)] += own @ (target.turn.T @ turn @ patch.turn).T * copies.heights[i]
-        result.matched[i] = True
-    return result
+        matched[i] = True
+    return Shifts(matched, offsets)
 
 
 def _source(copies: Copies) -> tuple[Origin, Patch, Array] | None:

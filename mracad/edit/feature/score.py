@@ -10,7 +10,6 @@ import numpy as np
 from mracad.edit.feature.detail import LOST
 from mracad.edit.feature.fit import between
 from mracad.edit.feature.ideal import Copies
-from mracad.edit.feature.locate import Place
 from mracad.edit.feature.patch import Patch
 from mracad.edit.feature.seams import Wanted
 from mracad.errors import EditError
@@ -128,27 +127,21 @@ def refuse(copies: Copies, found: Sequence[Copy], clip: bool) -> None:
 
     ``clip`` lets them take it.
     """
-    for copy, place in zip(found, copies.places, strict=True):
-        share = _share(copies, place, copy.short)
-        if share > SHORT:
+    heights = [copies.feature.height * abs(place.height) for place in copies.places]
+    for copy, height in zip(found, heights, strict=True):
+        if copy.short > SHORT * height:
             raise EditError(
-                f"{copy.place}: the faces there cannot hold the copy: it would be off by {100 * share:.0f} % of its "
-                f"height ({_numbers(copy)})",
+                f"{copy.place}: the faces there cannot hold the copy: it would be off by "
+                f"{100 * copy.short / height:.0f} % of its height ({_numbers(copy)})",
                 "make it smaller with --size, or choose another place",
             )
-    for copy, place in zip(found, copies.places, strict=True):
-        share = _share(copies, place, copy.lost)
-        if share > LOST and not clip:
+    for copy, height in zip(found, heights, strict=True):
+        if copy.lost > LOST * height and not clip:
             raise EditError(
-                f"{copy.place}: edges or holes that do not move take {100 * min(share, 1):.0f} % of the height of "
-                f"the copy there ({_numbers(copy)})",
+                f"{copy.place}: edges or holes that do not move take {100 * min(copy.lost / height, 1):.0f} % of the "
+                f"height of the copy there ({_numbers(copy)})",
                 "move it away from them, make it smaller with --size, or let them take it with --clip",
             )
-
-
-def _share(copies: Copies, place: Place, figure: float) -> float:
-    """A length as a share of the height of a copy."""
-    return figure / (copies.feature.height * abs(place.height))
 
 
 def _numbers(copy: Copy) -> str:
