@@ -20,7 +20,8 @@ from mracad.errors import EditError
 from mracad.inspect.deviation import Deviation, deviations
 from mracad.inspect.mended import Mending, unmended
 from mracad.inspect.seams import SeamMeasure, key, remeasured, seams
-from mracad.job.check import Judged, Original
+from mracad.job.judge import Judged, Original
+from mracad.job.words import numbers
 from mracad.model.brep import Model
 from mracad.spec.steps import Fitting, Selection
 
@@ -137,9 +138,7 @@ def play(
             put = apply or step is not steps[-1]
             result = run(document, function, step.options, progress=progress, apply=put, spoiled=spoiled)
         else:
-            note.doing(step.use)
-            if progress:
-                progress(step.use, 0, 1)
+            tell(progress, step.use)
             result = function(document, step.options, original)
         results.append(result)
         if isinstance(result, Judged) and not result.passed:
@@ -182,7 +181,7 @@ def run(
     from mracad.occ.files import read
     from mracad.occ.view import view
 
-    stage = partial(_told, progress)
+    stage = partial(tell, progress)
     start = time.perf_counter()
     stage("looking at faces")
     model, scope = looked_at(document, options)
@@ -228,7 +227,7 @@ def run(
     )
 
 
-def _told(progress: Progress | None, name: str, done: int = 0, total: int = 1) -> None:
+def tell(progress: Progress | None, name: str, done: int = 0, total: int = 1) -> None:
     """Say which stage is running."""
     note.doing(name)
     if progress:
@@ -253,7 +252,7 @@ class _Left:
         """Leave some more, for a reason; after enough rounds all edited ones that seams join to any of them."""
         self.rounds += 1
         if self.rounds > ROUNDS + 1:
-            names = " ".join(f"#{face + 1}" for face in sorted(faces)[:6]) + (" …" if len(faces) > 6 else "")
+            names = numbers(sorted(faces))
             raise EditError(
                 f"{self.name}: {names} would come out worse even with {len(self.faces)} other faces left as they are",
                 "leave them out with --faces '!#N', or use --amount 0.5",
@@ -308,7 +307,7 @@ def _refuse_if_asked(model: Model, result: Edit, named: Collection[int]) -> None
     asked = [outcome for outcome in result.outcomes if outcome.face in named]
     left = [outcome for outcome in asked if outcome.status == "left"]
     if left and not any(outcome.status == "edited" for outcome in asked):
-        names = " ".join(f"#{o.face + 1}" for o in left[:6]) + (" …" if len(left) > 6 else "")
+        names = numbers([outcome.face for outcome in left])
         raise EditError(
             f"{model.name}: {names}: {left[0].words}",
             "leave these faces out, or give no --faces to edit what can be edited",

@@ -9,13 +9,12 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, BinaryIO
 
-from mracad import note
 from mracad.errors import EditError, FileError
 from mracad.formats import FORMATS, by_content
 from mracad.inspect import accept
 from mracad.inspect.accept import Slack
 from mracad.inspect.faults import Fault, FaultKind, ReadBack
-from mracad.job.document import Progress, Report, Spoilt, play
+from mracad.job.document import Progress, Report, Spoilt, play, tell
 from mracad.job.judge import Judged, Original
 from mracad.job.words import of_fault
 from mracad.model.facts import Facts
@@ -121,10 +120,10 @@ def produce(
         done = Production(tuple(results))
         if not (targets and done.passed):
             return done
-        _tell("writing", progress)
+        tell(progress, "writing")
         made = tuple(_made(document, target, title) for target in targets)
         if verify:
-            _tell("reading back", progress)
+            tell(progress, "reading back")
             memory = _Memory(document, results)
             made = tuple(_judged(each, memory, copies) for each in made)
         faults = tuple((each.target, fault) for each in made if each.read_back for fault in each.read_back.faults)
@@ -170,12 +169,6 @@ def read_back(
     copy = partial(_Copies(original).of, target) if original else None
     slack = Slack(parts={cut.face: cut.parts for cut in written.cut} if written else {})
     return accept.read_back(found, *accept.judge(facts(document), found, slack, copy))
-
-
-def _tell(stage: str, progress: Progress | None) -> None:
-    note.doing(stage)
-    if progress:
-        progress(stage, 0, 1)
 
 
 class _Memory:

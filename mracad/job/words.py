@@ -13,6 +13,15 @@ if TYPE_CHECKING:
     from mracad.job.document import Report
 
 
+SHOWN = 6
+"""Most faces named in one line."""
+
+
+def numbers(faces: Sequence[int]) -> str:
+    """``#3 #7 …`` from face indices."""
+    return " ".join(f"#{face + 1}" for face in faces[:SHOWN]) + (" …" if len(faces) > SHOWN else "")
+
+
 def of_finding(finding: Finding) -> str:
     """What was found, in one line."""
     return _SENTENCES.get(finding.rule, _failure)(finding)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from mracad.job.words import notes, placed
+from mracad.job.words import notes, numbers, placed
 from mracad.spec.steps import Selection
 
 if TYPE_CHECKING:
@@ -20,9 +20,6 @@ if TYPE_CHECKING:
     from mracad.job.produce import Made
     from mracad.seam.natural import Treatment
     from mracad.spec.recipe import Step
-
-SHOWN = 6
-"""Most faces named in one line."""
 
 FINDINGS = 8
 """Most findings of one layer."""
@@ -44,11 +41,6 @@ def degrees(value: float) -> str:
 def plural(count: int, noun: str) -> str:
     """``1 face``, ``2 faces``."""
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
-
-
-def numbers(faces: list[int]) -> str:
-    """``#3 #7 …`` from face indices."""
-    return " ".join(f"#{i + 1}" for i in faces[:SHOWN]) + (" …" if len(faces) > SHOWN else "")
 
 
 def verdict(valid: bool | None) -> str:

@@ -147,18 +147,7 @@ class _Batch:
             self._check_target(item)
         except MracadError as error:
             return _failed(item, error)
-        work = Work(
-            Path(item.source).name,
-            data,
-            steps,
-            self.settings.input_unit,
-            self.settings.encoding,
-            item.format,
-            self.settings.schema or "",
-            self.settings.verify,
-            files,
-            self._epoch,
-        )
+        work = Work(Path(item.source).name, data, steps, self.settings, item.format, files, self._epoch)
         key = self._key(work)
         try:
             beside = self._record(item, work)
@@ -205,10 +194,11 @@ class _Batch:
         """A hash of everything that the output depends on."""
         files = {Path(name).name: digest(data) for name, data in work.files.items()}
         steps = [[step.use, step.id, structs.asdict(step.options)] for step in work.steps]
+        how = work.settings
         parts = [work.name, digest(work.data), steps, dict(work.versions), files]
         return digest(
             json.dumps(
-                [*parts, work.input_unit, work.encoding, work.format, work.schema, work.verify, work.epoch],
+                [*parts, how.input_unit, how.encoding, work.format, how.schema or "", how.verify, work.epoch],
                 sort_keys=True,
             ).encode()
         )

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from mracad import memo, note
 from mracad.errors import Code, MracadError
 from mracad.inspect.faults import ReadBack
+from mracad.job.batch.settings import Settings
 from mracad.spec.recipe import Step, title, versions
 from mracad.spec.steps import STEPS
 
@@ -34,11 +35,9 @@ class Work:
     data : bytes
         Its content.
     steps : tuple of Step
-    input_unit, encoding : str or None
-    format, schema : str
-        Of the output; see ``mracad.occ.files.write``.
-    verify : bool
-        Read the output back and judge it.
+    settings : Settings
+    format : str
+        Of the output.
     files : mapping
         The content of the files that the steps name.
     epoch : str or None
@@ -50,11 +49,8 @@ class Work:
     name: str
     data: bytes = field(repr=False)
     steps: tuple[Step, ...]
-    input_unit: str | None = None
-    encoding: str | None = None
+    settings: Settings = field(default_factory=Settings)
     format: str = "step"
-    schema: str = ""
-    verify: bool = True
     files: Mapping[str, bytes] = field(default_factory=dict, repr=False)
     epoch: str | None = None
     versions: Mapping[str, str] = field(default_factory=versions)
@@ -100,12 +96,14 @@ def do(work: Work) -> Product:
     else:
         os.environ["SOURCE_DATE_EPOCH"] = work.epoch
     memo.clear()
-    target = Target(work.name, work.format, work.schema)
+    target = Target(work.name, work.format, work.settings.schema or "")
     with tempfile.TemporaryDirectory() as folder:
         steps = _here(work, Path(folder))
         note.doing("reading", work.name)
         document = _read(work)
-        done = produce(document, lambda: _read(work), steps, [target], title=title(work.steps), verify=work.verify)
+        done = produce(
+            document, lambda: _read(work), steps, [target], title=title(work.steps), verify=work.settings.verify
+        )
     last = done.results[-1]
     if isinstance(last, Judged) and not last.passed:
         more = f" (and {len(last.failures) - 1} more)" if len(last.failures) > 1 else ""
@@ -121,7 +119,7 @@ def _read(work: Work) -> Document:
     from mracad.occ.files import read
     from mracad.occ.load import Text
 
-    return read(Text(work.data, work.name), work.input_unit, work.encoding)
+    return read(Text(work.data, work.name), work.settings.input_unit, work.settings.encoding)
 
 
 def _here(work: Work, folder: Path) -> list[Step]:
