@@ -68,15 +68,20 @@ class Filter:
         return problem.filtered(stiffness(self.scale), problem.seen)
 
     def ways(self, problem: Problem, target: Array, width: float) -> Iterable[Iterable[Array]]:
-        """What is held meets the target, ever more smoothly; is held as one filters; or fades it a wavelength wide."""
-        if not problem.rimmed:
-            yield [target]
-            return
-        smooth, faded = stiffness(width / 2), problem.fading(width) * target
-        yield [problem.nearest(target, stiff) for stiff in (0.0, stiffness(width / 4), smooth)]
-        yield problem.filtered(stiffness(self.scale)), problem.nearest(target, stiffness(width / 8))
-        yield problem.nearest(faded, smooth), problem.nearest(faded)
-        yield [problem.nearest(calm(problem, target, width) * faded)]
+        """See :func:`ways`."""
+        return ways(problem, target, width)
+
+
+def ways(problem: Problem, target: Array, width: float) -> Iterable[Iterable[Array]]:
+    """What is held meets the target, ever more smoothly; is held as one filters; or fades it a wavelength wide."""
+    if not problem.rimmed:
+        yield [target]
+        return
+    smooth, faded = stiffness(width / 2), problem.fading(width) * target
+    yield [problem.nearest(target, stiff) for stiff in (0.0, stiffness(width / 4), smooth)]
+    yield problem.filtered(stiffness(width)), problem.nearest(target, stiffness(width / 8))
+    yield problem.nearest(faded, smooth), problem.nearest(faded)
+    yield [problem.nearest(calm(problem, target, width) * faded)]
 
 
 def calm(problem: Problem, target: Array, width: float) -> Array:

@@ -23,6 +23,7 @@ class Reason(Enum):
     """Why a face did not change."""
 
     FAIR = "already fair"
+    CLEAN = "no noise"
     AMOUNT = "amount 0"
     NO_COPY = "no copy there"
     NO_FREE = "no free control points"
@@ -61,6 +62,8 @@ class FaceOutcome:
         Crease lines inside the surface, which every edit keeps.
     roughness : pair of Roughness, optional
         Before and after, where the edit looks at it.
+    noise : float, optional
+        Standard deviation of each coordinate of the control points, mm, where the edit looks at it.
     """
 
     face: int
@@ -75,6 +78,7 @@ class FaceOutcome:
     inserted: int = 0
     creases: int = 0
     roughness: tuple[Roughness, Roughness] | None = None
+    noise: float | None = None
 
     @property
     def words(self) -> str:

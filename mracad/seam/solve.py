@@ -158,7 +158,7 @@ class Problem:
         above = f - np.concatenate([each.reshape(-1, 3) for each in trends])
         self.above = above - above[self.seen].mean(axis=0)
 
-    def filtered(self, stiffness: float, free: Array | None = None) -> Array:
+    def filtered(self, stiffness: float, free: Array | None = None, of: Array | None = None) -> Array:
         """δ of the filter of gain 1 / (1 + x²), which takes nothing of the bending of trends.
 
         Parameters
@@ -167,6 +167,8 @@ class Problem:
             a = ℓ⁴, mm⁴.
         free : ndarray of bool (points,), optional
             Control points that may move, instead of those of the spaces; contacts then only join the surfaces.
+        of : ndarray (points, 3), optional
+            What is filtered instead of what is above trends.
 
         Returns
         -------
@@ -175,9 +177,10 @@ class Problem:
         solve = self._solver(stiffness, self.free if free is None else free)
         mended: Array | float = 0.0
         pull = self.pull if free is None else None
-        if self.goal is not None or pull is not None:
+        if of is None and (self.goal is not None or pull is not None):
             mended = solve(np.zeros_like(self.above) if pull is None else pull, goal=self.goal)
-        first = solve(-stiffness * (self.bending @ (self.above + mended)), exactly=False)
+        above = self.above if of is None else of
+        first = solve(-stiffness * (self.bending @ (above + mended)), exactly=False)
         return mended + solve.settled(_chebyshev(lambda x: solve(self.mass @ x, exactly=False), first))
 
     def faired(self, stiffness: float) -> Array:

@@ -84,6 +84,32 @@ class Smooth(Fitting, frozen=True, kw_only=True, forbid_unknown_fields=True):
             raise UsageError("smooth needs either a scale or a level", "give --scale 5mm, --scale 2% or --level 2.5")
 
 
+class Denoise(Fitting, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Take the noise from the NURBS faces of a model and leave their shape: no scale to choose."""
+
+    function: ClassVar[str] = "mracad.edit.denoise:denoise"
+
+    noise: Annotated[
+        Length | None,
+        Meta(
+            description="Standard deviation of each coordinate of the control points (a length); by default it is "
+            "measured, face by face."
+        ),
+    ] = None
+    strength: Annotated[
+        float,
+        Meta(description="What the noise counts for, times what it is: above 1 more is taken.", gt=0.0, le=10.0),
+    ] = 1.0
+
+    @property
+    def done(self) -> str:
+        return "denoised"
+
+    @property
+    def quiet(self) -> str:
+        return "without noise that can be told from shape" if self.amount else "left as they are: amount 0"
+
+
 class OffsetFaces(Fitting, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Move NURBS faces along their normals by a length, with the seams between them and their free edges."""
 

@@ -1,0 +1,172 @@
+"""Denoising: what is no shape goes, at a wavelength that the noise itself chooses.
+
+The filter is that of smoothing (:mod:`mracad.edit.fair`).  Of δ = −D y, with y the control points and σ their noise,
+the expected squared distance to the truth is, but for what is the same for all,
+
+    Cp = ‖δ‖² − 2 · 3 σ² tr D
+
+(C. L. Mallows, Some comments on Cp, Technometrics 15, 1973; 0 for no change), so that wavelength is taken for which it
+is least, and none where that is not below 0.  It is sought with the filter of the control points of each surface along
+both axes, in closed form, and then about there with the filter itself, of all surfaces that seams join; its trace is
+taken from ±1 at random (M. F. Hutchinson, Commun. Stat. Simul. Comput. 18, 1989).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import ClassVar
+
+import numpy as np
+
+from mracad.bspline.surface import Net
+from mracad.edit.fair import ways
+from mracad.edit.result import Edit, Reason
+from mracad.edit.target import Sheet, stiffness
+from mracad.edit.whole import edited
+from mracad.inspect.noise import noise
+from mracad.model.brep import Model
+from mracad.seam.interface import Joints
+from mracad.seam.ladders import Creases
+from mracad.seam.solve import Problem
+from mracad.spec.quantity import length
+from mracad.spec.select import Scope
+from mracad.spec.steps.smooth import Denoise
+from mracad.wavelet.ladder import arc_lengths
+
+Array = np.ndarray
+
+STEPS = 4
+"""Wavelengths that are looked at, from one to twice of it."""
+
+LONGEST = 0.5
+"""Longest wavelength over the size of a surface."""
+
+BESIDE = 2.0**-0.5, 1.0, 2.0**0.5
+"""Wavelengths that are looked at with the filter itself, over what suits control points by themselves."""
+
+
+@dataclass(frozen=True)
+class Quiet:
+    """The wish of a denoising.
+
+    Attributes
+    ----------
+    stated : float or None
+        Noise of all surfaces, mm; by default it is measured.
+    strength : float
+        What σ counts for, times what it is.
+    """
+
+    stated: float | None = None
+    strength: float = 1.0
+    spread: ClassVar[float] = 1.0
+    fairs: ClassVar[bool] = True
+
+    def noise(self, net: Net) -> float:
+        """The noise of a surface, mm; 0 where none can be told."""
+        known = noise(net, np.ones(net.poles.shape[:2], bool)) if self.stated is None else self.stated
+        return self.strength * (known or 0.0)
+
+    def wavelength(self, net: Net, creases: Creases) -> float:
+        """That for which Cp of a surface by itself is least, mm."""
+        axes = [_axis(net, axis) for axis in (0, 1)]
+        within = np.einsum("iu,uvk,vj->ijk", axes[0].modes.T, net.poles, axes[1].modes)
+        power = (within**2).sum(axis=2)
+        bent = np.add.outer(axes[0].squares, axes[1].squares) ** 2
+        shortest, longest = min(a.step for a in axes), LONGEST * max(a.step * len(a.squares) for a in axes)
+        count = 1 + int(STEPS * max(np.log2(longest / (2 * shortest)), 0.0))
+        every = 2 * shortest * 2.0 ** (np.arange(count) / STEPS)
+        size = 6 * self.noise(net) ** 2
+        taken = [(stiffness(w) * bent) ** 2 / (1 + (stiffness(w) * bent) ** 2) for w in every.tolist()]
+        return float(every[np.argmin([float((power * d**2).sum() - size * d.sum()) for d in taken])])
+
+    def space(self, net: Net) -> Net:
+        """The surface over its own knots."""
+        return net
+
+    def target(self, problem: Problem, sheets: Mapping[int, Sheet], joined: Joints) -> Array:
+        """What the filter of the least Cp does were no rim held, ``(points, 3)``; nothing where none is below 0."""
+        size = [np.full(space.free.size, self.noise(sheets[i].origin)) for i, space in problem.spaces.items()]
+        noise = np.concatenate(size)[:, None]
+        if not noise.any():
+            return np.zeros_like(problem.f)
+        width = max(sheet.wavelength for sheet in sheets.values())
+        every = [stiffness(scale * width) for scale in BESIDE]
+        best: Array = np.zeros(problem.f.shape)
+        least = 0.0
+        for stiff in every:
+            delta = problem.filtered(stiff, problem.seen)
+            cp = _risk(problem, stiff, delta, noise)
+            if cp < least:
+                best, least = delta, cp
+        return best
+
+    def ways(self, problem: Problem, target: Array, width: float) -> Iterable[Iterable[Array]]:
+        """As for smoothing; none where there is nothing to do."""
+        return ways(problem, target, width) if target.any() else ()
+
+
+def _risk(problem: Problem, stiff: float, delta: Array, noise: Array) -> float:
+    """Cp of a displacement, over σ² (mm, ``(points, 1)``) at each point that has noise."""
+    signs = np.random.default_rng(0).choice([-1.0, 1.0], delta.shape) * problem.seen[:, None]
+    removed = -signs * problem.filtered(stiff, problem.seen, of=noise * signs)
+    noisy = noise[:, 0] > 0
+    return float(((delta[noisy] / noise[noisy]) ** 2 - 2 * removed[noisy] / noise[noisy]).sum())
+
+
+@dataclass(frozen=True, eq=False)
+class _Axis:
+    """Control points along an axis.
+
+    Attributes
+    ----------
+    modes : ndarray (n, n)
+        Orthonormal, by how much they bend.
+    squares : ndarray (n,)
+        Wavenumbers squared of them, 1/mm².
+    step : float
+        Mean spacing, mm.
+    """
+
+    modes: Array
+    squares: Array
+    step: float
+
+
+def _axis(net: Net, axis: int) -> _Axis:
+    """The control points of a surface along an axis, with free ends."""
+    knots = (net.u, net.v)[axis]
+    along = np.concatenate([[0.0], np.cumsum(arc_lengths(net, axis))])
+    at = np.interp(knots.greville(), knots.breaks, along)
+    step = along[-1] / max(len(at) - 1, 1)
+    at = np.maximum.accumulate(at + step * 1e-6 * np.arange(len(at)))
+    gaps = np.diff(at)
+    second = np.zeros((max(len(at) - 2, 0), len(at)))
+    for k, (a, b) in enumerate(pairwise(gaps)):
+        second[k, k : k + 3] = 2 / (a * (a + b)), -2 / (a * b), 2 / (b * (a + b))
+    values, modes = np.linalg.eigh(second.T @ second)
+    return _Axis(modes, np.sqrt(np.maximum(values, 0.0)), step)
+
+
+def denoise(
+    model: Model,
+    options: Denoise,
+    *,
+    scope: Scope | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> Edit:
+    """Take the noise from the NURBS faces of a model; parameters and errors as for :func:`mracad.edit.whole.edited`."""
+    stated = None if options.noise is None else length(options.noise, model.diagonal, "noise")
+    wish = Quiet(stated, options.strength)
+    edit = edited(model, options, wish, scope, progress)
+    found = []
+    for outcome in edit.outcomes:
+        surface = model.faces[outcome.face].surface
+        if surface is not None and outcome.status in ("edited", "unchanged", "left"):
+            outcome = replace(outcome, noise=wish.noise(model.surfaces[surface].net))
+            if outcome.reason is Reason.FAIR:
+                outcome = replace(outcome, reason=Reason.CLEAN)
+        found.append(outcome)
+    return replace(edit, outcomes=tuple(found))
