@@ -143,7 +143,7 @@ OWN = {
     "compare overwrite": ("--overwrite", "OLD a.xml --junit a.xml"),
     "feature extract overwrite": ("--overwrite", "OLD a.feature"),
     "compare max_deviation": ("--max-deviation 1mm",),
-    "denoise keep": ("--keep g0",),
+    "denoise keep": ("--keep g2", "IN tangent.step --noise 0.2mm"),
     "denoise gap_tolerance": ("--gap-tolerance 1mm", "IN halves.step --noise 0.1mm"),
     "denoise refine": ("--refine never", "IN strips.step --noise 0.2mm --faces #2"),
     "offset gap_tolerance": ("--gap-tolerance 1mm", "IN halves.step --distance 2mm"),
