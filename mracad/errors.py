@@ -51,10 +51,19 @@ def _again(kind: type[MracadError], message: str, hint: str, code: Code) -> Mrac
 
 
 class UsageError(MracadError, ValueError):
-    """A malformed value, an unknown option, face or step."""
+    """A malformed value, an unknown option, face or step.
 
-    def __init__(self, message: str, hint: str = "") -> None:
+    Parameters
+    ----------
+    option : str
+        The option that is wrong, where that is known.
+    """
+
+    option = ""
+
+    def __init__(self, message: str, hint: str = "", option: str = "") -> None:
         super().__init__(message, hint, Code.USAGE)
+        self.option = option
 
 
 class FileError(MracadError, OSError):

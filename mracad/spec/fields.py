@@ -106,6 +106,8 @@ class Field:
     def check(self, value: Any) -> None:
         """Raise UsageError for a value out of bounds, and for a text that is not what it should be."""
         name = dashed(self.name)
+        if value is None and self.default is msgspec.NODEFAULT:
+            raise UsageError(f"{name}: a value is missing", self.hint, name)
         if isinstance(value, tuple):
             for member in value:
                 self.check(member)

@@ -33,22 +33,20 @@ def options(struct: type[Given], values: Mapping[str, Any], place: Callable[[str
     UsageError
         For a value that an option does not take.
     """
-    known, plain = fields(struct), {}
+    known, plain, key = fields(struct), {}, ""
     try:
         for key, value in values.items():
             field = named(known, key)
             if field is None:
-                hint = nearest(key, map(dashed, known))
-                raise UsageError(f"{key}: {struct.__name__} has no such option", hint)
+                raise UsageError(f"{key}: there is no such option", nearest(key, map(dashed, known)))
             plain[field.name] = field.read(value)
-        for name, field in known.items():
-            if field.default is msgspec.NODEFAULT and name not in plain:
-                raise UsageError(f"{dashed(name)}: a value is missing", f"give --{dashed(name)}")
-        return struct(**plain)
+        key = ""
+        missing = {name: None for name, field in known.items() if field.default is msgspec.NODEFAULT}
+        return struct(**(missing | plain))
     except UsageError as error:
         if not place:
             raise
-        raise UsageError(f"{place(error.message.partition(':')[0])}: {error.message}", error.hint) from error
+        raise UsageError(f"{place(dashed(key or error.option))}: {error.message}", error.hint) from error
 
 
 def filled(value: Any, variables: Mapping[str, str], place: str) -> Any:

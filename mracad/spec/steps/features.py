@@ -55,7 +55,7 @@ class Featured(Selection, frozen=True, kw_only=True, forbid_unknown_fields=True)
         if self.band is not None:
             band_of(self.band, 1.0)
         if self.base == "level" and self.band is None:
-            raise UsageError("base: a level needs a band", "give --band 0.5mm:20mm")
+            raise UsageError("base: a level needs a band", "give --band 0.5mm:20mm", "base")
 
 
 class Extract(Featured, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -89,7 +89,7 @@ class Copied(Featured, frozen=True, kw_only=True, forbid_unknown_fields=True):
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.height == 0:
-            raise UsageError("height: it must not be zero", "give --height 0.5, or a negative one for a dent")
+            raise UsageError("height: it must not be zero", "give --height 0.5, or a negative one for a dent", "height")
 
 
 class Single(Copied, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -108,7 +108,8 @@ class Move(Single, frozen=True, kw_only=True, forbid_unknown_fields=True):
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.feature.endswith(".feature"):
-            raise UsageError(f"feature: a file cannot be moved: {self.feature}", "lay copies of it with mracad repeat")
+            message = f"feature: a file cannot be moved: {self.feature}"
+            raise UsageError(message, "lay copies of it with mracad repeat", "feature")
 
     @property
     def done(self) -> str:
@@ -162,7 +163,7 @@ class Repeat(Single, frozen=True, kw_only=True, forbid_unknown_fields=True):
     def __post_init__(self) -> None:
         super().__post_init__()
         if not (self.at or self.grid or self.polar or self.along):
-            raise UsageError("at: no place is given for the copies", "give --at, --grid, --polar or --along")
+            raise UsageError("at: no place is given for the copies", "give --at, --grid, --polar or --along", "at")
         if sum(x is not None for x in (self.grid, self.polar, self.along)) > 1:
             raise UsageError("grid, polar and along cannot be combined", "give one of them")
 
@@ -199,7 +200,8 @@ class Transfer(Copied, frozen=True, kw_only=True, forbid_unknown_fields=True):
             places.feature(self.from_, "from")
             places.spot(self.to, "to")
         elif self.band is None:
-            raise UsageError("band: the detail of a face cannot be transferred without one", "give --band 0mm:20mm")
+            message = "band: the detail of a face cannot be transferred without one"
+            raise UsageError(message, "give --band 0mm:20mm", "band")
         self.share()
 
     def share(self) -> tuple[float, float]:
@@ -208,7 +210,7 @@ class Transfer(Copied, frozen=True, kw_only=True, forbid_unknown_fields=True):
             return (1.0, 1.0) if self.mode == "add" else (0.0, 1.0)
         match = re.fullmatch(r"blend=(\d+\.?\d*|\.\d+)", self.mode)
         if not match or not 0 <= float(match[1]) <= 1:
-            raise UsageError(f"mode: {self.mode!r} is not known", "use add, replace or blend=0.3")
+            raise UsageError(f"mode: {self.mode!r} is not known", "use add, replace or blend=0.3", "mode")
         return 1.0 - float(match[1]), float(match[1])
 
     def models(self) -> tuple[str, ...]:

@@ -115,7 +115,7 @@ class OffsetFaces(Fitting, frozen=True, kw_only=True, forbid_unknown_fields=True
 
     function: ClassVar[str] = "mracad.edit.offset:offset"
 
-    distance: Annotated[Length | None, Meta(description="How far outward (a length).")] = None
+    distance: Annotated[Length, Meta(description="How far outward (a length).")]
     inward: Annotated[bool, Meta(description="Move them inward instead.")] = False
 
     @property
@@ -125,8 +125,3 @@ class OffsetFaces(Fitting, frozen=True, kw_only=True, forbid_unknown_fields=True
     @property
     def quiet(self) -> str:
         return "left as they are"
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if self.distance is None:
-            raise UsageError("distance: it is not said how far", "give --distance 2mm")
