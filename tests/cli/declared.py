@@ -80,6 +80,7 @@ VALUES: Mapping[str, Sequence[Any]] = {
     "assignments": ["smooth.scale=3mm"],
     "chord": ["1mm"],
     "depfile": ["out.d"],
+    "distance": ["0.01mm"],
     "encoding": ["utf-8"],
     "expect": ["1", "report.json"],
     "faces": ["#1", "type:bspline", "!#2"],

@@ -15,13 +15,13 @@ from tests.occ import shapes
 TESTS = Path(__file__).parents[1]
 
 ELSEWHERE = {
-    "batch cluster": "batch/test_cluster.py::test_a_lost_worker_costs_nothing",
-    "batch if_changed": "batch/test_batch.py::test_a_changed_input_or_recipe_is_done_again_and_nothing_else",
-    "batch jobs": "batch/test_batch.py::test_the_outputs_do_not_depend_on_the_number_of_workers",
-    "batch keep_going": "batch/test_batch.py::test_fail_fast_stops_and_retry_tries_again",
-    "batch memory_limit": "batch/test_batch.py::test_five_bad_files_of_a_hundred_cost_five",
-    "batch retry": "batch/test_batch.py::test_fail_fast_stops_and_retry_tries_again",
-    "batch time_limit": "batch/test_batch.py::test_five_bad_files_of_a_hundred_cost_five",
+    "batch cluster": "job/batch/test_cluster.py::test_a_lost_worker_costs_nothing",
+    "batch if_changed": "job/batch/test_batch.py::test_a_changed_input_or_recipe_is_done_again_and_nothing_else",
+    "batch jobs": "job/batch/test_batch.py::test_the_outputs_do_not_depend_on_the_number_of_workers",
+    "batch keep_going": "job/batch/test_batch.py::test_fail_fast_stops_and_retry_tries_again",
+    "batch memory_limit": "job/batch/test_batch.py::test_five_bad_files_of_a_hundred_cost_five",
+    "batch retry": "job/batch/test_batch.py::test_fail_fast_stops_and_retry_tries_again",
+    "batch time_limit": "job/batch/test_batch.py::test_five_bad_files_of_a_hundred_cost_five",
 }
 """Options whose effect needs more than two calls, and the tests of it."""
 
