@@ -56,6 +56,11 @@ def edited(
         progress=progress,
     )
     amounts = {i: moved.scaled(options.amount * moved.amount) for i, moved in result.moved.items()}
+    if not wish.fairs:  # less of it is not what was asked for
+        amounts = {
+            i: now if result.moved[i].amount == 1.0 else replace(now.undone(), limits=now.limits)
+            for i, now in amounts.items()
+        }
     result = replace(result, moved=amounts)
     outcomes = tuple(_outcome(face, result, movable, scope, options) for face in model.faces)
     return Edit(result.displacement(), outcomes, edges=treatments(model, movable, result, options))

@@ -100,6 +100,13 @@ def test_what_is_held_stays():
     assert abs(points(edit.displacement.applied(flat))[:, 2].max() - DISTANCE) < 1e-2
 
 
+def test_what_would_fold_is_left():
+    """A cylinder has no offset beyond its axis; less than was asked for is not done instead."""
+    edit = offset(sheet(grounds.cylinder(40.0, 120.0)), OffsetFaces(distance="60mm", inward=True))
+    (outcome,) = edit.outcomes
+    assert outcome.status == "left" and not edit.displacement.offsets and "fold" in outcome.said
+
+
 def test_the_command_writes_what_is_asked_for(tmp_path):
     source, target, report = grounds.save(tmp_path / "in.step", grounds.uneven()), tmp_path / "out.step", tmp_path / "r"
     assert main(["offset", str(source), "-o", str(target), "--distance", "0.2cm", "--report", str(report)]) == 0
