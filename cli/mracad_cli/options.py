@@ -107,10 +107,10 @@ def _option(field: Field) -> Callable[[Command], Command]:
     if metavar is None and not field.choices:
         metavar = {float: "FLOAT", int: "INTEGER"}.get(field.type, "TEXT")
     shown = default not in (None, (), "")
+    known: dict[str, Any] = {"required": True} if missing else {"default": default}  # a default of None is one
     return click.option(
-        field.name, flag, help=field.help, metavar=metavar, default=default, required=missing, multiple=field.many,
-        type=kind, show_default=shown,
-    )  # fmt: skip
+        field.name, flag, help=field.help, metavar=metavar, multiple=field.many, type=kind, show_default=shown, **known
+    )
 
 
 def apply(*decorators: Callable[[Command], Command]) -> Callable[[Command], Command]:

@@ -119,3 +119,9 @@ def test_the_command_writes_what_is_asked_for(tmp_path):
 def test_bad_distances_are_refused(distance):
     with pytest.raises(UsageError, match="distance"):
         OffsetFaces(distance=distance)
+
+
+def test_a_distance_must_be_given(tmp_path, capsys):
+    source = grounds.save(tmp_path / "in.step", grounds.uneven())
+    assert main(["offset", str(source), "-o", str(tmp_path / "out.step")]) == 2
+    assert "--distance" in capsys.readouterr().err and not (tmp_path / "out.step").exists()
