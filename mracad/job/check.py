@@ -24,6 +24,7 @@ from mracad.spec.steps import Check
 
 if TYPE_CHECKING:
     from mracad.inspect.seams import SeamMeasure
+    from mracad.model.brep import Model
     from mracad.model.facts import Stated
     from mracad.occ.document import Document
 
@@ -43,20 +44,21 @@ def check(document: Document, options: Check, original: Original | None = None, 
     """
     expected, freeform = expectation(options.expect) if options.expect else (None, False)
 
-    def limits(size: float) -> CheckLimits:
-        gap, tolerance, wall = (
-            None if given is None else length(given, size, name)
-            for given, name in (
-                (options.max_gap, "max-gap"),
-                (options.max_tolerance, "max-tolerance"),
-                (options.min_wall, "min-wall"),
-            )
-        )
-        along = SeamLimits(options.kink, gap, options.max_angle, expected, freeform)
-        return CheckLimits(along, tolerance, wall, options.layer_limit)
+    from mracad.occ.view import view
 
+    model = view(document)
+    gap, tolerance, wall = (
+        None if given is None else length(given, model.diagonal, name)
+        for given, name in (
+            (options.max_gap, "max-gap"),
+            (options.max_tolerance, "max-tolerance"),
+            (options.min_wall, "min-wall"),
+        )
+    )
+    along = SeamLimits(options.kink, gap, options.max_angle, expected, freeform)
+    limits = CheckLimits(along, tolerance, wall, options.layer_limit)
     slow = SLOW if text is not None else SLOW.intersection(options.fail_on)
-    verdict = layered(text, document, limits, slow)
+    verdict = _layered(text, document, model, limits, slow)
     return Judged(verdict, tuple(failing(verdict, options.fail_on)))
 
 
@@ -128,29 +130,16 @@ SLOW = frozenset({"self-intersection", "mesh"})
 """Layers that take long."""
 
 
-def layered(
-    text: bytes | None, document: Document, limits: Callable[[float], CheckLimits], slow: Collection[str] = SLOW
+def _layered(
+    text: bytes | None, document: Document, model: Model, allowed: CheckLimits, slow: Collection[str]
 ) -> Verdict:
-    """Check a document, layer by layer.
-
-    Parameters
-    ----------
-    text : bytes or None
-        The file that it was read from; None for a document that has changed since.
-    document : Document
-    limits : callable
-        What it allows, from the diagonal of the document in mm.
-    slow : collection of str
-        Those of :data:`SLOW` to be looked at.
-    """
+    """Every layer; of those that take long the ``slow`` ones."""
     from mracad.occ.check import check as kernel_check
     from mracad.occ.check import looks
     from mracad.occ.stated import stated, unloaded
     from mracad.occ.triangles import triangles
-    from mracad.occ.view import view
 
-    model, name = view(document), document.name
-    allowed = limits(model.diagonal)
+    name = document.name
     is_step = text is not None and by_content(text, name).name == "step"
     file = stated(text, name) if text is not None and is_step else None
     why = "not written yet" if text is None else "only STEP files are looked at as parsed"

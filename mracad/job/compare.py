@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -10,7 +9,6 @@ from mracad.errors import UsageError
 from mracad.formats import unheld
 from mracad.inspect.compare import CompareLimits, Subject
 from mracad.inspect.compare import compare as differences
-from mracad.inspect.verdict import Verdict
 from mracad.job.judge import Judged, Original
 from mracad.spec.quantity import length
 from mracad.spec.steps import Compare
@@ -36,39 +34,17 @@ def compare(document: Document, options: Compare, original: Original | None = No
     else:
         raise UsageError("compare has nothing to compare with", "name a reference")
 
-    def limits(size: float) -> CompareLimits:
-        growth, volume = options.max_gap_growth, options.max_volume_change
-        return CompareLimits(
-            deviation=length(options.max_deviation, size, "max-deviation"),
-            gap_growth=None if growth is None else length(growth, size, "max-gap-growth"),
-            angle_growth=options.max_angle_growth,
-            volume_change=None if volume is None else volume / 100,
-        )
-
-    verdict = compared(reference, document, limits, options.ignore)
+    place = "assembly" in unheld(reference.schema, document.schema)
+    old, new = (_measured(each, place) for each in (reference, document))
+    growth, volume, size = options.max_gap_growth, options.max_volume_change, old.model.diagonal
+    limits = CompareLimits(
+        deviation=length(options.max_deviation, size, "max-deviation"),
+        gap_growth=None if growth is None else length(growth, size, "max-gap-growth"),
+        angle_growth=options.max_angle_growth,
+        volume_change=None if volume is None else volume / 100,
+    )
+    verdict = differences(old, new, limits, options.ignore)
     return Judged(verdict, verdict.failed())
-
-
-def compared(
-    ref: Document,
-    new: Document,
-    limits: Callable[[float], CompareLimits] | None = None,
-    ignore: Iterable[str] = (),
-) -> Verdict:
-    """Judge a new version of a document by a reference.
-
-    Parameters
-    ----------
-    ref, new : Document
-    limits : callable, optional
-        What may differ, from the diagonal of the reference in mm; by default faces may deviate by a millionth of a
-        millimetre.
-    ignore : iterable of str
-        Names of layers (see :data:`mracad.inspect.compare.LAYERS`) that are left out.
-    """
-    place = "assembly" in unheld(ref.schema, new.schema)
-    old, fresh = (_measured(document, place) for document in (ref, new))
-    return differences(old, fresh, limits(old.model.diagonal) if limits else CompareLimits(1e-6), ignore)
 
 
 def _measured(document: Document, place: bool) -> Subject:
