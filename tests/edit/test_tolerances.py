@@ -58,7 +58,7 @@ def test_options_say_what_an_edit_may_be_worse_in(model):
     options = Smooth(scale="5mm", gap_tolerance="1%", max_deviation="2mm")
     found = tolerances(model, options)
     assert found.gap == pytest.approx(model.diagonal / 100) and found.deviation == 2.0
-    assert tolerances(model, Repeat(feature="near:0,0,0", at=("near:1,1,1",))) == Tolerances()
+    assert tolerances(model, Repeat(feature="near:0,0,0,radius:1", at=("near:1,1,1",))) == Tolerances()
 
 
 def test_two_faces_that_move_by_themselves_share_what_their_edge_may_gape(model):
