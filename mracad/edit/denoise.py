@@ -13,7 +13,7 @@ taken from ±1 at random (M. F. Hutchinson, Commun. Stat. Simul. Comput. 18, 198
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import ClassVar
@@ -22,11 +22,12 @@ import numpy as np
 
 from mracad.bspline.surface import Net
 from mracad.edit.fair import ways
-from mracad.edit.result import Edit, Reason
+from mracad.edit.result import Edit, FaceOutcome, Reason
 from mracad.edit.target import Sheet, stiffness
 from mracad.edit.whole import edited
 from mracad.inspect.noise import noise
-from mracad.model.brep import Model
+from mracad.model.brep import Face, Model
+from mracad.seam.hold import separate
 from mracad.seam.interface import Joints
 from mracad.seam.ladders import Creases
 from mracad.seam.solve import Problem
@@ -64,12 +65,14 @@ class Quiet:
     spread: ClassVar[float] = 1.0
     fairs: ClassVar[bool] = True
 
-    def noise(self, net: Net) -> float:
-        """The noise of a surface, mm; 0 where none can be told."""
-        known = noise(net, np.ones(net.poles.shape[:2], bool)) if self.stated is None else self.stated
-        return self.strength * (known or 0.0)
+    def noise(self, net: Net, faces: Sequence[Face]) -> float:
+        """The noise of a surface, mm; 0 where none can be told.  Only control points inside faces say it: those
+        beyond their edges may be anything."""
+        if self.stated is not None:
+            return self.stated
+        return noise(net, separate(net, faces, [face.index for face in faces], "g0").free) or 0.0
 
-    def wavelength(self, net: Net, creases: Creases) -> float:
+    def wavelength(self, net: Net, faces: Sequence[Face], creases: Creases) -> float:
         """That for which Cp of a surface by itself is least, mm."""
         axes = [_axis(net, axis) for axis in (0, 1)]
         within = np.einsum("iu,uvk,vj->ijk", axes[0].modes.T, net.poles, axes[1].modes)
@@ -78,7 +81,7 @@ class Quiet:
         shortest, longest = min(a.step for a in axes), LONGEST * max(a.step * len(a.squares) for a in axes)
         count = 1 + int(STEPS * max(np.log2(longest / (2 * shortest)), 0.0))
         every = 2 * shortest * 2.0 ** (np.arange(count) / STEPS)
-        size = 6 * self.noise(net) ** 2
+        size = 6 * (self.strength * self.noise(net, faces)) ** 2
         taken = [(stiffness(w) * bent) ** 2 / (1 + (stiffness(w) * bent) ** 2) for w in every.tolist()]
         return float(every[np.argmin([float((power * d**2).sum() - size * d.sum()) for d in taken])])
 
@@ -88,8 +91,8 @@ class Quiet:
 
     def target(self, problem: Problem, sheets: Mapping[int, Sheet], joined: Joints) -> Array:
         """What the filter of the least Cp does were no rim held, ``(points, 3)``; nothing where none is below 0."""
-        size = [np.full(space.free.size, self.noise(sheets[i].origin)) for i, space in problem.spaces.items()]
-        noise = np.concatenate(size)[:, None]
+        known = {i: self.strength * self.noise(sheet.origin, sheet.faces) for i, sheet in sheets.items()}
+        noise = np.concatenate([np.full((space.free.size, 1), known[i]) for i, space in problem.spaces.items()])
         if not noise.any():
             return np.zeros_like(problem.f)
         width = max(sheet.wavelength for sheet in sheets.values())
@@ -161,12 +164,14 @@ def denoise(
     stated = None if options.noise is None else length(options.noise, model.diagonal, "noise")
     wish = Quiet(stated, options.strength)
     edit = edited(model, options, wish, scope, progress)
-    found = []
-    for outcome in edit.outcomes:
-        surface = model.faces[outcome.face].surface
-        if surface is not None and outcome.status in ("edited", "unchanged", "left"):
-            outcome = replace(outcome, noise=wish.noise(model.surfaces[surface].net))
-            if outcome.reason is Reason.FAIR:
-                outcome = replace(outcome, reason=Reason.CLEAN)
-        found.append(outcome)
-    return replace(edit, outcomes=tuple(found))
+    looked = {outcome.face for outcome in edit.faces("edited", "unchanged", "left")}
+    noises: dict[int, float] = {}
+    for surface in model.surfaces:
+        faces = [model.faces[i] for i in surface.faces if i in looked]
+        noises |= dict.fromkeys((face.index for face in faces), wish.noise(surface.net, faces) if faces else 0.0)
+    return replace(edit, outcomes=tuple(_said(each, noises.get(each.face)) for each in edit.outcomes))
+
+
+def _said(outcome: FaceOutcome, noise: float | None) -> FaceOutcome:
+    """An outcome with the noise of its face; what is fair has none."""
+    return replace(outcome, noise=noise, reason=Reason.CLEAN if outcome.reason is Reason.FAIR else outcome.reason)

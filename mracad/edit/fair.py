@@ -11,7 +11,7 @@ follow a face).  Waves of half the scale keep 0.4 %, those of three scales all b
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -26,7 +26,7 @@ from mracad.edit.pose import Scene
 from mracad.edit.target import Sheet, Wish, eased, sheets, stiffness
 from mracad.edit.tolerances import Tolerances
 from mracad.inspect.curvature import forms
-from mracad.model.brep import Model
+from mracad.model.brep import Face, Model
 from mracad.seam.interface import Joints, joints
 from mracad.seam.ladders import Creases
 from mracad.seam.solve import Problem
@@ -55,7 +55,7 @@ class Filter:
     spread: ClassVar[float] = 1.0
     fairs: ClassVar[bool] = True
 
-    def wavelength(self, net: Net, creases: Creases) -> float:
+    def wavelength(self, net: Net, faces: Sequence[Face], creases: Creases) -> float:
         """The scale, for every surface."""
         return self.scale
 

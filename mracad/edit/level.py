@@ -27,6 +27,7 @@ from mracad.bspline.knots import KnotVector
 from mracad.bspline.refine import refinement
 from mracad.bspline.surface import Net
 from mracad.edit.target import Sheet, stiffness
+from mracad.model.brep import Face
 from mracad.seam.conditions import rows
 from mracad.seam.constrained import Constrained
 from mracad.seam.interface import Joints
@@ -59,7 +60,7 @@ class Level:
     fairs: ClassVar[bool] = True
     spread: ClassVar[float] = math.inf  # waves beside what goes are part of a projection
 
-    def wavelength(self, net: Net, creases: Creases) -> float:
+    def wavelength(self, net: Net, faces: Sequence[Face], creases: Creases) -> float:
         """√2 spacings of the coarse knots, in the direction that gets coarser where they are closest."""
         own, found = (net.u, net.v), ladders({0: net}, {0: creases}, ())
         lengths = [float(arc_lengths(net, axis).sum()) for axis in (0, 1)]

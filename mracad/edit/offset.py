@@ -17,7 +17,7 @@ from mracad.bspline.surface import Net, pairs
 from mracad.edit.result import Edit
 from mracad.edit.target import Sheet, stiffness
 from mracad.edit.whole import edited
-from mracad.model.brep import Model
+from mracad.model.brep import Face, Model
 from mracad.seam.interface import Joints
 from mracad.seam.ladders import Creases
 from mracad.seam.solve import Problem
@@ -52,7 +52,7 @@ class Outward:
     spread: ClassVar[float] = math.inf
     fairs: ClassVar[bool] = False
 
-    def wavelength(self, net: Net, creases: Creases) -> float:
+    def wavelength(self, net: Net, faces: Sequence[Face], creases: Creases) -> float:
         """Within which it fades, mm."""
         return FADE * abs(self.distance)
 

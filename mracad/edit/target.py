@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
 
@@ -46,8 +46,8 @@ class Wish(Protocol):
     @property
     def fairs(self) -> bool: ...
 
-    def wavelength(self, net: Net, creases: Creases) -> float:
-        """Wavelength below which it takes waves from a surface, mm: within it, it fades beside what is held."""
+    def wavelength(self, net: Net, faces: Sequence[Face], creases: Creases) -> float:
+        """Wavelength below which it takes waves from faces of a surface, mm; beside what is held it fades within it."""
         ...
 
     def space(self, net: Net) -> Net:
@@ -133,7 +133,7 @@ def _sheet(index: int, origin: Net, every: tuple[Face, ...], faces: tuple[Face, 
     net = wish.space(origin.over(origin.u.elevated(DEGREE), origin.v.elevated(DEGREE)))
     points = quadrature(net, faces)
     sharp = creases(net, np.ones(net.poles.shape[:2], bool))
-    wavelength = wish.wavelength(origin, sharp)
+    wavelength = wish.wavelength(origin, faces, sharp)
     metric = smoothed(net, points, SMOOTHER**4 * stiffness(wavelength))
     form = forms(net, metric, points, sharp)
     reach = seen(net, form)
