@@ -107,6 +107,7 @@ VALUES: Mapping[str, Sequence[Any]] = {
     "memory_limit": ["16GB"],
     "min_wall": ["0.5mm"],
     "mode": ["replace", "blend=0.3"],
+    "noise": ["0.01mm"],
     "output": ["out.feature"],
     "reference_unit": ["mm"],
     "report": ["report.json"],
@@ -117,6 +118,7 @@ VALUES: Mapping[str, Sequence[Any]] = {
     "seed": ["3"],
     "size": ["0.8"],
     "spin": ["20"],
+    "strength": ["2"],
     "taper": ["0.5mm"],
     "time_limit": ["10min"],
 }
