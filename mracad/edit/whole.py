@@ -18,7 +18,7 @@ from mracad.seam.natural import Treatment
 from mracad.seam.wishes import Wishes
 from mracad.spec.select import Scope
 from mracad.spec.select import scope as scope_of
-from mracad.spec.steps import Fitting
+from mracad.spec.steps import Fairing, Fitting
 
 
 def edited(
@@ -46,11 +46,12 @@ def edited(
     held = scope.edges if options.edges == "coupled" else frozenset(edge.index for edge in model.edges)
     fit = math.radians(options.fit_g1 or 0.0)
     allowed = tolerances(model, options)
+    free = isinstance(options, Fairing) and options.free_edges == "smooth"
     result = faired(
         model,
         movable,
         wish,
-        Wishes(options.keep, fit, options.close_gaps, held, open=not wish.fairs),
+        Wishes(options.keep, fit, options.close_gaps, held, open=not wish.fairs, free=free),
         allowed if wish.fairs else replace(allowed, growth=RESHAPED, fairer=False),
         refine=options.refine == "auto",
         progress=progress,

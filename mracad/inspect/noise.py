@@ -25,7 +25,7 @@ MEDIAN = 1.5381723
 AGREE = 1.15
 """What is more than this times the least has shape in it."""
 
-FEWEST, ACROSS = 40, 10
+FEWEST, ACROSS = 40, 6
 """Differences, and control points along either axis, from which on noise can be told."""
 
 

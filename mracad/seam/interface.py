@@ -58,6 +58,8 @@ class Joints:
         Whether jumps of curvature along them must not grow.
     open : frozenset of int
         Free edges and poles that move with their faces.
+    cornered : bool
+        Whether the corners of faces between two of them stay.
     """
 
     exact: tuple[Seam, ...] = ()
@@ -67,6 +69,7 @@ class Joints:
     meetings: Mapping[int, Meeting] = field(default_factory=dict)
     jumps: bool = False
     open: frozenset[int] = frozenset()
+    cornered: bool = False
 
     @property
     def moving(self) -> frozenset[int]:
@@ -122,7 +125,16 @@ def joints(model: Model, movable: Collection[int], wishes: Wishes) -> Joints:
             frozen |= dict.fromkeys((seam.edge, seam.twin), rest)
     jumps = wishes.keep not in CONTINUITY
     joined = Joints(tuple(exact), tuple(loose), known.closing, frozen, known.meetings, jumps)
+    if wishes.free:
+        joined = _freed(joined)
     return _opened(joined) if wishes.open else joined
+
+
+def _freed(joined: Joints) -> Joints:
+    """The same with free edges that move with their faces."""
+    ends = frozenset(edge for edge, why in joined.frozen.items() if why.still is Still.FREE)
+    frozen = {edge: why for edge, why in joined.frozen.items() if edge not in ends}
+    return replace(joined, frozen=frozen, open=ends, cornered=True)
 
 
 def _opened(joined: Joints) -> Joints:
@@ -179,6 +191,10 @@ def rims(
     contacts : list of Contact
     """
     held, contacts, moving = np.zeros(net.poles.shape[:2], bool), [], joined.moving
+    if joined.cornered:
+        held |= _corners(
+            net, [t for face in faces if face.index in movable for t in face.trims if t.edge in joined.open]
+        )
     for face in faces:
         if face.index not in movable:
             held |= reached(net, [face])[face.index]
@@ -274,6 +290,16 @@ def end(net: Net, trim: Trim) -> tuple[int, int] | None:
         if abs(at - limit) <= END * (high - low) and multiplicity == knots.degree + 1:
             return axis, place
     return None
+
+
+def _corners(net: Net, trims: Iterable[Trim]) -> Array:
+    """The corners of a net of which both sides lie on trims."""
+    sides = {end(net, trim) for trim in trims}
+    held = np.zeros(net.poles.shape[:2], bool)
+    for i in (0, -1):
+        for j in (0, -1):
+            held[i, j] = (0, i) in sides and (1, j) in sides
+    return held
 
 
 def _rows(net: Net, trim: Trim, axis: int, place: int, order: int) -> Array:

@@ -34,6 +34,8 @@ class Wishes:
         Jump of the curvature, 1/mm, that counts for nothing beside :data:`BENT` of the curvature itself.
     open : bool
         Whether free edges and poles move with their faces.
+    free : bool
+        Whether free edges do, but for the corners of faces between two of them.
     """
 
     keep: str = "g1"
@@ -42,6 +44,7 @@ class Wishes:
     hold: frozenset[int] = frozenset()
     bend: float = 1e-9
     open: bool = False
+    free: bool = False
 
     def order(self, angles: Array, one: Array, other: Array) -> int:
         """Derivatives across an edge that are kept, from what there is along it.

@@ -83,6 +83,7 @@ WAYS = {
     "fit_g1": ("--fit-g1 20",),
     "folder": ("--folder other",),
     "format": ("--format brep", "-o -"),
+    "free_edges": ("--free-edges smooth",),
     "from_": ("--from near:5,5,0,radius:1",),
     "grid": ("--grid 1x2,1,2",),
     "height": ("--height 0.5",),

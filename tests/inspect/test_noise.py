@@ -46,7 +46,7 @@ def test_only_points_that_may_have_noise_count():
 
 
 def test_few_points_tell_nothing():
-    one = net(0.05, (6, 40))
+    one = net(0.05, (2, 40))
     assert noise(one, every(one)) is None
     some = np.zeros_like(every(net(0.05)))
     some[:10, :10] = True

@@ -10,11 +10,11 @@ from mracad.spec.steps import checks, features, smooth
 from mracad.spec.steps.base import Options, Selection
 from mracad.spec.steps.checks import Check, Compare
 from mracad.spec.steps.features import Copied, Extract, Featured, Move, Repeat, Single, Transfer
-from mracad.spec.steps.smooth import Fitting, Smooth
+from mracad.spec.steps.smooth import Fairing, Fitting, Smooth
 
 __all__ = [
-    "STEPS", "Check", "Compare", "Copied", "Extract", "Featured", "Fitting", "Move", "Options", "Repeat", "Selection",
-    "Single", "Smooth", "Transfer",
+    "STEPS", "Check", "Compare", "Copied", "Extract", "Fairing", "Featured", "Fitting", "Move", "Options", "Repeat",
+    "Selection", "Single", "Smooth", "Transfer",
 ]  # fmt: skip
 
 STEPS: dict[str, type[Options]] = {

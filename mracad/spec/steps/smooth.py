@@ -46,7 +46,19 @@ class Fitting(Selection, frozen=True, kw_only=True, forbid_unknown_fields=True):
     ] = None
 
 
-class Smooth(Fitting, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class Fairing(Fitting, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """How an edit that makes faces fairer goes about it."""
+
+    free_edges: Annotated[
+        Literal["hold", "smooth"],
+        Meta(
+            description="Edges of one face alone: hold, they stay; smooth, they move with their face, but for the "
+            "corners between two of them."
+        ),
+    ] = "hold"
+
+
+class Smooth(Fairing, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Remove detail finer than a scale from the NURBS faces of a model."""
 
     function: ClassVar[str] = "mracad.edit.smooth:smooth"
@@ -84,7 +96,7 @@ class Smooth(Fitting, frozen=True, kw_only=True, forbid_unknown_fields=True):
             raise UsageError("smooth needs either a scale or a level", "give --scale 5mm, --scale 2% or --level 2.5")
 
 
-class Denoise(Fitting, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class Denoise(Fairing, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Take the noise from the NURBS faces of a model and leave their shape: no scale to choose."""
 
     function: ClassVar[str] = "mracad.edit.denoise:denoise"
