@@ -92,7 +92,8 @@ def run(
 
 
 _OUT_OF_MEMORY = (
-    "failed to map segment", "error return without exception set", "bad_alloc", "Unable to create type object",
+    "failed to map segment", "cannot map zero-fill pages", "Cannot allocate memory", "bad_alloc",
+    "error return without exception set", "Unable to create type object",
 )  # fmt: skip
 """What libraries say that ran out of memory: the loader, and compiled modules while they are loaded."""
 
