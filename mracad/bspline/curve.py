@@ -36,7 +36,7 @@ class Curve:
     def __post_init__(self) -> None:
         if self.poles.ndim != 2 or len(self.poles) != self.knots.count:
             raise UsageError(
-                f"control points of shape {self.poles.shape} where the knot vector wants {self.knots.count}"
+                f"control points of shape {self.poles.shape}, but the knot vector needs {self.knots.count}"
             )
         check_weights(self.weights, self.poles.shape[:1])
 

@@ -42,7 +42,7 @@ class Net:
     def __post_init__(self) -> None:
         if self.poles.ndim != 3 or self.poles.shape[:2] != (self.u.count, self.v.count):
             raise UsageError(
-                f"control points of shape {self.poles.shape} where the knots want {self.u.count} × {self.v.count}"
+                f"control points of shape {self.poles.shape}, but the knots need {self.u.count} × {self.v.count}"
             )
         check_weights(self.weights, self.poles.shape[:2])
 

@@ -1,4 +1,4 @@
-"""What an edit did: the displacement, and what became of each face and why."""
+"""The result of an edit: the displacement, and the outcome for each face."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from mracad.seam.natural import Treatment
 from mracad.spec.select import Scope
 
 Status = Literal["edited", "unchanged", "left", "held", "unselected", "analytic"]
-"""``edited``; ``unchanged``: nothing to do there; ``left``: something to do that cannot be done well;
+"""``edited``; ``unchanged``: nothing to do there; ``left``: the edit would have made it worse;
 ``held``: by ``--hold``; ``unselected``; ``analytic``: not a NURBS face."""
 
 
@@ -25,7 +25,7 @@ class Reason(Enum):
     FAIR = "already fair"
     CLEAN = "no noise"
     AMOUNT = "amount 0"
-    NO_COPY = "no copy there"
+    NO_COPY = "no copy on it"
     NO_FREE = "no free control points"
     RIM = "cannot get fairer with its edges held"
     ROUGHER = "would get rougher"
@@ -47,23 +47,23 @@ class FaceOutcome:
     reason : Reason or None
         Why it did not change.
     said : str
-        More of that: in what it would get rougher, of what kind it is.
+        Details of the reason: which figures would get worse, or the kind of an analytic face.
     detail : float
-        Largest change that the edit would make to a control point of the face were nothing held, mm.
+        Largest change that the edit would make to a control point of the face if nothing were held, mm.
     moved : float
         Largest change made, mm.
     amount : float
-        Share of what was wanted that was done.
+        Share of the wanted change that was made.
     free, points : int
-        Free control points, and all of the surface as it is now.
+        Control points that are free, and all control points of the surface after the edit.
     inserted : int
         Knots inserted.
     creases : int
         Crease lines inside the surface, which every edit keeps.
     roughness : pair of Roughness, optional
-        Before and after, where the edit looks at it.
+        Before and after, where the edit measures it.
     noise : float, optional
-        Standard deviation of each coordinate of the control points, mm, where the edit looks at it.
+        Standard deviation of each coordinate of the control points, mm, where the edit measures it.
     """
 
     face: int
@@ -82,15 +82,15 @@ class FaceOutcome:
 
     @property
     def words(self) -> str:
-        """Why it did not change."""
+        """The reason with its details."""
         told = "" if self.reason is None else self.reason.value
         return f"{told}: {self.said}" if told and self.said else told or self.said
 
 
 @dataclass(frozen=True, eq=False)
 class Edit:
-    """A displacement, the outcome for each face of the model in face order, what was done about each edge, and what
-    became of each copy of a feature."""
+    """A displacement, the outcome for each face of the model in face order, the treatment of each edge, and the result
+    for each copy of a feature."""
 
     displacement: Displacement
     outcomes: tuple[FaceOutcome, ...]
@@ -103,7 +103,7 @@ class Edit:
 
 
 def spared(face: Face, scope: Scope, movable: Collection[int]) -> FaceOutcome | None:
-    """The outcome of a face that an edit must not touch; None for one that it may."""
+    """The outcome for a face that the edit must not touch; None if it may."""
     if face.surface is None:
         return FaceOutcome(face.index, "analytic", Reason.ANALYTIC, face.kind)
     if face.index in scope.held:

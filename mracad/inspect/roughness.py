@@ -13,7 +13,7 @@ Array = np.ndarray
 
 
 class Rougher(Enum):
-    """In what a face got worse."""
+    """The figure in which a face got worse."""
 
     BENDING = "bending"
     VARIATION = "curvature variation"
@@ -21,7 +21,7 @@ class Rougher(Enum):
     KINK = "kink"
     FOLD = "fold"
     SINGULAR = "singular point"
-    SPREAD = "waves where it is smooth"
+    SPREAD = "new waves in smooth places"
 
 
 SUMS = Rougher.BENDING, Rougher.VARIATION

@@ -81,7 +81,7 @@ _SENTENCES: dict[str, Callable[[Finding], str]] = {
     ),
     "same-sense": lambda f: f"the same_sense of {_faces(f.faces)} in the file is wrong",
     "free-edge": lambda f: f"edge#{(f.edge or 0) + 1} of {_faces(f.faces)} is free",
-    "flipped-face": lambda f: f"{_faces(f.faces)} looks the other way than its neighbours",
+    "flipped-face": lambda f: f"{_faces(f.faces)} faces the opposite way to its neighbours",
     "unsewn": lambda f: f"{_faces(f.faces)} are not sewn, gap {f.figures['gap']:.3g} mm",
     "gap": lambda f: f"gap {f.figures['gap']:.3g} mm {_seam(f)}",
     "angle": lambda f: f"angle {f.figures['angle']:.2g}° {_seam(f)}",
@@ -124,7 +124,7 @@ _SENTENCES: dict[str, Callable[[Finding], str]] = {
     "volume-change": lambda f: f"volume {f.figures['now']:.9g} mm³, was {f.figures['was']:.9g} mm³",
     # structure and attributes
     "assembly": lambda f: f"{f.figures['change']}: {f.figures['path']}{_of_product(f)}",
-    "placement": lambda f: f"{f.figures['path']}{_of_product(f)} stands elsewhere",
+    "placement": lambda f: f"{f.figures['path']}{_of_product(f)} has another placement",
     "usages": _counted("usages"),
     "product": lambda f: f"{f.figures['change']}: {f.figures['product']}",
     "face-name": lambda f: f"{_paired(f)} is named '{f.figures['now']}', was '{f.figures['was']}'",
@@ -187,6 +187,6 @@ def _mending(mending: Mending, reason: str) -> str:
         return text if m.next is None else f"{text} (the least above: {m.next:.3g}°)"
     text = f"{m.what}: {'closed' if gaps else 'made tangent'} {m.defects - m.left} of {m.defects} "
     text += ("gap" if gaps else "seam") + "s" * (m.defects > 1)
-    text += f", {m.mostly} more but for their ends" if m.mostly else ""
+    text += f", {m.mostly} more except at their ends" if m.mostly else ""
     how = f"open by {m.after:.3g} mm" if gaps else f"bent by {m.after:.3g}°"
     return f"{text}; edge#{(m.edge or 0) + 1} stays {how}" + (f" ({reason})" if reason else "")

@@ -1,4 +1,4 @@
-"""Why edges stay where faces beside them move."""
+"""Why edges stay in place although faces beside them move."""
 
 from __future__ import annotations
 
@@ -7,31 +7,31 @@ from enum import Enum
 
 
 class Still(Enum):
-    """Why an edge does not move with both of its faces, and what is said of it; of ``{}`` with its kind."""
+    """Why an edge does not move with both of its faces, as users read it; ``{}`` is the kind of the neighbour."""
 
     HELD = "held by --hold"
-    FROZEN = "no edge moves"
-    IDLE = "nothing to smooth on either side"
+    FROZEN = "frozen by --edges"
+    IDLE = "no change on either side"
     FREE = "free edge"
     POLE = "pole"
     SHARP = "sharp edge"
-    CROWDED = "more than two faces"
-    ELSEWHERE = "touches another instance, which moves by itself"
-    PART = "coincides with a part of another edge"
-    PLACED = "faces are placed differently"
-    ITSELF = "a face that meets itself"
+    CROWDED = "shared by more than two faces"
+    ELSEWHERE = "touches another instance, which moves on its own"
+    PART = "coincides with part of another edge"
+    PLACED = "its faces have different placements"
+    ITSELF = "a face meets itself there"
     ANALYTIC = "{} neighbour"
     NEIGHBOUR = "neighbour does not move"
     TRIMMED = "trimmed"
     UNEVEN = "parameters differ along the seam"
     DEGENERATE = "degenerate along the seam"
-    FLAT = "no curvature along the seam"
-    APART = "its faces get fairer each by itself"
-    STAYS = "a face there stays"
-    BARE = "no copy beyond it"
+    FLAT = "curvature undefined along the seam"
+    APART = "its faces are edited separately"
+    STAYS = "one of its faces stays"
+    BARE = "no copy on the other side"
     UNSEWN = "trimmed and not sewn"
-    OPEN = "trimmed: not within the tolerance"
-    BROKEN = "would not hold"
+    OPEN = "trimmed: cannot be kept within the tolerance"
+    BROKEN = "would open or lose its smoothness"
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class Cause:
     ----------
     still : Still
     kind : str
-        Of the neighbour, for ``ANALYTIC``.
+        Kind of the neighbour, for ``ANALYTIC``.
     """
 
     still: Still

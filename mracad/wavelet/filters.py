@@ -86,7 +86,7 @@ def wavelets(coarse: KnotVector, fine: KnotVector, vanish: tuple[int, int] = (0,
     """
     start, end = vanish
     if min(vanish) < 0 or start + end >= coarse.count or (fine.periodic and any(vanish)):
-        raise UsageError(f"splines cannot vanish to orders {vanish} at the ends here")
+        raise UsageError(f"these splines cannot vanish to orders {vanish} at their ends")
     p, g = refinement(coarse, fine), gram(fine)
     low, high = _staircase(coarse, fine, vanish)
     first, stop = _runs(low, high, fine.periodic)
@@ -94,7 +94,7 @@ def wavelets(coarse: KnotVector, fine: KnotVector, vanish: tuple[int, int] = (0,
     missing = fine.count - coarse.count
     if len(first) != missing or (fine.periodic and (stop - first).max(initial=0) + fine.degree > n):
         if not fine.periodic:
-            raise MracadError(f"found {len(first)} wavelets where {missing} are due")
+            raise MracadError(f"found {len(first)} wavelets instead of {missing}")
         return Columns(np.zeros(missing, dtype=int), _dense(p, g), n, False)
     width = int((stop - first).max(initial=1))
     begin = first if fine.periodic else np.minimum(first, n - width)

@@ -111,7 +111,7 @@ class Projection:
         c = np.asarray(c, dtype=float)
         if c.shape[axis] != self.fine_knots.count:
             raise UsageError(
-                f"{c.shape[axis]} control points along axis {axis} where the knots want {self.fine_knots.count}"
+                f"{c.shape[axis]} control points along axis {axis}, but the knots need {self.fine_knots.count}"
             )
         if self.coarse_knots == self.fine_knots:
             return c

@@ -66,7 +66,7 @@ class TwoScale:
         """Coarse poles and details of poles ``c`` along ``axis``; they may take its place if ``overwrite`` says so."""
         c = np.asarray(c, dtype=float)
         if c.shape[axis] != self.fine.count:
-            raise UsageError(f"{c.shape[axis]} control points along axis {axis} where the knots want {self.fine.count}")
+            raise UsageError(f"{c.shape[axis]} control points along axis {axis}, but the knots need {self.fine.count}")
         coarse, detail = slice(None, self._m), slice(self._m, None)
         if self.exact:
             both = self._solver.solve(c, axis, overwrite)
@@ -85,8 +85,8 @@ class TwoScale:
         """
         if (coarse.shape[axis], detail.shape[axis]) != (self._m, self.fine.count - self._m):
             raise UsageError(
-                f"{coarse.shape[axis]} coarse control points and {detail.shape[axis]} details along axis {axis} where "
-                f"the knots want {self._m} and {self.fine.count - self._m}"
+                f"{coarse.shape[axis]} coarse control points and {detail.shape[axis]} details along axis {axis}, but "
+                f"the knots need {self._m} and {self.fine.count - self._m}"
             )
         axis %= coarse.ndim
         if out is None:

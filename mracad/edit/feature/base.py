@@ -123,7 +123,7 @@ def _levelled(ground: Ground, window: Window) -> tuple[Array, Array, Array, Arra
         if len(np.unique(np.floor((angle / (2 * np.pi) + 0.5) * SECTORS))) < 0.75 * SECTORS:
             raise EditError(
                 f"{window.label}: the feature, {2 * reach:.4g} mm across with its taper, is larger than its face",
-                "use a smaller window or a shorter --taper, or select its neighbours, too",
+                "use a smaller window or a shorter --taper, or select its neighbours as well",
             )
         rows = np.c_[local[ring, :2], np.ones(ring.sum())]
         a, b, _ = np.linalg.lstsq(rows, local[ring, 2], rcond=None)[0]

@@ -59,7 +59,7 @@ def feature_of(model: Model, options: Featured, faces: Collection[int], text: st
     if isinstance(given, Stored):
         return load(given.path)
     if not faces:
-        raise EditError(f"{model.name}: there is no NURBS face to edit", "select faces with --faces")
+        raise EditError(f"{model.name}: no NURBS face to edit", "select faces with --faces")
     ground = Ground.of(model, faces)
     width = None if options.taper is None else length(options.taper, model.diagonal, "taper")
     area = window(ground, given, text, width)
@@ -136,8 +136,8 @@ def _made(ground: Ground, chart: Charts, area: Window, cuts: Mapping[int, Cut], 
         lost = float(np.linalg.norm(cut.offset[~free[i]], axis=-1).max(initial=0.0))
         if lost > LOST * largest:
             raise EditError(
-                f"{area.label}: {lost:.3g} mm of the feature lie on control points of "
-                f"#{ground.patches[i].faces[0].index + 1} that an edge or a hole holds",
+                f"{area.label}: {lost:.3g} mm of the feature is on control points of "
+                f"#{ground.patches[i].faces[0].index + 1} that edges or holes keep in place",
                 "use a smaller window or --keep g0",
             )
     cuts = {i: Cut(np.where(free[i][..., None], cut.offset, 0.0), cut.window) for i, cut in cuts.items()}

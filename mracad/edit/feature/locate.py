@@ -26,7 +26,7 @@ def face_number(model: Model, text: str, what: str, hint: str) -> int:
         return number - 1
     found = [face.index for face in model.faces if text and text in (face.name, face.product)]
     if len(found) != 1:
-        raise UsageError(f"{what}: {len(found) or 'no'} faces are called {text!r}", hint)
+        raise UsageError(f"{what}: {len(found) or 'no'} faces are named {text!r}", hint)
     return found[0]
 
 

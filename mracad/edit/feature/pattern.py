@@ -68,7 +68,7 @@ def _beginning(ground: Ground, feature: Feature, first: Place | None) -> tuple[A
         foot = standing(ground, [first], feature.reach)
         return foot.points[0], axes(foot.normals, foot.along)[0]
     if feature.origin is None:
-        raise EditError("a feature from a file has no place of its own to begin at", "give --at, too")
+        raise EditError("a feature from a file has no place of its own", "give its place with --at")
     feet = feature.origin.feet
     return ground.standing(feet.surface, feet.uv, np.zeros(1)).points[0], feature.origin.axes
 

@@ -138,9 +138,9 @@ def refuse(copies: Copies, found: Sequence[Copy], clip: bool) -> None:
     for copy, height in zip(found, heights, strict=True):
         if copy.lost > LOST * height and not clip:
             raise EditError(
-                f"{copy.place}: edges or holes that do not move take {100 * min(copy.lost / height, 1):.0f} % of the "
-                f"height of the copy there ({_numbers(copy)})",
-                "move it away from them, make it smaller with --size, or let them take it with --clip",
+                f"{copy.place}: edges or holes that stay in place cut off {100 * min(copy.lost / height, 1):.0f} % of "
+                f"the copy's height ({_numbers(copy)})",
+                "move it away from them, make it smaller with --size, or allow that with --clip",
             )
 
 
