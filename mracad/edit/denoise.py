@@ -33,6 +33,7 @@ from mracad.seam.ladders import Creases
 from mracad.seam.solve import Problem
 from mracad.spec.quantity import length
 from mracad.spec.select import Scope
+from mracad.spec.select import scope as scope_of
 from mracad.spec.steps.smooth import Denoise
 from mracad.wavelet.ladder import arc_lengths
 
@@ -44,6 +45,9 @@ STEPS = 4
 LONGEST = 0.5
 """Longest wavelength over the size of a surface."""
 
+MOST = 600
+"""Control points along an axis that are looked at."""
+
 BESIDE = 2.0**-0.5, 1.0, 2.0**0.5
 """Wavelengths that are looked at with the filter itself, over what suits control points by themselves."""
 
@@ -54,34 +58,26 @@ class Quiet:
 
     Attributes
     ----------
-    stated : float or None
-        Noise of all surfaces, mm; by default it is measured.
-    strength : float
-        What σ counts for, times what it is.
+    noise : mapping of int to float
+        Standard deviation of each coordinate of control points, mm, by surface; 0 where there is none.
     """
 
-    stated: float | None = None
-    strength: float = 1.0
+    noise: Mapping[int, float]
     spread: ClassVar[float] = 1.0
     fairs: ClassVar[bool] = True
-
-    def noise(self, net: Net, faces: Sequence[Face]) -> float:
-        """The noise of a surface, mm; 0 where none can be told.  Only control points inside faces say it: those
-        beyond their edges may be anything."""
-        if self.stated is not None:
-            return self.stated
-        return noise(net, separate(net, faces, [face.index for face in faces], "g0").free) or 0.0
 
     def wavelength(self, net: Net, faces: Sequence[Face], creases: Creases) -> float:
         """That for which Cp of a surface by itself is least, mm."""
         axes = [_axis(net, axis) for axis in (0, 1)]
-        within = np.einsum("iu,uvk,vj->ijk", axes[0].modes.T, net.poles, axes[1].modes)
+        within = net.poles
+        for axis, each in enumerate(axes):
+            within = np.moveaxis(np.tensordot(each.modes, within.take(each.points, axis), (0, axis)), 0, axis)
         power = (within**2).sum(axis=2)
         bent = np.add.outer(axes[0].squares, axes[1].squares) ** 2
         shortest, longest = min(a.step for a in axes), LONGEST * max(a.step * len(a.squares) for a in axes)
         count = 1 + int(STEPS * max(np.log2(longest / (2 * shortest)), 0.0))
         every = 2 * shortest * 2.0 ** (np.arange(count) / STEPS)
-        size = 6 * (self.strength * self.noise(net, faces)) ** 2
+        size = 6 * self.noise[_surface(faces)] ** 2
         taken = [(stiffness(w) * bent) ** 2 / (1 + (stiffness(w) * bent) ** 2) for w in every.tolist()]
         return float(every[np.argmin([float((power * d**2).sum() - size * d.sum()) for d in taken])])
 
@@ -91,8 +87,8 @@ class Quiet:
 
     def target(self, problem: Problem, sheets: Mapping[int, Sheet], joined: Joints) -> Array:
         """What the filter of the least Cp does were no rim held, ``(points, 3)``; nothing where none is below 0."""
-        known = {i: self.strength * self.noise(sheet.origin, sheet.faces) for i, sheet in sheets.items()}
-        noise = np.concatenate([np.full((space.free.size, 1), known[i]) for i, space in problem.spaces.items()])
+        sizes = [np.full((space.free.size, 1), self.noise[i]) for i, space in problem.spaces.items()]
+        noise = np.concatenate(sizes)
         if not noise.any():
             return np.zeros_like(problem.f)
         width = max(sheet.wavelength for sheet in sheets.values())
@@ -125,6 +121,8 @@ class _Axis:
 
     Attributes
     ----------
+    points : ndarray (n,) of int
+        Those that are looked at.
     modes : ndarray (n, n)
         Orthonormal, by how much they bend.
     squares : ndarray (n,)
@@ -133,24 +131,25 @@ class _Axis:
         Mean spacing, mm.
     """
 
+    points: Array
     modes: Array
     squares: Array
     step: float
 
 
 def _axis(net: Net, axis: int) -> _Axis:
-    """The control points of a surface along an axis, with free ends."""
+    """The control points of a surface along an axis, with free ends; of many, those in the middle."""
     knots = (net.u, net.v)[axis]
     along = np.concatenate([[0.0], np.cumsum(arc_lengths(net, axis))])
     at = np.interp(knots.greville(), knots.breaks, along)
-    step = along[-1] / max(len(at) - 1, 1)
-    at = np.maximum.accumulate(at + step * 1e-6 * np.arange(len(at)))
-    gaps = np.diff(at)
-    second = np.zeros((max(len(at) - 2, 0), len(at)))
+    step = float(along[-1]) / max(len(at) - 1, 1)
+    points = np.arange(len(at))[max((len(at) - MOST) // 2, 0) :][:MOST]
+    gaps = np.diff(at[points] + step * 1e-6 * points)
+    second = np.zeros((max(len(points) - 2, 0), len(points)))
     for k, (a, b) in enumerate(pairwise(gaps)):
         second[k, k : k + 3] = 2 / (a * (a + b)), -2 / (a * b), 2 / (b * (a + b))
     values, modes = np.linalg.eigh(second.T @ second)
-    return _Axis(modes, np.sqrt(np.maximum(values, 0.0)), step)
+    return _Axis(points, modes, np.sqrt(np.maximum(values, 0.0)), step)
 
 
 def denoise(
@@ -162,16 +161,33 @@ def denoise(
 ) -> Edit:
     """Take the noise from the NURBS faces of a model; parameters and errors as for :func:`mracad.edit.whole.edited`."""
     stated = None if options.noise is None else length(options.noise, model.diagonal, "noise")
-    wish = Quiet(stated, options.strength)
-    edit = edited(model, options, wish, scope, progress)
-    looked = {outcome.face for outcome in edit.faces("edited", "unchanged", "left")}
-    noises: dict[int, float] = {}
+    chosen = scope or scope_of(model, options)
+    found = {}
     for surface in model.surfaces:
-        faces = [model.faces[i] for i in surface.faces if i in looked]
-        noises |= dict.fromkeys((face.index for face in faces), wish.noise(surface.net, faces) if faces else 0.0)
-    return replace(edit, outcomes=tuple(_said(each, noises.get(each.face)) for each in edit.outcomes))
+        faces = [model.faces[i] for i in surface.faces if i in chosen.chosen]
+        found[surface.index] = stated if stated is not None else _noise(surface.net, faces)
+    wish = Quiet({i: options.strength * each for i, each in found.items()})
+    edit = edited(model, options, wish, chosen, progress)
+    return replace(edit, outcomes=tuple(_said(each, model, found) for each in edit.outcomes))
 
 
-def _said(outcome: FaceOutcome, noise: float | None) -> FaceOutcome:
+def _noise(net: Net, faces: Sequence[Face]) -> float:
+    """The noise of a surface, mm, from control points inside its faces: those beyond their edges may be anything."""
+    if not faces:
+        return 0.0
+    return noise(net, separate(net, faces, [face.index for face in faces], "g0").free) or 0.0
+
+
+def _surface(faces: Sequence[Face]) -> int:
+    surface = faces[0].surface
+    assert surface is not None
+    return surface
+
+
+def _said(outcome: FaceOutcome, model: Model, noises: Mapping[int, float]) -> FaceOutcome:
     """An outcome with the noise of its face; what is fair has none."""
-    return replace(outcome, noise=noise, reason=Reason.CLEAN if outcome.reason is Reason.FAIR else outcome.reason)
+    surface = model.faces[outcome.face].surface
+    if surface is None or outcome.status in ("held", "unselected"):
+        return outcome
+    reason = Reason.CLEAN if outcome.reason is Reason.FAIR else outcome.reason
+    return replace(outcome, noise=noises[surface], reason=reason)

@@ -77,9 +77,14 @@ def test_few_control_points_tell_nothing():
 def test_more_is_taken_where_the_noise_is_said_to_be_more():
     _, noisy = panels.whole(32, NOISE)
     faces = sheet(noisy).faces
-    widths = [Quiet(stated).wavelength(noisy, faces, NONE) for stated in (0.1 * NOISE, None, NOISE, 10 * NOISE)]
-    assert widths[0] < widths[1] == widths[2] < widths[3]
-    assert Quiet(NOISE, 10.0).wavelength(noisy, faces, NONE) == widths[3]
+    widths = [Quiet({0: stated}).wavelength(noisy, faces, NONE) for stated in (0.1 * NOISE, NOISE, 10 * NOISE)]
+    assert widths[0] < widths[1] < widths[2]
+    one = sheet(noisy)
+    little, more = (
+        denoise(one, Denoise(noise=f"{stated}mm", strength=strength)).displacement.offsets[0].poles
+        for stated, strength in ((NOISE, 1.0), (NOISE / 2, 2.0))
+    )
+    assert np.array_equal(little, more)
 
 
 def test_rotation_and_scaling_commute():
