@@ -18,9 +18,6 @@ from mracad.job.batch.pool import Pool
 from mracad.job.batch.settings import Limits
 from mracad.job.batch.work import warm
 
-PATIENCE = 30
-"""Seconds to wait for the scheduler and its first worker."""
-
 _pools: dict[Limits, Pool] = {}
 _lock = threading.Lock()
 
@@ -36,6 +33,8 @@ class Cluster(Executor):
         Of each task; the memory is that of each worker machine by default.
     workers : int
         How many tasks a local cluster does at a time.
+    patience : float
+        Seconds to wait for the scheduler and its first worker.
 
     Raises
     ------
@@ -45,7 +44,7 @@ class Cluster(Executor):
         When the cluster cannot be reached or has no workers.
     """
 
-    def __init__(self, address: str, limits: Limits, workers: int = 1) -> None:
+    def __init__(self, address: str, limits: Limits, workers: int = 1, patience: float = 30) -> None:
         try:
             import dask
             import distributed
@@ -64,8 +63,8 @@ class Cluster(Executor):
                 silence_logs=logging.ERROR,
             )
         try:
-            self._client = distributed.Client(self._own or address, timeout=PATIENCE, set_as_default=False)
-            self._client.wait_for_workers(1, timeout=PATIENCE)
+            self._client = distributed.Client(self._own or address, timeout=patience, set_as_default=False)
+            self._client.wait_for_workers(1, timeout=patience)
         except (OSError, TimeoutError, ValueError) as error:
             hint = "start it with 'dask scheduler', and workers with 'dask worker ADDRESS'"
             raise FileError(f"no cluster with workers at {address}", hint) from error

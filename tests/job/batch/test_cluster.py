@@ -62,11 +62,10 @@ def test_a_lost_worker_costs_nothing(tmp_path: Path):
     assert outputs(tmp_path / "here") == outputs(tmp_path / "local")
 
 
-def test_a_cluster_that_is_not_there_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_a_cluster_that_is_not_there_is_named():
     from mracad.errors import FileError
-    from mracad.job.batch import cluster as module
+    from mracad.job.batch.cluster import Cluster
     from mracad.job.batch.settings import Limits
 
-    monkeypatch.setattr(module, "PATIENCE", 1)
     with pytest.raises(FileError, match=r"no cluster with workers at tcp://127\.0\.0\.1:9"):
-        module.Cluster("tcp://127.0.0.1:9", Limits())
+        Cluster("tcp://127.0.0.1:9", Limits(), patience=1)

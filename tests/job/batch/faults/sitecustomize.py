@@ -7,7 +7,7 @@ import time
 
 from mracad.job.batch import work
 
-real, reader = work.do, work._read
+real = work.do
 
 
 def do(task) -> work.Product:
@@ -17,18 +17,16 @@ def do(task) -> work.Product:
         eaten = []
         while True:
             eaten.append(b"x" * 20_000_000)
+    if b"/* hang */" in task.data:
+        from mracad.occ import files
+
+        files.read = lambda *_: time.sleep(600)
     if not os.environ.get("SHAM"):
         return real(task)
     time.sleep(float(os.environ["SHAM"]))
     return work.Product(hashlib.sha256(task.data).hexdigest().encode() * 2000, (), (), 0.0)
 
 
-def read(task):
-    if b"/* hang */" in task.data:
-        time.sleep(600)
-    return reader(task)
-
-
-work.do, work._read = do, read
+work.do = do
 if os.environ.get("SHAM"):
     work.warm = bool
