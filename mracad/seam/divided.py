@@ -109,6 +109,8 @@ class Divided:
     rows : scipy.sparse matrix (conditions, points)
     free : ndarray of bool (points,)
     division : Division
+    left : float
+        Share of what the first strips had to make good that may be left to them.
     """
 
     def __init__(
@@ -119,11 +121,12 @@ class Divided:
         rows: Any,
         free: Array,
         division: Division,
+        left: float = LEFT,
     ) -> None:
         from scipy.sparse import csr_array, diags_array, vstack
 
         layout, strips = division.layout, division.strips
-        self.size = len(free)
+        self.size, self.least = len(free), left
         diagonal = diagonal if soft is None else diagonal + soft.diagonal()
         self.scale = free / np.sqrt(diagonal + LEAST * diagonal[free].max(initial=0.0) + 1e-300)
         rows = (rows @ diags_array(self.scale)).tocsr()
@@ -216,7 +219,7 @@ class Divided:
             found += rest
             left[self.inner] = 0.0
             left[self.at] -= self.tied_form @ rest
-            if np.linalg.norm(left) <= LEFT * first:
+            if np.linalg.norm(left) <= self.least * first:
                 break
         return found
 

@@ -25,7 +25,7 @@ from numpy.polynomial.chebyshev import chebvander
 
 from mracad.bspline.surface import Net
 from mracad.seam.constrained import Constrained
-from mracad.seam.divided import Divided
+from mracad.seam.divided import LEFT, Divided
 from mracad.seam.energy import Forms
 from mracad.seam.strips import Division, Layout, joints, strips
 
@@ -36,9 +36,6 @@ TERMS = 8
 
 KEPT = 60_000
 """Control points of which factors are kept, beside the last one."""
-
-DIRECT = 12_000
-"""Most control points of joined surfaces that are solved in one go."""
 
 OVERLAP = 2.0
 """Most control points in strips, over those that there are, where surfaces are solved in turn with strips."""
@@ -87,6 +84,22 @@ class Space:
     away: Array | None = None
 
 
+@dataclass(frozen=True)
+class Effort:
+    """What many joined surfaces are solved with.
+
+    Attributes
+    ----------
+    direct : int
+        Most control points that are solved in one go.
+    left : float
+        Of more: see :class:`mracad.seam.divided.Divided`.
+    """
+
+    direct: int = 12_000
+    left: float = LEFT
+
+
 class Blocks:
     """A matrix with blocks on its diagonal, one a surface, ``scipy.sparse.csr_array`` each."""
 
@@ -128,6 +141,7 @@ class Problem:
         Cᵀ W c, where contacts are to be mended.
     between : scipy.sparse matrix (points, points), optional
         That part of ``soft`` which joins the surfaces to each other, where the rest holds them.
+    effort : Effort
     """
 
     def __init__(
@@ -138,10 +152,11 @@ class Problem:
         soft: Any = None,
         pull: Array | None = None,
         between: Any = None,
+        effort: Effort = Effort(),
     ) -> None:
         from scipy.sparse import csr_array
 
-        self.spaces, self.soft, self.between = spaces, soft, between
+        self.spaces, self.soft, self.between, self.effort = spaces, soft, between, effort
         self.rows = csr_array((0, sum(s.free.size for s in spaces.values()))) if rows is None else rows
         self.goal = goal if goal is not None and goal.any() else None
         self.pull = pull if pull is not None and pull.any() else None
@@ -221,14 +236,15 @@ class Problem:
 
     def _factored(self, stiffness: float, free: Array, soft: Any) -> Constrained | Divided:
         parts = (_sum(space.forms, stiffness) for space in self.spaces.values())
-        if len(self.spaces) > 1 and free.sum() > DIRECT:
+        if len(self.spaces) > 1 and free.sum() > self.effort.direct:
             layout = self._layout(stiffness)
             joined = joints(layout, self.rows, soft, free)
             along = strips(layout, joined, free, OVERLAP * free.sum())
             if along is not None:
                 diagonals = [each.diagonal() for each in (self.mass, self.bending, self.creases)]
                 diagonal = diagonals[0] + stiffness * (diagonals[1] + diagonals[2])
-                return Divided(parts, diagonal, soft, self.rows, free, Division(layout, joined, along))
+                division = Division(layout, joined, along)
+                return Divided(parts, diagonal, soft, self.rows, free, division, self.effort.left)
         form = Blocks(list(parts)).tocsr()
         return Constrained(form if soft is None else form + soft, self.rows, free)
 

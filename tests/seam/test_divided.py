@@ -9,9 +9,9 @@ from scipy.sparse import csr_array
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
 from mracad.model.cells import quadrature
-from mracad.seam.divided import LEFT, Divided, _Colour
+from mracad.seam.divided import LEFT
 from mracad.seam.energy import forms
-from mracad.seam.solve import Problem, Space
+from mracad.seam.solve import Effort, Problem, Space
 from tests.edit.models import rotation
 from tests.model.shapes import face
 
@@ -47,9 +47,11 @@ def seams():
     return csr_array((value, (i, j)), shape=(len(rows), at.size))
 
 
-def problem(monkeypatch, most, nets=None, held=True, **more):
-    """The patches as a problem; groups of more points than ``most`` are divided."""
-    monkeypatch.setattr("mracad.seam.solve.DIRECT", most)
+DIVIDED, WHOLE = Effort(0), Effort(10**9)
+
+
+def problem(effort, nets=None, held=True, rows=None, **more):
+    """The patches as a problem."""
     spaces = {}
     for i, (net, metric) in enumerate(nets or patches()):
         free = np.ones(net.poles.shape[:2], bool)
@@ -58,25 +60,15 @@ def problem(monkeypatch, most, nets=None, held=True, **more):
         if held and i < SIDE:
             free[:, :2] = False
         spaces[i] = Space(net, forms(net, metric, quadrature(net, [face()])), free, np.ones_like(free))
-    return Problem(spaces, seams(), **more)
+    return Problem(spaces, seams() if rows is None else rows, effort=effort, **more)
 
 
-@pytest.fixture
-def both(monkeypatch):
-    """Displacements of a call on the divided problem and on the same in one go."""
-
-    def run(call, left=1e-9, **more):
-        monkeypatch.setattr("mracad.seam.divided.LEFT", left)
-        divided, whole = (problem(monkeypatch, most, **more) for most in (0, 10**9))
-        monkeypatch.setattr("mracad.seam.solve.DIRECT", 0)
-        found = call(divided)
-        assert any(isinstance(each, Divided) for each in divided._solvers.values())
-        monkeypatch.setattr("mracad.seam.solve.DIRECT", 10**9)
-        wanted = call(whole)
-        assert not any(isinstance(each, Divided) for each in whole._solvers.values())
-        return divided, found, wanted
-
-    return run
+def both(call, left=1e-9, **more):
+    """Displacements of a call on the divided problem and on the same in one go, which take other ways."""
+    divided = problem(Effort(0, left), **more)
+    found, wanted = call(divided), call(problem(WHOLE, **more))
+    assert found.tobytes() != wanted.tobytes()
+    return divided, found, wanted
 
 
 def size(x):
@@ -84,7 +76,7 @@ def size(x):
 
 
 @pytest.mark.parametrize("held", [False, True])
-def test_filtered_is_that_of_the_whole_system(both, held):
+def test_filtered_is_that_of_the_whole_system(held):
     p, found, wanted = both(lambda p: p.filtered(STIFFNESS), held=held)
     assert size(wanted) > 1e-3
     assert size(found - wanted) < 1e-6 * size(wanted)
@@ -93,36 +85,34 @@ def test_filtered_is_that_of_the_whole_system(both, held):
     assert np.trace(x.T @ (p.bending @ x)) < np.trace(p.f.T @ (p.bending @ p.f))
 
 
-def test_little_is_left_of_what_strips_make_good(both):
+def test_little_is_left_of_what_strips_make_good():
     _, found, wanted = both(lambda p: p.filtered(STIFFNESS), left=LEFT)
     assert size(found - wanted) < 1e-4 * size(wanted)
 
 
-def test_nearest_is_that_of_the_whole_system(both):
+def test_nearest_is_that_of_the_whole_system():
     wanted = 0.1 * np.random.default_rng(3).standard_normal((SIDE**2 * KNOTS.count**2, 3))
     p, found, direct = both(lambda p: p.nearest(wanted))
     assert size(found - direct) < 1e-6 * size(direct)
     assert size(p.rows @ found) < 1e-12 * size(found) and not found[~p.free].any()
 
 
-def test_what_obeys_already_is_not_made_to(monkeypatch):
+def test_what_obeys_already_is_not_made_to():
     """Rounding that is left of conditions is not taken for what is lacking."""
-    p, calls = problem(monkeypatch, 0), []
+    p = problem(DIVIDED)
     obeys = p.nearest(0.1 * np.random.default_rng(3).standard_normal((SIDE**2 * KNOTS.count**2, 3)))
-    step = _Colour.__call__
-    monkeypatch.setattr(_Colour, "__call__", lambda colour, right: calls.append(colour) or step(colour, right))
-    assert size(p.nearest(obeys) - obeys) < 1e-9 * size(obeys)
-    assert len(calls) <= 3 * len(set(calls))
+    assert 0 < size(p.rows @ obeys) < 1e-12 * size(obeys)
+    assert p.nearest(obeys).tobytes() == p.settled(obeys).tobytes() == obeys.tobytes()
 
 
-def test_conditions_are_mended_by_what_is_asked(both):
+def test_conditions_are_mended_by_what_is_asked():
     goal = seams() @ (0.01 * np.random.default_rng(2).standard_normal((SIDE**2 * KNOTS.count**2, 3)))
     p, found, direct = both(lambda p: p.filtered(STIFFNESS), goal=goal, held=False)
     assert size(found - direct) < 1e-5 * size(direct)
     assert size(p.rows @ found - goal) < 1e-12 * size(found)
 
 
-def test_contacts_pull_surfaces_that_they_join(both):
+def test_contacts_pull_surfaces_that_they_join():
     """Springs between points of two patches that no seam joins, and one between those of a patch."""
     n, rng = KNOTS.count**2, np.random.default_rng(4)
     ends = [(k * 30 + 200, 4 * n + k * 25 + 100) for k in range(8)] + [(50, 60)]
@@ -135,24 +125,20 @@ def test_contacts_pull_surfaces_that_they_join(both):
     assert size(found - both(lambda p: p.filtered(STIFFNESS))[1]) > 0.1 * size(found)
 
 
-def test_the_filter_is_linear_and_commutes_with_rotation(monkeypatch):
+def test_the_filter_is_linear_and_commutes_with_rotation():
     turn = rotation([1, 2, -0.5], 0.7)
-    plain, turned = (problem(monkeypatch, 0, patches(how)).filtered(STIFFNESS) for how in (None, turn))
+    plain, turned = (problem(DIVIDED, patches(how)).filtered(STIFFNESS) for how in (None, turn))
     assert size(turned - plain @ turn.T) < 1e-9
-    again = problem(monkeypatch, 0).filtered(STIFFNESS)
+    again = problem(DIVIDED).filtered(STIFFNESS)
     assert again.tobytes() == plain.tobytes()
 
 
-def test_strips_that_would_be_everything_are_solved_in_one_go(monkeypatch):
-    p = problem(monkeypatch, 0)
-    p.filtered(10.0**4)
-    assert not any(isinstance(each, Divided) for each in p._solvers.values())
+def test_strips_that_would_be_everything_are_solved_in_one_go():
+    found, wanted = (problem(effort).filtered(10.0**4) for effort in (DIVIDED, WHOLE))
+    assert found.tobytes() == wanted.tobytes()
 
 
-def test_surfaces_that_nothing_joins_are_solved_by_themselves(monkeypatch):
-    apart = problem(monkeypatch, 0)
-    apart.rows = apart.rows[:0]
-    found = apart.split(apart.filtered(STIFFNESS))
-    assert isinstance(next(iter(apart._solvers.values())), Divided)
-    alone = Problem({0: apart.spaces[0]}).filtered(STIFFNESS)
-    assert size(found[0].reshape(-1, 3) - alone) < 1e-9 * size(alone)
+def test_surfaces_that_nothing_joins_are_solved_by_themselves():
+    p, found, _ = both(lambda p: p.filtered(STIFFNESS), rows=seams()[:0])
+    alone = Problem({0: p.spaces[0]}).filtered(STIFFNESS)
+    assert size(p.split(found)[0].reshape(-1, 3) - alone) < 1e-9 * size(alone)
