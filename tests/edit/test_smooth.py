@@ -8,10 +8,10 @@ import pytest
 
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
-from mracad.edit import driver
 from mracad.edit.fair import Filter
 from mracad.edit.result import Reason
 from mracad.edit.smooth import smooth
+from mracad.edit.whole import edited
 from mracad.errors import UsageError
 from mracad.occ.view import view
 from mracad.spec.select import Scope
@@ -124,10 +124,16 @@ def test_what_is_fair_at_a_scale_stays_and_says_so():
         assert not edit.displacement.offsets
 
 
-def test_a_face_that_nothing_admissible_makes_fairer_says_that_its_edges_hold_it(monkeypatch):
+class Nothing(Filter):
+    """A filter that has no way but to stay put."""
+
+    def ways(self, problem, target, width):
+        return [[0.0 * target]]
+
+
+def test_a_face_that_nothing_admissible_makes_fairer_says_that_its_edges_hold_it():
     """Nothing but staying put is left of what is wanted, and the judge took nothing off it."""
-    monkeypatch.setattr(Filter, "ways", lambda self, problem, target, width: [[0.0 * target]])
-    edit = smooth(sheet(rough(noise=0.1)), Smooth(scale="4mm"))
+    edit = edited(sheet(rough(noise=0.1)), Smooth(scale="4mm"), Nothing(4.0), None, None)
     assert (edit.outcomes[0].status, edit.outcomes[0].reason) == ("left", Reason.RIM)
     assert edit.outcomes[0].words == "cannot get fairer with its edges held" and not edit.displacement.offsets
 
@@ -143,14 +149,13 @@ def test_a_face_whose_seams_take_all_its_control_points_says_so_or_gets_some():
     assert outcome.status == "edited" and 0 < outcome.inserted < 12
 
 
-def test_points_that_bring_next_to_nothing_nearer_are_not_added(monkeypatch):
-    """The price of control points decides: as it is, with one that nobody pays, and for nothing."""
-    model, options = view(shapes.document(shapes.zigzag_strips(6, 6, 6))), Smooth(scale="8mm", faces=("#2",))
-    for price, inserted in ((driver.PRICE, True), (1.0, False), (0.0, True)):
-        monkeypatch.setattr(driver, "PRICE", price)
-        outcome = smooth(model, options).outcomes[1]
-        assert (outcome.inserted > 0) == inserted
-        assert (outcome.status, outcome.reason) == (("edited", None) if inserted else ("left", Reason.RIM))
+def test_points_that_bring_next_to_nothing_nearer_are_not_added():
+    """Spans beside the rims are wider than a quarter of the scale, but the sheet gets as fair with them."""
+    net = rough()
+    assert max(np.diff(knots.breaks)[[0, -1]].max() for knots in (net.u, net.v)) > 1.0
+    (plain, _), (result, outcome) = (smoothed(net, scale="4mm", refine=refine) for refine in ("never", "auto"))
+    assert outcome.status == "edited" and outcome.inserted == 0
+    assert np.array_equal(result.poles, plain.poles)
 
 
 def flat():
