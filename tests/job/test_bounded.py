@@ -1,15 +1,17 @@
 """However badly faces come out, edits are done again a bounded number of times; counted, not timed."""
 
-import sys
-from dataclasses import replace
+from dataclasses import dataclass, field
+from importlib import import_module
 
 import numpy as np
 import pytest
 
 from mracad.edit import driver
+from mracad.edit.fair import Filter
 from mracad.edit.result import Edit, FaceOutcome
-from mracad.edit.smooth import smooth
+from mracad.edit.whole import edited
 from mracad.errors import Code, EditError
+from mracad.inspect import accept
 from mracad.inspect.faults import Fault, FaultKind, ReadBack
 from mracad.job import document as job
 from mracad.job import produce
@@ -26,58 +28,64 @@ def panel(side, spans=6):
     return view(panels.document(panels.cut(noisy, (side, side))))
 
 
+@dataclass(frozen=True)
+class Counted(Filter):
+    """Smoothing that writes down of how many surfaces it is asked at a time."""
+
+    tried: list[int] = field(default_factory=list)
+
+    def ways(self, problem, target, width):
+        self.tried.append(len(problem.spaces))
+        return super().ways(problem, target, width)
+
+
+@dataclass(frozen=True)
+class Refused(Counted):
+    """That smoothing, but of joined surfaces one more is made rougher each time, as if there were no end of them."""
+
+    refused: set[int] = field(default_factory=set)
+
+    def ways(self, problem, target, width):
+        every = super().ways(problem, target, width)
+        if len(problem.spaces) == 1:
+            return every
+        self.refused.add(min(problem.spaces))
+        parts = [-part if i in self.refused else part for i, part in problem.split(target).items()]
+        return [[problem.nearest(np.concatenate([part.reshape(-1, 3) for part in parts]))]]
+
+
 @pytest.mark.parametrize("side", [2, 4])
-def test_groups_are_solved_a_bounded_number_of_times(side, monkeypatch):
-    """The judge takes everything from one surface more in every round, as if there were no end of them."""
-    tried, refused = [], set()
-    attempt = driver._attempt
-
-    def refusing(scene, wish, members, joined, *rest):
-        found = attempt(scene, wish, members, joined, *rest)
-        if len(members) > 1:
-            tried.append(len(members))
-            refused.add(min(members))
-        return {
-            i: replace(moved, amount=0.0) if i in refused and len(members) > 1 else moved for i, moved in found.items()
-        }
-
-    monkeypatch.setattr(driver, "_attempt", refusing)
-    model = panel(side)
-    edit = smooth(model, Smooth(scale="60mm"))
-    assert 0 < sum(tried) <= (1 + driver.ROUNDS) * side * side  # all at once, and then the rounds
+def test_groups_are_solved_a_bounded_number_of_times(side):
+    """The judge takes everything from one surface more in every round."""
+    wish = Refused(60.0)
+    edit = edited(panel(side), Smooth(scale="60mm"), wish, None, None)
+    together = [count for count in wish.tried if count > 1]
+    assert together == [side**2 - i for i in range(min(driver.ROUNDS, side))]
     assert len(edit.faces("edited")) > side * side / 2 and all(edge.how == "frozen" for edge in edit.edges)
 
 
-@pytest.mark.parametrize(("spans", "scale", "solved"), [(10, "30mm", [1, 1, 9]), (6, "60mm", [1, 1, 9, *[1] * 7])])
-def test_surfaces_that_go_through_together_are_not_all_tried_alone(spans, scale, solved, monkeypatch):
-    """What comes of them is what would have come of them; at 60 mm two of them do not, and are left out then."""
-    model, options, tried = panel(3, spans), Smooth(scale=scale, refine="never"), []
-    attempt = driver._attempt
-
-    def counted(scene, wish, members, joined, finer=()):
-        tried.append(len(members))
-        return attempt(scene, wish, members, joined, finer)
-
-    monkeypatch.setattr(driver, "_attempt", counted)
-    some = smooth(model, options)
-    assert tried == solved
-    monkeypatch.setattr(driver, "FIRST", 9)
-    every = smooth(model, options)
-    assert tried[len(solved) :] == [1] * 9 + [9]
-    assert some.displacement.offsets.keys() == every.displacement.offsets.keys()
-    assert some.faces("edited") == every.faces("edited")
-    for index, offset in some.displacement.offsets.items():
-        assert np.array_equal(offset.poles, every.displacement.offsets[index].poles)
+@pytest.mark.parametrize(("spans", "scale", "solved"), [(10, 30.0, [1, 1, 9]), (6, 60.0, [1, 1, 9, *[1] * 7])])
+def test_surfaces_that_go_through_together_are_not_all_tried_alone(spans, scale, solved):
+    """At 60 mm not all that is wanted may be done to all of them together, so that the others are, too."""
+    wish = Counted(scale)
+    edit = edited(panel(3, spans), Smooth(scale=f"{scale}mm", refine="never"), wish, None, None)
+    assert wish.tried == solved
+    assert len({outcome.amount for outcome in edit.faces("edited")}) == 1 and len(edit.faces("edited")) == 9
+    assert all((edge.how == "coupled") == (len(edge.faces) == 2) for edge in edit.edges)
 
 
 class Stub:
     """An edit that says of every face that it may move that it did; the rounds are counted."""
 
     def __init__(self):
-        self.rounds = 0
+        self.chosen = []
+
+    @property
+    def rounds(self):
+        return len(self.chosen)
 
     def __call__(self, model, options, *, scope, progress):
-        self.rounds += 1
+        self.chosen.append(scope.chosen)
         faces = range(len(model.faces))
         return Edit(
             Displacement({}),
@@ -142,17 +150,15 @@ def test_an_edit_that_fails_for_a_face_that_had_to_stay_says_so(monkeypatch):
 
 def test_files_are_made_again_a_bounded_number_of_times(monkeypatch):
     """Every file is worse at one more face; the last is named."""
-    stub, document = Stub(), chains(*[1] * (produce.ROUNDS + 4))
+    stub, faces = Stub(), produce.ROUNDS + 4
 
-    def judged(made, memory, copies):
-        assert memory.edited == set(range(stub.rounds - 1, produce.ROUNDS + 4))
-        return replace(made, read_back=ReadBack(False, (Fault(FaultKind.AREA, (min(memory.edited),), 2.0, 1.0),)))
+    def worse(*_):
+        return ReadBack(False, (Fault(FaultKind.AREA, (stub.rounds - 1,), 2.0, 1.0),))
 
-    monkeypatch.setattr("mracad.job.produce._judged", judged)
-    monkeypatch.setattr(sys.modules["mracad.edit.smooth"], "smooth", stub)
-    step = Step("smooth", "smooth", Smooth(level=1))
+    monkeypatch.setattr(accept, "read_back", worse)
+    monkeypatch.setattr(import_module("mracad.edit.smooth"), "smooth", stub)
+    step, target = Step("smooth", "smooth", Smooth(level=1)), produce.Target("out.brep", "brep")
     with pytest.raises(EditError, match=f"the area of #{produce.ROUNDS} changes") as caught:
-        produce.produce(
-            document, lambda: chains(*[1] * (produce.ROUNDS + 4)), [step], [produce.Target("out.brep", "brep")]
-        )
+        produce.produce(chains(*[1] * faces), lambda: chains(*[1] * faces), [step], [target])
     assert caught.value.code == Code.CANNOT_EDIT and stub.rounds == produce.ROUNDS
+    assert stub.chosen == [set(range(i, faces)) for i in range(produce.ROUNDS)]
