@@ -1,14 +1,14 @@
-"""Denoising: what is no shape goes, at a wavelength that the noise itself chooses.
+"""Denoising: remove noise at a wavelength that the noise itself determines.
 
-The filter is that of smoothing (:mod:`mracad.edit.fair`).  Of δ = −D y, with y the control points and σ their noise,
-the expected squared distance to the truth is, but for what is the same for all,
+The filter is that of smoothing (:mod:`mracad.edit.fair`).  For δ = −D y, with y the control points and σ their noise,
+the expected squared distance to the truth is, up to a constant,
 
     Cp = ‖δ‖² − 2 · 3 σ² tr D
 
-(C. L. Mallows, Some comments on Cp, Technometrics 15, 1973; 0 for no change), so that wavelength is taken for which it
-is least, and none where that is not below 0.  It is sought with the filter of the control points of each surface along
-both axes, in closed form, and then about there with the filter itself, of all surfaces that seams join; its trace is
-taken from ±1 at random (M. F. Hutchinson, Commun. Stat. Simul. Comput. 18, 1989).
+(C. L. Mallows, Some comments on Cp, Technometrics 15, 1973; 0 for no change).  The wavelength with the least Cp is
+taken, and none if that is not below 0.  It is first searched in closed form, with the filter of the control points of
+each surface along both axes, then near there with the filter itself, on all surfaces that seams join; the trace is
+estimated with random ±1 (M. F. Hutchinson, Commun. Stat. Simul. Comput. 18, 1989).
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ from mracad.wavelet.ladder import arc_lengths
 Array = np.ndarray
 
 STEPS = 4
-"""Wavelengths that are looked at, from one to twice of it."""
+"""Wavelengths that are tried in every octave."""
 
 LONGEST = 0.5
 """Longest wavelength over the size of a surface."""
@@ -49,7 +49,7 @@ MOST = 600
 """Control points along an axis that are looked at."""
 
 BESIDE = 2.0**-0.5, 1.0, 2.0**0.5
-"""Wavelengths that are looked at with the filter itself, over what suits control points by themselves."""
+"""Wavelengths that are tried with the filter itself, over the best for control points alone."""
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ class Quiet:
     fairs: ClassVar[bool] = True
 
     def wavelength(self, net: Net, faces: Sequence[Face], creases: Creases) -> float:
-        """That for which Cp of a surface by itself is least, mm."""
+        """The wavelength with the least Cp for a surface alone, mm."""
         axes = [_axis(net, axis) for axis in (0, 1)]
         within = net.poles
         for axis, each in enumerate(axes):
@@ -86,7 +86,7 @@ class Quiet:
         return net
 
     def target(self, problem: Problem, sheets: Mapping[int, Sheet], joined: Joints) -> Array:
-        """What the filter of the least Cp does were no rim held, ``(points, 3)``; nothing where none is below 0."""
+        """What the filter with the least Cp would do if no rim were held, ``(points, 3)``; 0 if no Cp is below 0."""
         sizes = [np.full((space.free.size, 1), self.noise[i]) for i, space in problem.spaces.items()]
         noise = np.concatenate(sizes)
         if not noise.any():
@@ -103,7 +103,7 @@ class Quiet:
         return best
 
     def ways(self, problem: Problem, target: Array, width: float) -> Iterable[Iterable[Array]]:
-        """As for smoothing; none where there is nothing to do."""
+        """As for smoothing; none if there is nothing to do."""
         return ways(problem, target, width) if target.any() else ()
 
 
@@ -124,9 +124,9 @@ class _Axis:
     points : ndarray (n,) of int
         Those that are looked at.
     modes : ndarray (n, n)
-        Orthonormal, by how much they bend.
+        Orthonormal, ordered by bending.
     squares : ndarray (n,)
-        Wavenumbers squared of them, 1/mm².
+        Their squared wavenumbers, 1/mm².
     step : float
         Mean spacing, mm.
     """
@@ -159,7 +159,7 @@ def denoise(
     scope: Scope | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Edit:
-    """Take the noise from the NURBS faces of a model; parameters and errors as for :func:`mracad.edit.whole.edited`."""
+    """Remove noise from the NURBS faces of a model; parameters and errors as for :func:`mracad.edit.whole.edited`."""
     stated = None if options.noise is None else length(options.noise, model.diagonal, "noise")
     chosen = scope or scope_of(model, options)
     found = {}
@@ -185,7 +185,7 @@ def _surface(faces: Sequence[Face]) -> int:
 
 
 def _said(outcome: FaceOutcome, model: Model, noises: Mapping[int, float]) -> FaceOutcome:
-    """An outcome with the noise of its face; what is fair has none."""
+    """An outcome with the noise of its face; a fair face has none."""
     surface = model.faces[outcome.face].surface
     if surface is None or outcome.status in ("held", "unselected"):
         return outcome

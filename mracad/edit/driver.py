@@ -1,10 +1,9 @@
 """The loop of every edit: solve, judge, give something up, solve again.
 
-An edit says what it wants of surfaces that seams join (a :class:`mracad.edit.target.Wish`); the solver finds what is
-nearest to it under the conditions of seams and rims; the judge says how much of that may be done.  A surface of which
-next to nothing may be done is left, and its neighbours are solved again without it: at first each surface by itself,
-then together with those that seams join to it.  Where the first few go through by themselves, and then all of them
-together, the others need not be looked at alone.
+An edit states its target for surfaces that seams join (a :class:`mracad.edit.target.Wish`); the solver finds the
+nearest displacement under the conditions of seams and rims; the judge decides how much of it is allowed.  A surface
+that may hardly move is left, and its neighbours are solved again without it: first each surface alone, then together
+with those that seams join to it.  If the first few succeed alone and then all together, the others are not tried alone.
 """
 
 from __future__ import annotations
@@ -37,14 +36,14 @@ FIRST = 2
 """Surfaces of a group of which each goes through by itself, so that all are tried together before the others are."""
 
 PRICE = 0.05
-"""Share of what is wanted that as many control points again as a surface has must bring nearer to be added."""
+"""Share of the wanted change that doubling the control points of a surface must add to be worth it."""
 
 CANDIDATES = 3
-"""Most displacements of which what a first look leaves is looked at closer."""
+"""Most displacements that are judged closely after a first look."""
 
 BLENDS, PROMISE = 2, 1.05
-"""Most times that what is best for each of joined surfaces is put together, and by how much that, or what is done to
-each by itself, has to come nearer."""
+"""Most times that the best displacements of joined surfaces are put together, and the factor by which that, or what is
+done to each alone, has to come nearer to the target."""
 
 
 def drive(scene: Scene, wish: Wish, progress: Callable[[int, int], None] | None = None) -> Result:
@@ -86,9 +85,9 @@ def _dropped(wanted: Joints, used: Joints, result: Mapping[int, Moved]) -> dict[
 def _alone(
     scene: Scene, wish: Wish, group: Sequence[int]
 ) -> tuple[dict[int, Moved], dict[tuple[int, ...], dict[int, Moved]]]:
-    """What becomes of surfaces that seams join, each by itself; of the first only, where together all go through.
+    """Results for joined surfaces, each edited alone; only for the first few if all succeed together.
 
-    Of none, where they need not get fairer: between held neighbours they could hardly move at all.
+    For none if they need not get fairer: between held neighbours they could hardly move at all.
     """
     if not scene.tolerances.fairer:
         return {}, {}
@@ -106,7 +105,7 @@ def _alone(
 
 
 def _finer(scene: Scene, group: Iterable[int], alone: Mapping[int, Moved]) -> set[int]:
-    """Surfaces for which more control points pay, as far as that is known; of others, where it does for any, or where
+    """Surfaces for which more control points pay, as far as that is known; the unknown ones too, if it does for any or
     nothing is known."""
     known = {i for i, moved in alone.items() if moved.finer}
     more = scene.refine and (known or not alone)
@@ -114,14 +113,14 @@ def _finer(scene: Scene, group: Iterable[int], alone: Mapping[int, Moved]) -> se
 
 
 def _through(moved: Mapping[int, Moved]) -> bool:
-    """Whether all that is wanted may be done to all surfaces."""
+    """Whether all surfaces may make the whole wanted change."""
     return all(each.amount > ENOUGH for each in moved.values())
 
 
 def _less(together: Mapping[int, Moved], alone: Mapping[int, Moved]) -> bool:
-    """Whether surfaces come clearly less near to what is wanted than each by itself, of those of which that is known.
+    """Whether surfaces come clearly less near to the target together than alone, where that is known.
 
-    Shares are compared, for together something else may be wanted of them than of each.
+    Shares are compared, because their target together may differ from their targets alone.
     """
     every = next(iter(together.values()))
     gain, wanted = (sum(getattr(alone[i], name) for i in together if i in alone) for name in ("gain", "wanted"))
@@ -135,7 +134,7 @@ def _together(
     alone: Mapping[int, Moved],
     tried: Mapping[tuple[int, ...], dict[int, Moved]],
 ) -> Iterable[tuple[dict[int, Moved], Joints]]:
-    """What becomes of surfaces that seams join, in the parts in which they move together."""
+    """Results for joined surfaces, in the parts in which they move together."""
     waiting = [(list(group), ROUNDS)]
     while waiting:
         part, rounds = waiting.pop()
@@ -158,9 +157,9 @@ def _together(
 
 
 def _alike(found: Mapping[int, Moved], tolerances: Tolerances) -> dict[int, Moved]:
-    """The same amount done to all, each looked at closer: less of a displacement may be rougher than more of it.
+    """The same amount for all surfaces, each judged closely: less of a displacement may be rougher than more of it.
 
-    Where that does not settle, and of surfaces that gain nothing then, nothing is done.
+    If that does not settle, or surfaces gain nothing from it, they stay.
     """
     for _ in range(ROUNDS):
         found = {i: moved.confirmed(tolerances) for i, moved in found.items()}
@@ -191,7 +190,7 @@ def groups(surfaces: Iterable[int], joined: Joints) -> list[list[int]]:
 
 
 def _by_itself(scene: Scene, wish: Wish, i: int) -> Moved:
-    """The best that can be done to a surface by itself: with control points beside its rims where these pay."""
+    """The best result for a surface alone, with more control points beside its rims where they pay."""
     joined, sheet = scene.joints.among({i}), scene.sheets[i]
     plain = _attempt(scene, wish, [i], joined)[i]
     size = _points(beside_rims(sheet, joined)) / _points(sheet.net) if scene.refine else 1.0
@@ -216,9 +215,9 @@ def _attempt(
     finer: Collection[int] = (),
     least: float = 0.0,
 ) -> dict[int, Moved]:
-    """The best that can be done to surfaces that move together, some with more control points; amounts may differ.
+    """The best result for surfaces that move together, some with more control points; amounts may differ.
 
-    Nothing is done where that comes to less than a share of what is wanted.
+    They stay if that is less than a given share of the wanted change.
     """
     members = {i: scene.sheets[i] for i in surfaces}
     trial = Trial(scene, members, joined, finer)
@@ -250,7 +249,7 @@ def _attempt(
 
 
 def _confirmed(trial: Trial, members: Mapping[int, Sheet], found: Sequence[Verdict], target: Array) -> dict[int, Moved]:
-    """What is worth most once it has been looked at closer."""
+    """The result that is worth most after a closer look."""
     best: dict[int, Moved] = {}
     most, wanted = (-1.0, 0.0), sum(trial.problem.gains(target, target, [1.0] * len(members)))
     for verdict in sorted(found, key=rank, reverse=True)[:CANDIDATES]:
@@ -266,7 +265,7 @@ def _confirmed(trial: Trial, members: Mapping[int, Sheet], found: Sequence[Verdi
 
 
 def _moved(trial: Trial, members: Mapping[int, Sheet], verdict: Verdict) -> list[Moved]:
-    """What a verdict leaves of a displacement."""
+    """The displacement that a verdict allows, by surface."""
     figures = zip(verdict.parts, verdict.amounts, verdict.changes, verdict.limits, strict=True)
     return [
         Moved(members[i], space.net, amount * part, amount, changes, limits, int(space.free.sum()), 0.0, 0.0)

@@ -1,12 +1,12 @@
 """Fairing: remove waves shorter than a scale from NURBS faces that seams join, never making one rougher.
 
-Every face x is the one nearest to the input f whose bending is that of what is coarser than the scale:
+Every face x is the one nearest to the input f that bends like its part coarser than the scale:
 
     x = argmin ‖x − f‖²_M + ℓ⁸ |x − g|²,   ℓ = scale / 2π
 
-under the conditions of seams and rims (:mod:`mracad.seam.solve`), |·| the energy of the filter of gain
-1 / (1 + (2πℓ/Λ)⁸) and g the face projected on the splines of a few scales, which is shape (or 0, where g does not
-follow a face).  Waves of half the scale keep 0.4 %, those of three scales all but 2e-4.
+under the conditions of seams and rims (:mod:`mracad.seam.solve`).  |·| is the energy of the filter with gain
+1 / (1 + (2πℓ/Λ)⁸), g the face projected on the splines of a few scales, which is shape (or 0 where g does not follow
+the face).  Waves of half the scale keep 0.4 %, those of three scales all but 2e-4.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from mracad.seam.wishes import Wishes
 Array = np.ndarray
 
 SHARP = 0.2, 0.5
-"""Curvatures over ℓ from which on less is done, and from which on nothing: there the filter takes shape."""
+"""Curvatures over ℓ above which less is done, and above which nothing is: there the filter would take shape."""
 
 DETAIL = 1e-7, 1e-6
 """Least displacement that counts as detail: the tolerance of coincidence, mm, and a share of the wavelength."""
@@ -64,7 +64,7 @@ class Filter:
         return net
 
     def target(self, problem: Problem, sheets: Mapping[int, Sheet], joined: Joints) -> Array:
-        """What smoothing would do were no rim held, ``(points, 3)``."""
+        """What smoothing would do if no rim were held, ``(points, 3)``."""
         return problem.filtered(stiffness(self.scale), problem.seen)
 
     def ways(self, problem: Problem, target: Array, width: float) -> Iterable[Iterable[Array]]:
@@ -73,7 +73,7 @@ class Filter:
 
 
 def ways(problem: Problem, target: Array, width: float) -> Iterable[Iterable[Array]]:
-    """What is held meets the target, ever more smoothly; is held as one filters; or fades it a wavelength wide."""
+    """Meet the target next to what is held, ever more smoothly; filter with that held; or fade out in a wavelength."""
     if not problem.rimmed:
         yield [target]
         return
@@ -87,7 +87,7 @@ def ways(problem: Problem, target: Array, width: float) -> Iterable[Iterable[Arr
 def calm(problem: Problem, target: Array, width: float) -> Array:
     """1 where surfaces have no shape finer than a width (mm), 0 at noses and fillets, smooth between, ``(points, 1)``.
 
-    They are looked at as they were after all of the target, so that ripples are no shape.
+    They are measured after the whole target, so that ripples do not count as shape.
     """
     found = []
     for space, part in zip(problem.spaces.values(), problem.split(target).values(), strict=True):
@@ -110,7 +110,7 @@ def faired(
     refine: bool = True,
     progress: Callable[[int, int], None] | None = None,
 ) -> Result:
-    """Fair faces of a model as far as that makes none of them rougher.
+    """Fair faces of a model as far as none of them gets rougher.
 
     Parameters
     ----------
@@ -118,7 +118,7 @@ def faired(
     movable : collection of int
         Faces on NURBS surfaces; those without detail stay.
     wish : Wish
-        What to do: :class:`Filter`, for example.
+        The target, :class:`Filter` for example.
     wishes : Wishes
         What seams keep.
     tolerances : Tolerances

@@ -1,4 +1,4 @@
-"""Jumps of curvature along seams that are tangent and no more: they stay, but must not grow."""
+"""Jumps of curvature along seams that are only tangent: they stay, but must not grow."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from mracad.seam.interface import Joints
 from mracad.seam.sides import views
 
 MORE = 0.1
-"""Share by which a jump may grow, beside what an edit may add where there is none."""
+"""Share by which a jump may grow, on top of what an edit may add where there is none."""
 
 
 class Jumps:
-    """The seams of surfaces that move, whether these move along them or not, of which jumps are looked at.
+    """The seams of surfaces that move, whether the seams move or not, where jumps are measured.
 
     Parameters
     ----------
@@ -43,12 +43,12 @@ class Jumps:
                 self.most.append(meeting.bend + allowed / max(apart, 1))
 
     def room(self, moved: Mapping[int, Net]) -> dict[int, float]:
-        """How much of a displacement surfaces may do, 0 to 1, by index; those that may do all left out.
+        """The share of a displacement that each surface may make, 0 to 1, by index; without those that may make all.
 
         Parameters
         ----------
         moved : mapping of int to Net
-            The surfaces with all of it.
+            The surfaces after the whole displacement.
         """
         surfaces = [replace(s, net=moved[s.index]) if s.index in moved else s for s in self.model.surfaces]
         model = replace(self.model, surfaces=tuple(surfaces))

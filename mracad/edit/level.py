@@ -1,16 +1,16 @@
-"""Levels: take away what lies between rungs of the knot ladders of NURBS faces.
+"""Levels: remove the detail between rungs of the knot ladders of NURBS faces.
 
-On one surface, level j is the L2 projection on the splines over the knots that j rungs leave, as in the wavelet
-transform.  A level of patches that seams join is a level of the surface that they make: with P the refinement from
+On one surface, level j is the L2 projection on the splines over the knots left after j rungs, as in the wavelet
+transform.  A level of patches that seams join is a level of the surface that they form: with P the refinement from
 coarse spaces whose ladders the patches share (:mod:`mracad.seam.ladders`) and L the conditions of their seams, as
 smooth as these are,
 
     y = argmin ‖P y − f‖_G   subject to   L (P y − f) = r,      δ = P y − f,
 
-the conditions asked at as many places as the coarse splines along a seam have functions: exact where the joint has
-constant coefficients, and never more than the coarse spaces have room for where they vary.  G is the Gram matrix of
-the transform on each surface, by its area.  In y the conditions count 1 / ``LOOSE``; the solver, which sees to rims,
-keeps them exactly.
+with conditions at as many places as the coarse splines along a seam have functions: exact where the joint has constant
+coefficients, and never more than the coarse spaces can meet where they vary.  G is the Gram matrix of the transform on
+each surface, by its area.  In y the conditions have weight 1 / ``LOOSE``; the solver, which also handles rims, keeps
+them exactly.
 """
 
 from __future__ import annotations
@@ -42,8 +42,8 @@ Coarse = Mapping[int, tuple[KnotVector, KnotVector]]
 """Coarse knots in u and v, by surface."""
 
 LOOSE = 1e-4
-"""How little, relative, fitting counts against the conditions of seams on coarse splines: those of joints that lack
-something contradict each other a little at vertices, and are not to be met at any price."""
+"""Relative weight of fitting against the conditions of seams on coarse splines: where joints are imperfect, conditions
+contradict each other a little at vertices, and must not be met at any price."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ class Level:
         return net
 
     def target(self, problem: Problem, sheets: Mapping[int, Sheet], joined: Joints) -> Array:
-        """The level of the surface that the sheets make, less that surface, ``(points, 3)``."""
+        """The level of the surface that the sheets form, less that surface, ``(points, 3)``."""
         found = ladders(
             {i: sheet.origin for i, sheet in sheets.items()},
             {i: sheet.creases for i, sheet in sheets.items()},
@@ -95,7 +95,7 @@ class Level:
         return np.asarray(total)
 
     def ways(self, problem: Problem, target: Array, width: float) -> Iterable[Iterable[Array]]:
-        """What is nearest to the target, and smoother ways from it to what is held."""
+        """The displacement nearest to the target, and smoother transitions from it to what is held."""
         yield [problem.nearest(target, stiff) for stiff in ((0.0, stiffness(width / 4)) if problem.rimmed else (0.0,))]
         if problem.rimmed:
             yield problem.nearest(target, stiffness(width / 2)), problem.nearest(problem.fading(width) * target)
@@ -127,7 +127,7 @@ def projected(problem: Problem, coarse: Coarse, seams: Sequence[Seam]) -> Array:
 
 
 def _joined(problem: Problem, coarse: Coarse, seams: Sequence[Seam], system: tuple[Any, Any, Array]) -> Array:
-    """What to add to coarse control points so that seams hold: the least of the Gram matrix."""
+    """The least correction, in the Gram matrix, of coarse control points that meets the conditions of seams."""
     p, form, y = system
     nets = {i: space.net for i, space in problem.spaces.items()}
     conditions, mended = rows(nets, seams, coarse=coarse)

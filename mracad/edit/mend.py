@@ -1,9 +1,9 @@
-"""Mending: gaps and tilts along seams pulled shut by the smoothest least displacement, before anything else is done.
+"""Mending: close gaps and angles along seams by the smoothest least displacement, before anything else is done.
 
     δ = argmin ‖δ‖²_M + ℓ⁴ |δ|²_K    subject to    L δ = r,    ℓ = width / 2π
 
-r what joints lack.  It fades within the width, and what an edit does afterwards is judged against the mended surfaces:
-mending is asked for by name.  Ends of seams on free edges are closed, too: these give way near there.
+with r the defects of the joints.  It fades within the width.  The edit that follows is judged against the mended
+surfaces, because mending was asked for.  Ends of seams on free edges are closed too: free edges give way near there.
 """
 
 from __future__ import annotations
@@ -34,15 +34,15 @@ HALVINGS = 4
 """Most times that spans beside a trim curve are halved until its seam holds."""
 
 PASSES = 4
-"""Times that what a mending has left is mended."""
+"""Times that the remainder of a mending is mended again."""
 
 DETAIL = 3.0
-"""Displacements along trim curves count for so many of the widest gap there."""
+"""Size of the displacements along trim curves, over the widest gap there."""
 
 
 @dataclass(frozen=True, eq=False)
 class Mended:
-    """What mending made of a model.
+    """The result of mending a model.
 
     Attributes
     ----------
@@ -50,7 +50,7 @@ class Mended:
     moved : mapping of int to Moved
         The surfaces that it moved.
     edges : frozenset of int
-        Those that were pulled shut.
+        Those that were mended.
     """
 
     model: Model
@@ -58,7 +58,7 @@ class Mended:
     edges: frozenset[int] = frozenset()
 
     def before(self, result: Result, sheets: Mapping[int, Sheet]) -> Result:
-        """All that was done to a model, this first; ``sheets`` are those of the model as it was."""
+        """The whole change to a model, mending first; ``sheets`` are those of the original model."""
         moved = dict(result.moved)
         for i, each in self.moved.items():
             moved[i] = _both(each, moved[i], sheets[i]) if i in moved else each
@@ -68,7 +68,7 @@ class Mended:
 
 
 def mended(scene: Scene) -> Mended:
-    """Pull the gaps and tilts shut that the joints of a scene say."""
+    """Close the gaps and angles that the joints of a scene mark for mending."""
     moved: dict[int, Moved] = {}
     edges: set[int] = set()
     for group in groups(scene.sheets, scene.joints):
@@ -94,9 +94,9 @@ def _widest(joined: Joints) -> float:
 
 
 def _yielding(joined: Joints) -> Joints:
-    """The joints, of which those that are to be mended keep their position exactly and the rest to the tolerance.
+    """The joints; those to be mended keep their position exactly and the rest to the tolerance.
 
-    Where four patches meet, gaps that are closed have slopes that tilts must follow, and the other way round.
+    Where four patches meet, the slopes of closed gaps constrain the angles, and the other way round.
     """
     exact, loose = [], list(joined.loose)
     for seam in joined.exact:
@@ -110,7 +110,7 @@ def _yielding(joined: Joints) -> Joints:
 
 
 def _shut(scene: Scene, members: Mapping[int, Sheet], joined: Joints, wide: float) -> tuple[Pose, Array]:
-    """The problem of surfaces, and the displacement by which joints are shut."""
+    """The problem of surfaces, and the displacement that closes their joints."""
     width = max(sheet.wavelength for sheet in members.values())
     longest, finer = np.inf, members if scene.refine else ()
     for halving in range(HALVINGS + 1):
@@ -132,7 +132,7 @@ def _moved(members: Mapping[int, Sheet], found: Pose, delta: Array) -> dict[int,
 
 
 def _whole(sheet: Sheet, net: Net, offset: Array, free: int) -> Moved:
-    """A displacement that was done in whole."""
+    """A displacement made in full."""
     now = Watch.of([(net, sheet.base, sheet.faces)], sheet.wavelength, sheet.reach).changes(
         {0: displaced(net, offset)}
     )[0]

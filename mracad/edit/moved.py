@@ -1,4 +1,4 @@
-"""What was done to surfaces, and how that looks closer."""
+"""The changes made to surfaces, and a closer look at them."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from mracad.seam.interface import Joints
 Array = np.ndarray
 
 CLOSER = 9
-"""Points a span at which a result is looked at again."""
+"""Points a span at which a result is judged again."""
 
 
 @dataclass(frozen=True, eq=False)
 class Moved:
-    """What was done to a surface.
+    """The change made to a surface.
 
     Attributes
     ----------
@@ -33,17 +33,17 @@ class Moved:
         Before, in the space of the displacement.
     offset : ndarray (nu, nv, 3)
     amount : float
-        Share of what was wanted that could be done.
+        Share of the wanted change that was allowed.
     changes : mapping of int to Change
         Of the roughness of its faces, by face.
     limits : tuple of Worse
-        What kept it from more.
+        What limited the amount.
     free : int
         Free control points.
     gain, wanted : float
-        By how much the surfaces that move with it came nearer to what was wanted, and all of that, as squared norms.
+        How much nearer the surfaces that move with it came to the target, and the whole distance, as squared norms.
     rough : bool
-        Whether what was wanted would take anything off its roughness.
+        Whether the wanted change would reduce its roughness at all.
     """
 
     sheet: Sheet
@@ -74,11 +74,11 @@ class Moved:
 
     @property
     def share(self) -> float:
-        """How much of the way to what was wanted was gone."""
+        """The share of the way to the target."""
         return self.gain / self.wanted if self.wanted > 0.0 else 0.0
 
     def scaled(self, amount: float) -> Moved:
-        """The same with another share of it done."""
+        """The same change with another amount."""
         if amount == self.amount:
             return self
         offset = self.offset * (amount / self.amount)
@@ -86,13 +86,13 @@ class Moved:
         return replace(self, offset=offset, amount=amount, changes=now)
 
     def undone(self) -> Moved:
-        """Nothing done instead."""
+        """No change instead."""
         still = {face: change.undone() for face, change in self.changes.items()}
         return replace(self, offset=np.zeros_like(self.offset), amount=0.0, changes=still, limits=(), gain=0.0)
 
     def confirmed(self, tolerances: Tolerances) -> Moved:
-        """What a closer look leaves of it: what grows between the points of the first is taken back; nothing if no face
-        gains by the rest."""
+        """The part that passes a closer look: growth between the points of the first is taken back; nothing is left if
+        no face gains from the rest."""
         if not self.amount:
             return self
         whole, most = self.offset / self.amount, np.array([self.amount])
@@ -107,14 +107,14 @@ class Moved:
         )
 
     def displacement(self) -> Offset:
-        """The displacement over the surface as it is."""
+        """The displacement over the original surface."""
         return Offset.of(self.sheet.origin, self.net, self.offset)
 
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """What became of all surfaces, and the joints that moved with them; ``sheets`` are all that were looked at, and
-    ``mended`` edges that were pulled shut."""
+    """The changes of all surfaces, and the joints that moved with them; ``sheets`` are all that were considered, and
+    ``mended`` the edges that were mended."""
 
     moved: Mapping[int, Moved]
     joints: Joints
@@ -122,5 +122,5 @@ class Result:
     mended: frozenset[int] = frozenset()
 
     def displacement(self) -> Displacement:
-        """What moves."""
+        """The displacement of all surfaces that move."""
         return Displacement({i: each.displacement() for i, each in self.moved.items() if np.any(each.offset)})

@@ -1,6 +1,6 @@
 """Offsets: faces moved along their outward normals by a length, with the seams between them.
 
-The wish is δ = d n at the Greville points; free edges and poles go along, and beside what is held it fades.
+The wish is δ = d n at the Greville points; free edges and poles move along, and it fades beside what is held.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from mracad.spec.steps.smooth import OffsetFaces
 Array = np.ndarray
 
 MISSED, LEAST = 1e-4, 0.25
-"""Shares of the distance: by which splines may miss it, and to which their spans are divided at least."""
+"""Shares of the distance: the error that splines may have, and the shortest spans into which they are divided."""
 
 FADE = 8.0
 """Distances within which an offset fades beside what is held: a face is tilted by 13° at most there."""
@@ -44,7 +44,7 @@ class Outward:
     distance : float
         Along outward normals, mm.
     refine : bool
-        Whether knots may be set where splines through d n need them.
+        Whether knots may be inserted where splines through d n need them.
     """
 
     distance: float
@@ -53,11 +53,11 @@ class Outward:
     fairs: ClassVar[bool] = False
 
     def wavelength(self, net: Net, faces: Sequence[Face], creases: Creases) -> float:
-        """Within which it fades, mm."""
+        """The width within which it fades, mm."""
         return FADE * abs(self.distance)
 
     def space(self, net: Net) -> Net:
-        """The surface with spans divided until splines through d n miss it by next to nothing."""
+        """The surface with spans divided until splines can hold d n."""
 
         def more(knots: Knots) -> Sequence[Array]:
             uv, fine = middles(*knots), net.over(*knots)
@@ -86,7 +86,7 @@ class Outward:
         return np.asarray(self.distance * np.nan_to_num(net.normals(uv)))
 
     def ways(self, problem: Problem, target: Array, width: float) -> Iterable[Iterable[Array]]:
-        """The nearest that seams allow; beside what is held, faded."""
+        """The nearest displacement that seams allow, faded beside what is held."""
         if problem.rimmed:
             target = problem.fading(width) * target
         yield [problem.nearest(target, stiff, beyond=True) for stiff in (0.0, stiffness(width / 8))]

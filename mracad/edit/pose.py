@@ -1,4 +1,4 @@
-"""The problem that surfaces which move together make: their spaces, what joins them and what holds them."""
+"""The problem of surfaces that move together: their spaces, how they are joined and how they are held."""
 
 from __future__ import annotations
 
@@ -25,16 +25,16 @@ from mracad.seam.space import refined
 Array = np.ndarray
 
 TIGHT = 0.3
-"""Share of what a contact may lack at which its conditions aim."""
+"""Share of the allowed error of a contact that its conditions aim at."""
 
 EASY = 30.0
-"""How much more smooth contacts between surfaces may lack in what an edit wants: splines of unrelated knots that had to
-agree closely along a curve could hardly follow what is wanted beside it.  At creases each side is on its own: what
-slides along one would push the other."""
+"""Factor on the allowed error of smooth contacts between surfaces in the target of an edit: splines of unrelated knots
+that had to agree closely along a curve could hardly follow the target beside it.  At creases each side is on its own:
+sliding on one side would push the other."""
 
 
 WITHIN = 0.8
-"""Share of what may be worse that contacts may lack, which are looked at in other places than the result."""
+"""Share of the allowed growth that contacts may use, because the result is measured in other places than theirs."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,11 +83,11 @@ class Pose:
     owners : sequence of set of int
         The surfaces of each contact.
     opened : ndarray (conditions, 3)
-        What contacts between two surfaces lack as they are: gap, slope, curvature.
+        Errors of contacts between two surfaces before the edit: gap, slope, curvature.
     limits : ndarray (conditions,)
-        What they may lack.
+        Their allowed errors.
     trimmed : ndarray of bool (conditions,)
-        Where what seams along trim curves lack is to be mended.
+        Conditions of seams along trim curves that are to be mended.
     """
 
     problem: Problem
@@ -98,7 +98,7 @@ class Pose:
     trimmed: Array
 
     def open(self, delta: Array) -> bool:
-        """Whether a displacement leaves seams along trim curves open that are to be mended."""
+        """Whether a displacement leaves seams along trim curves open that should be mended."""
         lacked = np.linalg.norm(self.opened + self.contacts.matrix @ delta, axis=1)
         return bool((lacked > self.limits)[self.trimmed].any())
 
@@ -121,11 +121,11 @@ def pose(
     members : mapping of int to Sheet
     joined : Joints
     width : float
-        Within which displacements fade, mm.
+        Width within which displacements fade, mm.
     detail : float
-        Size of the displacements that are wanted, mm: the larger, the more contacts weigh.
+        Size of the wanted displacements, mm: the larger, the more contacts weigh.
     finer : collection of int
-        Surfaces that get control points beside rims where they have few.
+        Surfaces that get control points beside rims if they have few.
     longest : float
         Longest knot spans beside seams along trim curves, mm.
     """
@@ -168,7 +168,8 @@ def pose(
 
 
 def worth(detail: float, width: float) -> float:
-    """What a contact that lacks all that it may counts for, mm³: displacements (mm) of a size within a width (mm)."""
+    """The weight of a contact with its whole allowed error, mm³: that of displacements of size ``detail`` (mm) within
+    ``width`` (mm)."""
     return (detail / TIGHT) ** 2 * width
 
 

@@ -1,4 +1,4 @@
-"""What an edit wants, and surfaces as it looks at them before it solves anything."""
+"""The target of an edit, and its view of surfaces before it solves anything."""
 
 from __future__ import annotations
 
@@ -23,21 +23,21 @@ from mracad.wavelet.project import at_scale
 Array = np.ndarray
 
 DEGREE = 3
-"""Least degree of a surface that moves: knots set into a lower one make facets."""
+"""Least degree of a surface that moves: knots inserted into a lower one make facets."""
 
 TREND, BASE = 2.5, 6.0
-"""Waves of more wavelengths than the first are shape, of more than the second what waves show beside."""
+"""Waves longer than the first (in wavelengths) are shape, longer than the second the base that waves show against."""
 
 
 class Wish(Protocol):
-    """What an edit wants.
+    """The target of an edit.
 
     Attributes
     ----------
     spread : float
-        Within how many wavelengths what it takes from a place spreads; infinite where that is no fault.
+        Number of wavelengths within which a change at a place spreads; infinite where that is no fault.
     fairs : bool
-        Whether it makes faces fairer; else it changes what they are, and takes free edges and poles with them.
+        Whether it makes faces fairer; otherwise it changes their shape, and free edges and poles move along.
     """
 
     @property
@@ -47,22 +47,22 @@ class Wish(Protocol):
     def fairs(self) -> bool: ...
 
     def wavelength(self, net: Net, faces: Sequence[Face], creases: Creases) -> float:
-        """Wavelength below which it takes waves from faces of a surface, mm; beside what is held it fades within it."""
+        """Wavelength below which it removes waves from a surface, mm; beside what is held it fades within this."""
         ...
 
     def space(self, net: Net) -> Net:
-        """A surface over knots that can hold what it wants; itself where those that it has will do."""
+        """The surface over knots that can hold the target; the surface itself if its own can."""
         ...
 
     def target(self, problem: Problem, sheets: Mapping[int, Sheet], joined: Joints) -> Array:
-        """What it would do to surfaces that seams join were no rim held, ``(points, 3)``."""
+        """What it would do to surfaces that seams join if no rim were held, ``(points, 3)``."""
         ...
 
     def ways(self, problem: Problem, target: Array, width: float) -> Iterable[Iterable[Array]]:
-        """Displacements ``(points, 3)`` of a problem, of which that is done that may come nearest to the target.
+        """Displacements ``(points, 3)`` to choose from: the one that the judge allows nearest to the target is taken.
 
-        They come in batches: the next is looked at only where the judge takes much off the one before.  Beside what is
-        held, they fade within ``width`` (mm).
+        They come in batches: the next is only tried if the judge cuts much off the one before.  Beside what is held,
+        they fade within ``width`` (mm).
         """
         ...
 
@@ -76,22 +76,22 @@ class Sheet:
     index : int
         In ``Model.surfaces``.
     origin, net : Net
-        As it is, and of degree 3 at least over knots that can hold what is wanted.
+        The original, and the same of degree 3 at least over knots that can hold the target.
     all_faces, faces : tuple of Face
         All faces on it, and those that may move.
     metric : Net
-        What displacements are measured on.
+        The surface on which displacements are measured.
     creases : pair of frozenset of float
         Crease lines in u and v.
     wavelength : float
-        Below which the edit takes waves from it, mm.
+        Wavelength below which the edit removes waves, mm.
     reach : float
-        Within which what it takes spreads, mm.
+        Distance within which a change spreads, mm.
     trend, base : Net
-        The surface projected on the splines of a few wavelengths: what is in it is shape; and of many, for the judge: a
-        trend that swings about a mark would hide waves that are made there.
+        The surface projected on the splines of a few wavelengths, which is shape; and of many, for the judge: a trend
+        that oscillates around a mark would hide new waves there.
     detail : float
-        Largest displacement of a control point were nothing held, mm.
+        Largest displacement of a control point if nothing were held, mm.
     """
 
     index: int
@@ -145,9 +145,9 @@ def _sheet(index: int, origin: Net, every: tuple[Face, ...], faces: tuple[Face, 
 
 
 def eased(net: Net, share: Array, width: float) -> Array:
-    """Shares ``(nu, nv)`` of the control points of a net that change smoothly, and are nowhere larger than they were.
+    """Shares ``(nu, nv)`` of control points made smooth, and nowhere larger than before.
 
-    The mean over a window of the width (mm) of the least over the same window.
+    The mean, over a window of the width (mm), of the least over the same window.
     """
     from scipy.ndimage import minimum_filter, uniform_filter
 

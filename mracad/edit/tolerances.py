@@ -1,4 +1,4 @@
-"""What the result of an edit may be worse in: one answer for conditions, the judge and the verdict on a document."""
+"""How much worse the result of an edit may be: one answer for conditions, the judge and the verdict on a document."""
 
 from __future__ import annotations
 
@@ -13,30 +13,30 @@ from mracad.spec.quantity import length
 from mracad.spec.steps import Fitting, Selection
 
 GROWTH = Growth(0.005, 0.005, 0.005, 0.02, 30.0, 0.25)
-"""What the judge lets pass by default: a quarter of the 2 % that count as worse where faces are compared, and waves
-at a place of an eighth more than about it."""
+"""Growth that the judge allows by default: a quarter of the 2 % that count as worse when faces are compared, and waves
+at a place an eighth larger than those around it."""
 
 RESHAPED = Growth(np.inf, np.inf, np.inf, np.inf, 30.0, np.inf)
-"""What the judge lets pass where an edit changes what faces are: they must not fold."""
+"""Growth that the judge allows if an edit changes the shape of faces: they must not fold."""
 
 MORE = 0.02
-"""Share by which an edge may gape more that gapes as far as it may."""
+"""Share by which the gap of an edge may grow if it is already as wide as allowed."""
 
 
 @dataclass(frozen=True)
 class Tolerances:
-    """What a result may be worse in.
+    """How much worse a result may be.
 
     Attributes
     ----------
     gap : float
-        Of a seam that moves along a trim curve, mm: by how much it may gape more; most that any other edge may.
+        By how much the gap of a seam that moves along a trim curve may grow, mm; the most for any other edge.
     least : float
-        What any edge may gape, mm, however exact it is.
+        Gap that any edge may have, mm, however exact it is.
     angle, bend : float
-        By which the angle (radians) and the curvature (over the wavelength of the edit) along an edge may grow.
+        By how much the angle (radians) and the curvature (over the wavelength of the edit) along an edge may grow.
     jump : float
-        Jumps of curvature along edges, over the wavelength, that count for none: more shows beside them.
+        Jumps of curvature along edges, over the wavelength, that count as none: larger ones would show.
     growth : Growth
         Of roughness.
     deviation : float
@@ -59,17 +59,17 @@ class Tolerances:
         return self.gap, self.angle, self.bend / width
 
     def wider(self, edge: Edge, gap: float) -> float:
-        """By how much an edge that gapes by ``gap`` (mm) may gape more where it stays, mm: up to its own tolerance."""
+        """By how much the gap (mm) of an edge that stays may grow, mm: up to the edge's own tolerance."""
         return max(min(max(edge.tolerance, self.least), self.gap) - gap, MORE * gap)
 
 
 def tolerances(model: Model, options: Selection) -> Tolerances:
-    """What an edit of a model may be worse in.
+    """How much worse an edit of a model may be.
 
     Raises
     ------
     UsageError
-        For a length that is none.
+        For an invalid length.
     """
     if not isinstance(options, Fitting):
         return Tolerances()

@@ -1,4 +1,4 @@
-"""What seams may gape after an edit, and the faces of those that do not hold."""
+"""How far seams may open in an edit, and the faces of those that open further."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def torn(
     allowed: Tolerances,
     keep: str,
 ) -> set[int]:
-    """Faces of seams that an edit would open, or that were smooth and would not be; against its own intent.
+    """Faces of seams that an edit would open, or whose smoothness it would lose, against its own intent.
 
     Parameters
     ----------
@@ -28,10 +28,10 @@ def torn(
     before, after : sequence of SeamMeasure
         In the same order.
     edit : Edit
-        Edges of which it says nothing stay.
+        Edges that it does not mention stay.
     allowed : Tolerances
     keep : str
-        Where only the position (``"g0"``) is to be kept a kink is no harm.
+        If only the position is kept (``"g0"``), a kink is no fault.
     """
     steeper, found = math.degrees(allowed.angle), set()
     for (old, widest), new in zip(_widest(model, before, edit, allowed), after, strict=True):
@@ -42,7 +42,7 @@ def torn(
 
 
 def gaps(model: Model, before: Sequence[SeamMeasure], edit: Edit, allowed: Tolerances) -> dict[tuple[int, ...], float]:
-    """How wide seams of edited faces may gape that do not move exactly, mm, by their faces.
+    """The gaps allowed for seams of edited faces that do not move exactly, mm, by their faces.
 
     Parameters as for :func:`torn`.
     """
@@ -58,7 +58,7 @@ def gaps(model: Model, before: Sequence[SeamMeasure], edit: Edit, allowed: Toler
 def _widest(
     model: Model, before: Sequence[SeamMeasure], edit: Edit, allowed: Tolerances
 ) -> Iterator[tuple[SeamMeasure, float | None]]:
-    """Seams, and how wide they may gape, mm; None where they were to be mended."""
+    """Seams, and their allowed gaps, mm; None where they were to be mended."""
     ways: Mapping[int, str] = {each.edge: each.how for each in edit.edges}
     for seam in before:
         how = ways.get(seam.edge)

@@ -1,4 +1,4 @@
-"""One attempt of an edit on surfaces that move together: their problem, and what the judge makes of displacements."""
+"""One attempt of an edit on surfaces that move together: their problem, and the judge's verdict on displacements."""
 
 from __future__ import annotations
 
@@ -22,43 +22,43 @@ Array = np.ndarray
 
 GAIN = 0.01, 0.25, 0.01
 """Least share of its bending or curvature variation that a face must lose to be touched at all; or one of its places,
-and all in the mean."""
+and the mean of all."""
 
 ENOUGH = 0.9
-"""Where more than this of a displacement may be done, no other is tried."""
+"""If more than this share of a displacement is allowed, no other is tried."""
 
 WHOLE = 1.25
-"""What may be done in whole is preferred to a part of what comes nearer to the target by less than this factor: a part
-leaves something of every wave everywhere."""
+"""A displacement allowed in full is preferred to part of one that comes nearer to the target by less than this factor:
+a part leaves something of every wave everywhere."""
 
 SHARES = 0.125, 0.25, 0.5, 1.0
-"""Amounts of which the largest that serves is done place by place, where not all can be done everywhere."""
+"""Amounts to choose from place by place, the largest that is allowed, where not everything is allowed everywhere."""
 
 EASINGS = 2
 """Most times that this is done to one displacement."""
 
 FINER = 3
-"""Steps from one Greville point to the next in which deviations are looked for."""
+"""Steps from one Greville point to the next at which deviations are sampled."""
 
 
 @dataclass(frozen=True, eq=False)
 class Verdict:
-    """What the judge makes of a displacement.
+    """The judge's verdict on a displacement.
 
     Attributes
     ----------
     tried : Tried
-        What is done to each surface.
+        The displacement of each surface.
     amounts : sequence of float
-        How much of it may be done.
+        The share of it that is allowed.
     changes : sequence of mapping of int to Change
-        What that makes of the roughness of its faces, by face.
+        The change of roughness of its faces, by face.
     limits : sequence of tuple of Worse
-        What keeps it from more.
+        What limits the amount.
     gains : sequence of float
-        By how much each comes nearer to the target, as a squared norm.
+        How much nearer each surface comes to the target, as a squared norm.
     gain : float
-        The same of all, the least of the amounts of each.
+        The same for all surfaces, with the least of their amounts.
     """
 
     tried: Tried
@@ -70,17 +70,17 @@ class Verdict:
 
     @property
     def parts(self) -> Sequence[Array]:
-        """What is done to each surface, mm, ``(nu, nv, 3)`` each."""
+        """The allowed displacement of each surface, mm, ``(nu, nv, 3)`` each."""
         return self.tried.parts
 
     @property
     def least(self) -> float:
-        """What may be done to all of them."""
+        """The amount allowed for all of them."""
         return min(self.amounts)
 
 
 class Trial:
-    """Surfaces that move together: their problem, and the judge of what is done to them."""
+    """Surfaces that move together: their problem, and the judge of their displacements."""
 
     def __init__(self, scene: Scene, members: Mapping[int, Sheet], joined: Joints, finer: Collection[int] = ()) -> None:
         self.width = max(sheet.wavelength for sheet in members.values())
@@ -95,13 +95,13 @@ class Trial:
         self.watch = Watch.of(surfaces, self.width, max(sheet.reach for sheet in members.values()))
 
     def nothing(self, least: float = 0.0) -> Verdict:
-        """What the judge makes of leaving everything as it is, which counts for a gain that others have to exceed."""
+        """The verdict on no change, with a gain that others have to exceed."""
         still = Tried(self.watch, self.nets, [np.zeros(net.poles.shape) for net in self.nets])
         none = [0.0] * len(self.nets)
         return Verdict(still, none, self.watch.still(), [()] * len(none), none, least)
 
     def judged(self, delta: Array, target: Array, others: Sequence[Verdict] = ()) -> Verdict:
-        """How much of a displacement may be done to each surface; where it could not do better than others, nothing."""
+        """The share of a displacement allowed for each surface; 0 where it could not do better than others."""
         bound = self.tolerances.deviation
         if np.isfinite(bound) and np.linalg.norm(delta, axis=1).max(initial=0.0) > bound:
             both = zip(self.nets, self._split(delta), strict=True)
@@ -111,13 +111,13 @@ class Trial:
         return self._verdict(tried, target, self._floor(delta, target, others), BISECTIONS[len(self.nets) > 1])
 
     def settled(self, verdict: Verdict, target: Array) -> Verdict:
-        """The same, its amounts found closely."""
+        """The same verdict, with closer amounts."""
         if not verdict.least or verdict.least == 1.0:
             return verdict
         return self._verdict(verdict.tried, target, np.zeros(len(self.nets)), BISECTIONS[1])
 
     def left(self, verdict: Verdict, shares: Sequence[float], target: Array) -> Verdict:
-        """The same with other amounts."""
+        """The same verdict with other amounts."""
         delta = np.concatenate([part.reshape(-1, 3) for part in verdict.parts])
         gains, gain = self._gains(delta, target, shares)
         return replace(verdict, amounts=shares, gains=gains, gain=gain)
@@ -131,7 +131,7 @@ class Trial:
         return Verdict(tried, shares, found, limits, *self._gains(delta, target, shares))
 
     def eased(self, verdict: Verdict, target: Array, others: Sequence[Verdict] = ()) -> Verdict:
-        """The best that becomes of a displacement that is scaled back where places allow less of it."""
+        """The best verdict on a displacement that is scaled back where places allow less of it."""
         found = [verdict]
         while found[-1].least <= ENOUGH and len(found) <= EASINGS:
             delta = np.concatenate([part.reshape(-1, 3) for part in found[-1].parts])
@@ -145,19 +145,19 @@ class Trial:
         return max(found, key=rank)
 
     def blended(self, chosen: Sequence[tuple[Verdict, int]], target: Array, others: Sequence[Verdict]) -> Verdict:
-        """For each surface another verdict on it, by place, made to meet as smoothly as can be."""
+        """The best displacement of each surface, from different verdicts, made to meet as smoothly as possible."""
         wanted = np.concatenate([each.amounts[i] * each.parts[i].reshape(-1, 3) for each, i in chosen])
         together = self.judged(self.problem.nearest(wanted, stiffness(self.width)), target, others)
         return self.eased(together, target, others)
 
     def fairer(self, delta: Array) -> list[bool]:
-        """Whether a displacement would take anything off the roughness of each surface, whatever it adds to others."""
+        """Whether a displacement would reduce the roughness of each surface, whatever it adds to others."""
         both = zip(self.problem.spaces.values(), self.problem.split(delta).values(), strict=True)
         found = self.watch.changes({i: displaced(space.net, part) for i, (space, part) in enumerate(both)})
         return [any(better(change, GAIN[0]) for change in faces.values()) for faces in found.values()]
 
     def _floor(self, delta: Array, target: Array, others: Sequence[Verdict]) -> Array:
-        """Amounts of a displacement up to which it is worth less than one of others, infinite where it is in whole."""
+        """Amounts below which a displacement is worth less than another; infinite if it always is."""
         best, count = max((worth(each) for each in others), default=0.0), len(self.nets)
         if best and count == 1:
             return np.array([_beating(best, *(self.problem.gains(delta, target, [a])[0] for a in (0.5, 1.0)))])
@@ -166,7 +166,7 @@ class Trial:
         return np.full(count, np.inf if WHOLE * gain <= best and all(beaten) else 0.0)
 
     def _gains(self, delta: Array, target: Array, shares: Sequence[float]) -> tuple[list[float], float]:
-        """By how much amounts of a displacement bring each surface nearer to a target, and the least of them all."""
+        """How much nearer a displacement brings each surface to a target, and all of them with the least amount."""
         least = [min(shares)] * len(shares)
         return self.problem.gains(delta, target, shares), sum(self.problem.gains(delta, target, least))
 
@@ -191,7 +191,7 @@ class Trial:
         return np.concatenate([eased(net, share, self.width / 2).ravel() for net, share in both])[:, None]
 
     def _ceilings(self, delta: Array) -> Array:
-        """How much of a displacement contacts allow each surface."""
+        """The share of a displacement that contacts allow for each surface."""
         ceiling = dict.fromkeys(self.problem.spaces, 1.0)
         room = self.pose.contacts.room(delta, self.pose.opened, self.pose.limits)
         for surfaces, most in zip(self.pose.owners, room, strict=True):
@@ -210,12 +210,12 @@ def gained(faces: Mapping[int, Change], tolerances: Tolerances) -> bool:
 
 
 def worth(verdict: Verdict) -> float:
-    """What a verdict counts for among others."""
+    """The worth of a verdict, to compare it with others."""
     return verdict.gain * (WHOLE if verdict.least > ENOUGH else 1.0)
 
 
 def _beating(best: float, half: float, whole: float) -> float:
-    """The least amount of a displacement that is worth more than the best, from what half and all of it gain."""
+    """The least amount of a displacement that is worth more than the best, given the gains of half and all of it."""
     amounts = np.arange(1, 65) / 64
     gain = (4 * half - whole) * amounts + 2 * (whole - 2 * half) * amounts**2
     more = amounts[gain * np.where(amounts > ENOUGH, WHOLE, 1.0) > best]
@@ -223,14 +223,14 @@ def _beating(best: float, half: float, whole: float) -> float:
 
 
 def rank(verdict: Verdict) -> tuple[float, float]:
-    """What it counts for, and where some of the surfaces may not move at all, by what the others gain."""
+    """Its worth; if some of the surfaces may not move at all, then the gain of the others."""
     return worth(verdict), sum(verdict.gains)
 
 
 def bounded(net: Net, offset: Array, bound: float, width: float) -> Array:
-    """Offsets ``(nu, nv, 3)`` that are scaled back, smoothly within a width, until none leads far along the normal.
+    """Offsets ``(nu, nv, 3)`` scaled back, smoothly within a width, until none exceeds a bound along the normal.
 
-    Each takes the share min(1, bound / |δ · n|), eased, of what is largest beside its Greville point.
+    Each gets the share min(1, bound / |δ · n|), eased, for the largest |δ · n| beside its Greville point.
 
     Parameters
     ----------
@@ -251,5 +251,5 @@ def bounded(net: Net, offset: Array, bound: float, width: float) -> Array:
 
 
 def _between(places: Array) -> Array:
-    """Parameters with more between each and the next."""
+    """Parameters with more of them between each and the next."""
     return np.asarray(np.interp(np.arange(FINER * (len(places) - 1) + 1) / FINER, np.arange(len(places)), places))

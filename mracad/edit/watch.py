@@ -1,4 +1,4 @@
-"""Faces looked at while displacements of their surfaces are tried: how much of each may be done."""
+"""Faces watched while displacements of their surfaces are tried: how much of each is allowed."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from mracad.model.brep import Face
 Array = np.ndarray
 
 BISECTIONS = 3, 5
-"""Steps in which an amount is found: roughly among several displacements of one surface; else closely."""
+"""Steps in which an amount is found: roughly among several displacements of one surface; otherwise closely."""
 
 SINGULAR = 1e5
-"""Curvature over the wavelength from which on a face is singular."""
+"""Curvature over the wavelength above which a face is singular."""
 
 
 @dataclass(frozen=True, eq=False)
 class Watch:
-    """The faces of surfaces, each looked at by itself.
+    """The faces of surfaces, each watched separately.
 
     Attributes
     ----------
@@ -40,8 +40,8 @@ class Watch:
     def of(
         cls, surfaces: Sequence[tuple[Net, Net, Sequence[Face]]], width: float, reach: float, points: int = POINTS
     ) -> Watch:
-        """Look at faces of surfaces, with their bases, before an edit that takes waves up to a width and
-        spreads them within a reach (mm), at so many points a span."""
+        """Watch faces of surfaces, with their bases, before an edit that removes waves up to a width and spreads them
+        within a reach (mm), at so many points a span."""
         every = [(place, net, base, face) for place, (net, base, faces) in enumerate(surfaces) for face in faces]
         looked = [(net, (face,), net.u, net.v) for _, net, _, face in every]
         bases = [base for *_, base, _ in every] if np.isfinite(reach) else ()
@@ -51,14 +51,14 @@ class Watch:
         )
 
     def still(self) -> list[dict[int, Change]]:
-        """What becomes of the faces of each surface where nothing moves."""
+        """The changes of the faces of each surface if nothing moves."""
         found: list[dict[int, Change]] = [{} for _ in range(self.owners[-1][0] + 1)]
         for (place, face), survey in zip(self.owners, self.surveys, strict=True):
             found[place][face] = Change(survey.roughness, survey.roughness, survey.noise)
         return found
 
     def changes(self, nets: Mapping[int, Net]) -> dict[int, dict[int, Change]]:
-        """What became of the faces of some surfaces, by place."""
+        """The changes of the faces of some surfaces, by position of the surface."""
         found: dict[int, dict[int, Change]] = {place: {} for place in nets}
         looked = [(*owner, survey) for owner, survey in zip(self.owners, self.surveys, strict=True) if owner[0] in nets]
         now = changes([survey for *_, survey in looked], [nets[place] for place, *_ in looked])
@@ -69,7 +69,7 @@ class Watch:
 
 @dataclass(frozen=True, eq=False)
 class Tried:
-    """Displacements of surfaces, of which amounts are looked at, each once.
+    """Displacements of surfaces; each amount is evaluated once.
 
     Attributes
     ----------
@@ -85,7 +85,7 @@ class Tried:
     _seen: dict[tuple[int, float], Mapping[int, Change]] = field(default_factory=dict)
 
     def changes(self, amounts: Mapping[int, float]) -> dict[int, Mapping[int, Change]]:
-        """What an amount of its displacement makes of the faces of each surface that is named."""
+        """The changes of the faces of each surface after the given amount of its displacement."""
         new = {i: displaced(self.nets[i], a * self.parts[i]) for i, a in amounts.items() if (i, a) not in self._seen}
         self._seen.update({(i, amounts[i]): faces for i, faces in self.watch.changes(new).items()})
         return {i: self._seen[i, amount] for i, amount in amounts.items()}
@@ -100,7 +100,7 @@ def amounts(
     ----------
     tried : Tried
     floor, ceiling : ndarray (surfaces,)
-        Amounts below which nothing is done, and those that are not to be exceeded.
+        Amounts below which nothing is done, and that must not be exceeded.
     tolerances : Tolerances
     steps : int
         Bisections.

@@ -1,4 +1,4 @@
-"""Edits that change whole faces: a wish taken through the driver, and what became of each face and edge."""
+"""Edits that change whole faces: a wish taken through the driver, and the outcome for each face and edge."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from mracad.spec.steps import Fairing, Fitting
 def edited(
     model: Model, options: Fitting, wish: Wish, scope: Scope | None, progress: Callable[[int, int], None] | None
 ) -> Edit:
-    """Do as much of a wish to the NURBS faces of a model as may be done.
+    """Apply a wish to the NURBS faces of a model, as far as the judge allows.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ def edited(
     Raises
     ------
     UsageError
-        For options that this model does not have or that need the document.
+        For options that name parts this model does not have, or that need the document.
     """
     scope = scope or scope_of(model, options)
     movable = {i for i in scope.chosen if model.faces[i].surface is not None}
@@ -68,7 +68,7 @@ def edited(
 
 
 def _outcome(face: Face, result: Result, movable: Collection[int], scope: Scope, options: Fitting) -> FaceOutcome:
-    """What became of one face."""
+    """The outcome for one face."""
     outcome = spared(face, scope, movable)
     if outcome:
         return outcome
@@ -116,12 +116,12 @@ def _left(moved: Moved, options: Fitting) -> tuple[Status, Reason, str]:
 
 
 def _figures(limits: Collection[Worse]) -> str:
-    """In what a face would get rougher."""
+    """The figures in which a face would get rougher."""
     return ", ".join(dict.fromkeys(limit.what.value for limit in limits))
 
 
 def treatments(model: Model, movable: set[int], result: Result, options: Fitting) -> tuple[Treatment, ...]:
-    """What was done about each edge of a face that could move, in edge order."""
+    """The treatment of each edge of a face that could move, in edge order."""
     joints, frozen = result.joints, dict(result.joints.frozen)
     if options.edges == "frozen":
         frozen = {e: Cause(Still.FROZEN) if why.still is Still.HELD else why for e, why in frozen.items()}
