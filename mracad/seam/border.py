@@ -15,7 +15,7 @@ from mracad.seam.sides import inner_side
 
 Array = np.ndarray
 Jet = tuple[Array, ...]
-"""``S, S_n, S_t`` and perhaps ``S_nn`` along a border, as :func:`jets` gives them."""
+"""``S, S_n, S_t`` and perhaps ``S_nn`` along a border, from :func:`jets`."""
 
 AFFINE = 1e-7
 """Largest deviation, as a fraction of the seam, from an affine map between the parameters along it."""
@@ -59,13 +59,13 @@ class Border:
         return (self.limit, along) if self.axis == 0 else (along, self.limit)
 
     def part(self, low: float, high: float) -> Border:
-        """What lies between two fractions of it."""
+        """The part between two fractions."""
         start, stop = ((1.0 - share) * self.start + share * self.stop for share in (low, high))
         return replace(self, start=start, stop=stop)
 
 
 def border(model: Model, edge: Edge, side: Side, use: int) -> Border | None:
-    """The isoparametric curve by which a face meets an edge, run through at a steady pace; None for any other."""
+    """The isoparametric curve by which a face meets an edge, if its parameter is even along it; None otherwise."""
     face = model.faces[side.face]
     assert face.surface is not None and side.uv is not None
     net = model.surfaces[face.surface].net

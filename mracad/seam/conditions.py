@@ -1,14 +1,13 @@
 """Conditions along seams, as rows on the control points of a problem.
 
-A seam along knot lines of both surfaces, whose degrees and knots along it are made the same, exactly, keeps on a
-displacement δ, at the Greville points of the splines along it,
+Along a seam on knot lines of both surfaces, degrees and knots are made the same, exactly.  A displacement δ then
+satisfies, at the Greville points of the splines along it,
 
     G0   δ_b = δ_a,   G1   ∂_n δ_b = a ∂_n δ_a + b ∂_t δ_a,   G2   ∂_nn δ_b = a² ∂_nn δ_a + r ∂_n δ_a + s ∂_t δ_a
 
-(a, b, r, s of the input's joint: :class:`mracad.seam.joint.Joint`), or what comes to the same with fewer control
-points in each condition.  As many conditions as the space has functions are exact where the joint's coefficients are
-constant, and never lock where they vary.  Along double knots (:func:`doubled`) there is room for conditions that are
-exact where they vary, too.
+(a, b, r, s of the input's joint: :class:`mracad.seam.joint.Joint`), or an equivalent with fewer control points in each
+condition.  One condition per function of the space is exact where the joint's coefficients are constant, and never
+locks where they vary.  With double knots along the seam (:func:`doubled`) conditions can be exact there too.
 """
 
 from __future__ import annotations
@@ -29,17 +28,17 @@ from mracad.seam.natural import Seam
 Array = np.ndarray
 
 ROUNDING = 1e-13
-"""Share of the largest entry of the conditions of a seam that counts for nothing."""
+"""Share of the largest entry of the conditions of a seam below which entries are dropped."""
 
 MOST_PLAIN = 1_000_000
-"""Most entries of a dense matrix in which they are made plain."""
+"""Most entries of a dense matrix in which conditions are simplified."""
 
 SAME = 1e-9
 """Fraction of a seam within which knots of its two sides are the same."""
 
 
 def laid_out(nets: Mapping[int, Net]) -> tuple[dict[int, int], int]:
-    """Where the control points of each net begin when all are laid out one after another, and how many there are."""
+    """Where the control points of each net begin when all are laid out one after another, and their number."""
     ends = np.cumsum([0, *(net.u.count * net.v.count for net in nets.values())]).tolist()
     return dict(zip(nets, ends[:-1], strict=True)), ends[-1]
 
@@ -50,7 +49,7 @@ def matched(nets: Mapping[int, Net], seams: Sequence[Seam]) -> dict[int, Net]:
     Both sides of every seam then have the same splines along it.
     """
     result = _elevated(nets, seams)
-    for _ in nets:  # what one needs is handed on from seam to seam
+    for _ in nets:  # knots are passed on from seam to seam
         wanted: dict[int, tuple[list[float], list[float]]] = {i: ([], []) for i in result}
         for seam in seams:
             a, b = (_inner(_along(result[border.surface], border), border) for border in (seam.a, seam.b))
@@ -89,7 +88,7 @@ def _lost(joint: Joint) -> int:
 
 
 def _elevated(nets: Mapping[int, Net], seams: Sequence[Seam]) -> dict[int, Net]:
-    """The nets with the highest degree of those that seams join along them."""
+    """The nets, raised along seams to the highest degree of those that are joined there."""
     degrees = {(i, axis): knots.degree for i, net in nets.items() for axis, knots in enumerate((net.u, net.v))}
     sides = [[(border.surface, 1 - border.axis) for border in (seam.a, seam.b)] for seam in seams]
     for _ in nets:
@@ -99,7 +98,7 @@ def _elevated(nets: Mapping[int, Net], seams: Sequence[Seam]) -> dict[int, Net]:
 
 
 def _inner(knots: KnotVector, border: Border) -> dict[float, int]:
-    """Fractions of a seam at which knots along it lie, and their multiplicities."""
+    """Fractions of the knots along a seam, and their multiplicities."""
     breaks, counts = knots.breaks, knots.multiplicities
     if knots.periodic:
         turns = knots.period * np.arange(-2, 3)
@@ -110,7 +109,7 @@ def _inner(knots: KnotVector, border: Border) -> dict[float, int]:
 
 
 def _near(nets: Mapping[int, Net], border: Border, at: float) -> float:
-    """A knot of the border that is as good as the same as ``at``, or itself."""
+    """The knot of the border that equals ``at`` to rounding, or ``at`` itself."""
     knots = _along(nets[border.surface], border)
     breaks = knots.breaks
     if knots.periodic:
@@ -120,7 +119,7 @@ def _near(nets: Mapping[int, Net], border: Border, at: float) -> float:
 
 
 def _most(values: Iterable[float]) -> Array:
-    """Knots wanted by several seams, those within rounding of each other once."""
+    """Knots needed by several seams, without duplicates up to rounding."""
     result: list[float] = []
     for value in sorted(values):
         if not result or value - result[-1] > 1e-12 * max(1.0, abs(value)):
@@ -147,15 +146,15 @@ def rows(
         control points are laid out one after another.
     seams : sequence of Seam
     everywhere : bool
-        Whether joints that vary are exact, too: their knots must be double.
+        Whether joints that vary are exact too: their knots must be double.
     coarse : mapping of int to pair of KnotVector, optional
-        Knots in u and v by surface, of spaces in which displacements lie: no more is asked than decides for these.
+        Knots in u and v, by surface, of the spaces of the displacements: no more conditions than these need.
 
     Returns
     -------
     scipy.sparse.csr_array (conditions, points)
     ndarray of bool (conditions,)
-        Those of which the input's defect is to be mended.
+        Conditions whose defect in the input is to be mended.
     """
     from scipy.sparse import csr_array
 
@@ -179,9 +178,9 @@ def rows(
 
 
 def _plain(knots: KnotVector, column: Array, value: Array) -> tuple[Array, Array, Array]:
-    """Conditions at the Greville points as such on the coefficients of the spline through what they take, if fewer.
+    """Conditions at the Greville points, on the coefficients of the spline through them if that is sparser.
 
-    Where both sides are of the same make across their seam, a condition is then one on a few control points.
+    If both sides are alike across their seam, a condition then involves only a few control points.
 
     Parameters
     ----------
@@ -212,7 +211,7 @@ def _plain(knots: KnotVector, column: Array, value: Array) -> tuple[Array, Array
 
 
 def _terms(joint: Joint, order: int, share: Array, sides: Sequence[Any]) -> tuple[Array, Array]:
-    """What a condition takes of side b and of side a."""
+    """The terms of a condition on side b and on side a."""
     b, a = (table for (_, table), _ in sides)
     if order == 0:
         return b["s"], -a["s"]
@@ -227,10 +226,9 @@ def _law(coefficients: Array, share: Array) -> Array:
 
 
 def _asked(spaces: Mapping[int, tuple[KnotVector, KnotVector]], seam: Seam, order: int) -> KnotVector:
-    """The larger of the spaces of both sides along a seam, over its fractions: conditions are asked at its Greville
-    points.
+    """The larger of the spaces of both sides along a seam, over its fractions; conditions hold at its Greville points.
 
-    For an order above 0 that in which the condition of that order lies.
+    For an order above 0, the space in which the condition of that order lies.
     """
     more, lost = (order * (len(seam.joint.across) - 1), _lost(seam.joint)) if order else (0, 0)
     found = []

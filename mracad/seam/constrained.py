@@ -11,15 +11,15 @@ from mracad.seam.factor import Definite, nested
 Array = np.ndarray
 
 SLACK = 1e-9
-"""Proximal parameter of the conditions, relative: rows may depend on each other; each pass divides what is left of
-``L δ`` by about as much."""
+"""Proximal parameter of the conditions, relative: rows may be dependent; each pass divides the remaining ``L δ`` by
+about as much."""
 
 PASSES, MOST, MET = 2, 24, 1e-14
-"""Proximal passes (one leaves errors of 1e-6 where lengths are many spans), and most of them until conditions are met
-to a share of what moves: rows that barely depend on each other are met slowly."""
+"""Proximal passes (one leaves errors of 1e-6 where lengths are many spans), and the most until conditions are met to a
+share of the motion: nearly dependent rows converge slowly."""
 
 HELD = 1e-9
-"""Share of a condition that must be on points that may move: of others only rounding is left."""
+"""Share of a condition that must be on points that may move: otherwise only rounding is left."""
 
 LEAST = 1e-10
 """Share of the largest diagonal entry that is added to the form: functions that barely reach into a face stay put."""
@@ -28,8 +28,8 @@ LEAST = 1e-10
 class Constrained:
     """argmin ½ xᵀ A x − bᵀ x under L x = r, x = 0 off ``free``.
 
-    Where there are conditions, by one sparse factorisation of the quasi-definite [[A, Lᵀ], [L, −ε]] and proximal
-    passes, which also bear rows of L that depend on each other.
+    Conditions take one sparse factorisation of the quasi-definite [[A, Lᵀ], [L, −ε]] and proximal passes, which
+    tolerate dependent rows of L.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ class Constrained:
     rows : scipy.sparse matrix (m, n)
     free : ndarray of bool (n,)
     slack : float
-        ε, relative: so much less than the form conditions may count in a single pass, where they contradict each other.
+        ε, relative: the weight of the form against contradictory conditions in a single pass.
     """
 
     def __init__(self, form: Any, rows: Any, free: Array, slack: float = SLACK) -> None:
@@ -106,7 +106,7 @@ class Constrained:
         return self._whole(x)
 
     def settled(self, x: Array) -> Array:
-        """What is nearest to x, ``(n, k)``, with L x = 0: what one pass has left of it is taken away."""
+        """The nearest to x, ``(n, k)``, with L x = 0, after further passes on the remainder."""
         return x + self(np.zeros_like(x), start=x) if len(self.there) else x
 
     def _whole(self, x: Array) -> Array:

@@ -1,14 +1,14 @@
 """Contacts along trim curves: seams whose two sides have no common spline space, and rims held at what stays.
 
-They cannot be kept exactly without freezing all that meets the curve.  A displacement δ is instead asked, at Gauss
-points of every piece between knot lines of either side,
+They cannot be kept exactly without freezing everything that meets the curve.  Instead, a displacement δ has conditions
+at Gauss points of every piece between knot lines of either side,
 
     G0   δ_b = δ_a,      G1   D_c δ_b = D_c δ_a,      G2   D_c² δ_b + D_z δ_b = D_c² δ_a
 
-(δ_b = 0 at a rim, and with G1 D_t δ_a = 0, t along it: what is off by next to nothing still tilts a surface where its
-knots are close; directions as in :mod:`mracad.seam.trimmed`), weighted with the inverse square of what each may
-lack: where the net can, it does, and where it cannot δ gives way.  What two noisy sides lack already is their noise:
-conditions are drawn towards surfaces that meet, the more gently the more they lacked.
+(δ_b = 0 at a rim, and with G1 also D_t δ_a = 0, t along it: even a tiny error tilts a surface where its knots are
+close; directions as in :mod:`mracad.seam.trimmed`), weighted with the inverse square of the allowed error: the net
+meets them where it can, and elsewhere δ gives way.  Two noisy sides are already apart by their noise: conditions pull
+them together, the more gently the further apart they were.
 """
 
 from __future__ import annotations
@@ -44,11 +44,11 @@ class Contact:
     order : {0, 1, 2}
         Derivatives across the trace that are kept.
     close, fit : bool
-        Whether the gap and the tilt of the input are pulled shut.
+        Whether the gap and the angle of the input are closed.
     since : {0, 1, 2}
-        The least of the derivatives that are asked.
+        The lowest order of the conditions.
     edge : int
-        The edge that it stands for.
+        The edge it belongs to.
     """
 
     a: Trace
@@ -61,7 +61,7 @@ class Contact:
 
     @property
     def surfaces(self) -> set[int]:
-        """The one or two that move."""
+        """The one or two surfaces that move."""
         return {trace.surface for trace in (self.a, self.b) if trace is not None}
 
 
@@ -92,9 +92,9 @@ class Rows:
         Parameters
         ----------
         opened : ndarray (conditions, 3)
-            How far they were: positions may be so at every place, slopes and curvatures as at their worst.
+            How far they were: the limit for positions place by place, for slopes and curvatures by the worst.
         tolerances : ndarray (contacts, 3)
-            By how much more, in each order.
+            How much more is allowed, for each order.
         """
         old, worst = np.linalg.norm(opened, axis=1), np.zeros((int(self.owner.max(initial=-1)) + 1, 3))
         np.maximum.at(worst, (self.owner, self.order), old)
@@ -107,11 +107,11 @@ class Rows:
         return scaled.T @ scaled
 
     def pull(self, wanted: Array, limits: Array) -> Array:
-        """``Cᵀ W wanted``, ``(points, 3)``: what draws the contacts to values ``(conditions, 3)``."""
+        """``Cᵀ W wanted``, ``(points, 3)``: the pull of the contacts towards values ``(conditions, 3)``."""
         return np.asarray(self.matrix.T @ ((self.width / limits**2)[:, None] * wanted))
 
     def room(self, delta: Array, opened: Array, limits: Array) -> Array:
-        """How much of a displacement ``(points, 3)`` each contact allows, 0 to 1."""
+        """The share of a displacement ``(points, 3)`` that each contact allows, 0 to 1."""
         old, new = (np.linalg.norm(each, axis=1) for each in (opened, opened + self.matrix @ delta))
         share = np.where(new > limits, (limits - old) / np.maximum(new - old, 1e-300), 1.0)
         room = np.ones(int(self.owner.max(initial=-1)) + 1)
@@ -158,7 +158,7 @@ def rows(nets: Mapping[int, Net], contacts: Sequence[Contact]) -> Rows:
 
 
 def _asked(contact: Contact) -> list[tuple[int, bool]]:
-    """The orders of the derivatives that are asked of a contact, those across it and that along it."""
+    """The orders of the conditions on a contact, across it and along it."""
     orders = range(contact.since, contact.order + 1)
     return [*((order, False) for order in orders), *((order, True) for order in orders if order == 1 and not contact.b)]
 

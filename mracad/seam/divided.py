@@ -1,9 +1,9 @@
-"""Minima over many joined surfaces, by subspaces: the insides of surfaces in turn with strips along what joins them.
+"""Minima over many joined surfaces, by subspaces: insides of surfaces alternating with strips along their joints.
 
-What a joint does to a surface fades within the length ℓ of the filter, or within a few knot spans.  So one takes the
-minimum over the control points that nothing joins, surface by surface, then over a strip along every joint and under
-its conditions, and then what the strips leave to the insides, until nothing is left: a multiplicative Schwarz method,
-whose error falls by e^(−√2 w / ℓ) or so in every sweep, w the width of the strips.  Every step lowers the objective.
+The effect of a joint on a surface fades within the length ℓ of the filter, or within a few knot spans.  So we take the
+minimum over the control points without joints, surface by surface, then over a strip along every joint under its
+conditions, then over the insides again, until nothing is left to do: a multiplicative Schwarz method, whose error falls
+by about e^(−√2 w / ℓ) in every sweep, w the width of the strips.  Every step lowers the objective.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ from mracad.seam.strips import Division, Layout, coloured
 Array = np.ndarray
 
 LEFT = 1e-4
-"""Share of what the first strips had to make good that may be left to them."""
+"""Share of the first strips' correction that may remain."""
 
 SWEEPS = 20
-"""Most sweeps; one or two serve."""
+"""Most sweeps; one or two are usually enough."""
 
 PENALTY = 1e7
-"""Weight of conditions against a form whose diagonal is one; each pass divides what they lack by about as much."""
+"""Weight of conditions against a form whose diagonal is one; each pass divides their error by about as much."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +53,7 @@ class _Strip:
 
 @dataclass(frozen=True, eq=False)
 class _Colour:
-    """Strips that have nothing in common.
+    """Strips that have nothing in common, solved at once.
 
     Attributes
     ----------
@@ -101,7 +101,7 @@ class Divided:
     Parameters
     ----------
     forms : iterable of scipy.sparse.csr_array (n, n)
-        A, of each surface; what follows is of all of their points.
+        A, one per surface; the rest is over the points of all of them.
     diagonal : ndarray (points,)
         Its diagonal.
     soft : scipy.sparse matrix (points, points), optional
@@ -188,7 +188,7 @@ class Divided:
         return found
 
     def settled(self, x: Array) -> Array:
-        """What is near to x, ``(n, k)``, with L x = 0."""
+        """A point near x, ``(n, k)``, with L x = 0."""
         if not len(self.there):
             return x
         scaled = self._scaled(x)
@@ -200,7 +200,7 @@ class Divided:
         return x / np.where(self.scale > 0, self.scale, np.inf)[:, None]
 
     def _within(self, right: Array) -> Array:
-        """The minimum under L x = 0, but for what one pass leaves of it, in the place of its right-hand side."""
+        """The minimum under L x = 0, up to the remainder of one pass; overwrites the right-hand side."""
         found, left = right, np.zeros((len(self.about), right.shape[1]))
         left[self.at] = found[self.tied]
         found[self.tied] = 0.0
@@ -224,12 +224,12 @@ class Divided:
         return found
 
     def _inside(self, x: Array) -> None:
-        """Put the minimum over the points that nothing joins in the place of its right-hand side."""
+        """Overwrite the right-hand side with the minimum over the points without joints."""
         for points, factor in self.insides:
             x[points] = factor(x[points])
 
     def _met(self, owed: Array, size: float, right: Array | None = None) -> Array:
-        """What meets conditions beside a displacement of a size; what the form makes of it is taken from ``right``."""
+        """A displacement that meets conditions beside one of a size; the form times it is subtracted from ``right``."""
         found = np.zeros((self.size, owed.shape[1]))
         for _ in range(MOST):
             if np.abs(owed).max(initial=0.0) <= MET * max(size, np.abs(found).max(initial=0.0)):
@@ -247,7 +247,7 @@ class Divided:
 
 
 class _Strips:
-    """The making of strips, as soon as the rows of the form for all of their points are known: these take most room.
+    """Builds strips as soon as the rows of the form for all of their points are known: these take the most memory.
 
     Parameters
     ----------
@@ -272,7 +272,7 @@ class _Strips:
         self.made: dict[int, _Strip] = {}
 
     def add(self, points: Array, form: Any, tied: Array, tied_form: Any) -> None:
-        """Take the form of the points of the next surface that strips take, those tied by joints apart."""
+        """Add the form on the strip points of the next surface; those tied by joints separately."""
         from scipy.sparse import csr_array, vstack
 
         surface = len(self.forms)
@@ -324,7 +324,7 @@ def _part(form: Any, points: Array) -> Any:
 
 
 def _taken(form: Any, which: Array, columns: Array | None = None, width: int | None = None) -> Any:
-    """Some of the entries of a matrix, in other columns where that is said."""
+    """Some of the entries of a matrix, in other columns if given."""
     from scipy.sparse import csr_array
 
     ends = np.append(0, np.cumsum(which))[form.indptr].astype(np.int32)
@@ -333,14 +333,14 @@ def _taken(form: Any, which: Array, columns: Array | None = None, width: int | N
 
 
 def _widened(form: Any, own: slice, size: int) -> Any:
-    """Rows over the points of one surface as rows over those of all."""
+    """Rows over the points of one surface, widened to those of all."""
     from scipy.sparse import csr_array
 
     return csr_array((form.data, form.indices + np.int32(own.start), form.indptr), shape=(form.shape[0], size))
 
 
 def _apart(form: Any, layout: Layout) -> Any:
-    """What of a form joins points of different surfaces."""
+    """The part of a form that joins points of different surfaces."""
     from scipy.sparse import csr_array
 
     form, owner = form.tocoo(), layout.owner

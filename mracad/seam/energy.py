@@ -1,12 +1,12 @@
-"""Mass and bending energy of displacements of a surface, over the part of it that its faces show.
+"""Mass and bending energy of displacements of a surface, over the part that its faces cover.
 
 On a surface X (the metric: a smoothed copy of the edited one) with first fundamental form g and Christoffel symbols Γ,
 
     M_ij = ∫ R_i R_j dA,    K_ij = ∫ Σ_ab H̃_ab(R_i) H̃_ab(R_j) dA,    H̃ = L⁻¹ (∂_ab − Γ^d_ab ∂_d) L⁻ᵀ,    g = L Lᵀ,
 
 R_i the (rational) basis functions of the edited net, dA = √det g du dv inside the trims, by Gauss points on every knot
-span.  The energy of second derivatives is covariant: it does not see the parameters.  On knot lines of multiplicity
-≥ degree, where second derivatives say nothing of a kink, K gets 10³ ∫ [∂_n x]² / h, h the spans beside the line.
+span.  The energy of second derivatives is covariant: independent of the parameters.  On knot lines of multiplicity
+≥ degree, where second derivatives do not measure a kink, K gets 10³ ∫ [∂_n x]² / h, h the spans beside the line.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ def forms(net: Net, metric: Net, quadrature: Quadrature, creases: Sequence[Colle
     net : Net
         Its knots, degrees and weights define the basis.
     metric : Net
-        The surface in whose metric is measured, over the same parameters.
+        The surface whose metric is used, over the same parameters.
     quadrature : Quadrature
         Gauss points over the faces on it.
     creases : pair of collections of float
@@ -84,7 +84,7 @@ def forms(net: Net, metric: Net, quadrature: Quadrature, creases: Sequence[Colle
 
 
 def _kinks(net: Net, metric: Net, quadrature: Quadrature, creases: Sequence[Collection[float]]) -> tuple[Any, Any]:
-    """Energies of kinks on knot lines of full multiplicity, those of creases apart."""
+    """Energies of kinks on knot lines of full multiplicity; those of creases separately."""
     from scipy.sparse import csr_array
 
     n = net.u.count * net.v.count
@@ -149,7 +149,7 @@ class _Side:
 
 
 def _sloped(net: Net, metric: Net, uv: Array, axis: int, side: Side) -> tuple[Array, _Side]:
-    """Control points ``(q, k)`` and what their functions do on one side of lines."""
+    """Control points ``(q, k)``, and their functions on one side of lines."""
     limits: tuple[Side, Side] = (side, "right") if axis == 0 else ("right", side)
     xn, xt = metric.evaluate(uv, 1, limits)[1:][:: 1 - 2 * axis]
     e, f, g = ((a * b).sum(axis=1) for a, b in ((xn, xn), (xn, xt), (xt, xt)))
@@ -161,7 +161,7 @@ def _sloped(net: Net, metric: Net, uv: Array, axis: int, side: Side) -> tuple[Ar
 
 
 def _frames(metric: Net, along: tuple[Sites, Sites]) -> tuple[Array, Array]:
-    """What H̃_11, √2 H̃_12, H̃_22 take of ∂_u, ∂_v, ∂_uu, ∂_uv, ∂_vv, ``(5, 3, qu, qv)``, and areas ``(qu, qv)``."""
+    """Coefficients in H̃_11, √2 H̃_12, H̃_22 of ∂_u, ∂_v, ∂_uu, ∂_uv, ∂_vv, ``(5, 3, qu, qv)``, and areas ``(qu, qv)``."""
     xu, xv, xuu, xuv, xvv = _jets(metric, along)[1:]
     e, f, g = _dot(xu, xu), _dot(xu, xv), _dot(xv, xv)
     root = np.sqrt(np.maximum(e * g - f * f, 0.0))
@@ -212,7 +212,7 @@ def _dot(a: Array, b: Array) -> Array:
 
 
 def _on_pattern(form: Any, like: Any) -> Any:
-    """A matrix whose pattern is kept once where it is that of another."""
+    """A matrix that shares the pattern of another, if they are equal."""
     from scipy.sparse import csr_array
 
     same = np.array_equal(form.indptr, like.indptr) and np.array_equal(form.indices, like.indices)

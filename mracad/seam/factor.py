@@ -1,4 +1,4 @@
-"""Solutions of sparse positive definite systems: by band Cholesky where a band is narrow, as on nets of surfaces."""
+"""Sparse positive definite systems: band Cholesky where the band is narrow, as on nets of surfaces."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Definite:
     Parameters
     ----------
     matrix : scipy.sparse matrix (n, n)
-        Symmetric, positive definite; one that rounding made indefinite is borne.
+        Symmetric, positive definite; indefinite by rounding is tolerated.
     """
 
     def __init__(self, matrix: Any) -> None:
@@ -59,7 +59,7 @@ class Definite:
 
 
 def nested(matrix: Any) -> Callable[[Array], Array]:
-    """Solutions with a symmetric matrix by sparse factors: without pivoting, unless refinement does not mend that."""
+    """Solve with sparse factors of a symmetric matrix: without pivoting, unless refinement then fails."""
     from scipy.sparse.linalg import splu
 
     matrix = matrix.tocsc()

@@ -1,9 +1,9 @@
-"""Separation: which control points of a surface an edit must leave, so that every joint stays as it is.
+"""Separation: the control points of a surface that an edit must hold, so that every joint stays as it is.
 
 METHOD (S. the paper's wavelet signal separation): S' = S + δ.  Along an edge that is an isoparametric curve u = c
 of the surface, δ and its cross derivatives up to order k vanish when the coefficients of all basis functions with
 a non-zero derivative of order ≤ k at c do: the outer k + 1 rows where c is a clamped end.  Along any other edge
-the coefficients of all functions whose open support meets the curve are left, so that δ vanishes there with all
+the coefficients of all functions whose open support meets the curve are held, so that δ vanishes there with all
 its derivatives; edges, vertices and pcurves stay exactly valid.
 """
 
@@ -37,7 +37,7 @@ NEAR = 1e-4
 
 @dataclass(frozen=True, eq=False)
 class Separation:
-    """Control points of one surface by what they may do.
+    """The control points of one surface, by role.
 
     Attributes
     ----------
@@ -82,10 +82,10 @@ def separate(
     edited : collection of int
         Indices of those that may move; the others' whole region is frozen.
     keep : {"g0", "g1", "g2"} or mapping of int to int
-        Which continuity each edge keeps with whatever lies beyond it; or how many derivatives, by edge, those that are
-        not named their position alone.
+        The continuity that each edge keeps with its other side; or the number of derivatives, by edge, where edges
+        that are not named only keep their position.
     moving : collection of int
-        Edges that may move, because what lies beyond them moves with them.
+        Edges that may move, because their other side moves with them.
     """
     visible = np.zeros(net.poles.shape[:2], bool)
     frozen = np.zeros_like(visible)
@@ -137,7 +137,7 @@ def frozen_along(net: Net, curves: Sequence[Curve], region: Region, orders: Sequ
 def jet_support(knots: KnotVector, at: float, highest: int) -> Array:
     """Basis functions ``(n,)`` with a non-zero derivative of order ≤ ``highest`` at ``at``, from either side.
 
-    Those of a knot that is as near as makes no difference to the eye count too: the other side of it is what is seen.
+    Functions of a knot that is invisibly close count too: the other side of that knot is what is seen.
     """
     start, end = knots.domain
     if knots.periodic:

@@ -2,8 +2,8 @@
 
     F_ij = Σ_αβ ∫ c_αβ D^α B_i D^β B_j du dv,        B_i(u, v) = N_a(u) N_b(v),
 
-c_αβ = c_βα given at Gauss points.  Per knot span this takes (p + 1) (q + 1)⁴ or so multiplications where adding up the
-products of all functions takes (p + 1)³ (q + 1)³.
+c_αβ = c_βα given at Gauss points.  Per knot span this takes about (p + 1) (q + 1)⁴ multiplications; adding up the
+products of all functions would take (p + 1)³ (q + 1)³.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from mracad.bspline.knots import KnotVector
 Array = np.ndarray
 
 Order = tuple[int, int]
-"""How often a derivative is taken along u and v."""
+"""Orders of a derivative along u and v."""
 
 _BLOCK = 1 << 22
 
@@ -106,7 +106,7 @@ def _inner(v: Sites, parts: list[tuple[int, int, Array]], mirrored: bool) -> Arr
 
 
 def _added(form: Array, along: Sites, part: slice, cells: Array) -> None:
-    """Add what pieces ``(s, d + 1, d + 1, …)`` give pairs of functions to a stencil ``(n, 2d + 1, …)``."""
+    """Add the parts ``(s, d + 1, d + 1, …)`` that pieces give to pairs of functions to a stencil ``(n, 2d + 1, …)``."""
     n, d = along.knots.count, along.knots.degree
     first = along.first[part]
     new = np.flatnonzero(np.diff(first, prepend=first[0] - 1))

@@ -1,8 +1,7 @@
-"""What joins the surfaces that an edit may move, and what holds them.
+"""How the surfaces that an edit may move are joined and held.
 
-Edges between two faces that both move are exact seams, where both sides end there along parameter lines with a law
-between them, or contacts along trim curves; every other edge is a rim.  A seam keeps the continuity that it has, or
-that is asked for.
+Edges between two faces that both move are exact seams, where both sides end along parameter lines related by a law, or
+contacts along trim curves; every other edge is a rim.  A seam keeps the continuity that it has, or that is asked for.
 """
 
 from __future__ import annotations
@@ -27,13 +26,13 @@ from mracad.seam.wishes import CREASE, Wishes
 Array = np.ndarray
 
 RIM_POINTS = 65
-"""Points of a boundary curve from which distances are taken."""
+"""Points of a boundary curve from which distances are measured."""
 
 POLE = 2
-"""Derivatives that are kept at a pole, where a side of a surface is one point: any motion there makes a cone of it."""
+"""Derivatives kept at a pole, where a side of a surface is one point: any motion there would make a cone."""
 
 LOOSE = Still.TRIMMED, Still.UNEVEN
-"""Why seams that may move to a tolerance cannot exactly: no parameter line of both sides, or a joint without a law."""
+"""Why seams may only move to a tolerance: not a parameter line of both sides, or a joint without a law."""
 
 END = 1e-9
 """Fraction of the domain within which a parameter line is its end."""
@@ -53,7 +52,7 @@ class Joints:
     frozen : mapping of int to Cause
         Edges that stay, and why.
     meetings : mapping of int to Meeting
-        How edges meet what lies beyond them; where they stay, they keep that.
+        How edges meet their other side; where they stay, they keep that.
     jumps : bool
         Whether jumps of curvature along them must not grow.
     open : frozenset of int
@@ -80,12 +79,12 @@ class Joints:
 
     @property
     def orders(self) -> dict[int, int]:
-        """Derivatives that edges keep with what lies beyond them, where they stay."""
+        """Derivatives that edges keep with their other side, where they stay."""
         return {edge: meeting.order for edge, meeting in self.meetings.items()}
 
     @property
     def mended(self) -> tuple[Seam | TrimmedSeam, ...]:
-        """Those of which a gap or a tilt is pulled shut."""
+        """Seams whose gap or angle is mended."""
         exact = (seam for seam in self.exact if seam.joint.close or seam.joint.fit)
         return (*exact, *(seam for seam in self.loose if seam.close or seam.fit))
 
@@ -95,7 +94,7 @@ class Joints:
         yield from ((seam.a.surface, seam.b.surface) for seam in self.loose)
 
     def among(self, surfaces: Collection[int]) -> Joints:
-        """Those between some surfaces, all the others' rims."""
+        """The joints between some surfaces, with all others as rims."""
         exact = tuple(s for s in self.exact if s.a.surface in surfaces and s.b.surface in surfaces)
         loose = tuple(s for s in self.loose if s.a.surface in surfaces and s.b.surface in surfaces)
         return replace(self, exact=exact, loose=loose)
@@ -131,14 +130,14 @@ def joints(model: Model, movable: Collection[int], wishes: Wishes) -> Joints:
 
 
 def _freed(joined: Joints) -> Joints:
-    """The same with free edges that move with their faces."""
+    """The same joints, with free edges that move with their faces."""
     ends = frozenset(edge for edge, why in joined.frozen.items() if why.still is Still.FREE)
     frozen = {edge: why for edge, why in joined.frozen.items() if edge not in ends}
     return replace(joined, frozen=frozen, open=ends, cornered=True)
 
 
 def _opened(joined: Joints) -> Joints:
-    """Joints of faces that change what they are: free edges and poles move with them, and sharp edges stay."""
+    """Joints of faces that change shape: free edges and poles move with them, and sharp edges stay."""
     angles = [
         *((s.edge, s.twin, s.angle) for s in joined.exact),
         *((s.edge, s.twin, s.opening[1]) for s in joined.loose),
@@ -157,7 +156,7 @@ def _opened(joined: Joints) -> Joints:
 
 
 def contact(seam: TrimmedSeam) -> Contact:
-    """A seam kept to a tolerance, as conditions see it."""
+    """The contact of a seam kept to a tolerance."""
     return Contact(seam.a, seam.b, seam.order, seam.close, seam.fit, seam.since, seam.edge)
 
 
@@ -169,7 +168,7 @@ def rims(
     joined: Joints,
     given: Collection[int] = (),
 ) -> tuple[Array, list[Contact]]:
-    """What holds a surface: control points that stay, and contacts with what stays.
+    """How a surface is held: held control points, and contacts with faces that stay.
 
     Parameters
     ----------
@@ -181,7 +180,7 @@ def rims(
     movable : collection of int
         Faces that may move.
     joined : Joints
-        What moves with them, and what the other edges keep.
+        The edges that move with them, and what the others keep.
     given : collection of int
         Edges that hold nothing.
 
@@ -216,7 +215,7 @@ def rims(
 def twists(held: Array) -> Array:
     """Control points on which the twist depends where two held sides of a surface meet, both ``(nu, nv)``.
 
-    All else of the curvature there is that of the sides; what is smoothest between two rough sides twists there.
+    The rest of the curvature there is given by the sides; the smoothest surface between two rough sides twists there.
     """
     found = np.zeros_like(held)
     for u, v in ((1, 1), (1, -1), (-1, 1), (-1, -1)):
@@ -228,7 +227,7 @@ def twists(held: Array) -> Array:
 def mended_ends(
     model: Model, net: Net, surface: int, faces: Sequence[Face], movable: Collection[int], joined: Joints, within: float
 ) -> Array:
-    """Control points ``(nu, nv)`` that only free edges hold, near the ends of seams that are to be mended.
+    """Control points ``(nu, nv)`` held only by free edges, near the ends of seams that are to be mended.
 
     Parameters
     ----------

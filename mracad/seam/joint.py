@@ -1,12 +1,12 @@
-"""The joint of a seam: how the derivatives of its two surfaces go together.
+"""The joint of a seam: how the derivatives of its two surfaces are related.
 
-Let S and T be the surfaces of a seam, n the parameter across it and t the one along it on S, φ the affine map to T's.
-The joint of the input is
+Let S and T be the surfaces of a seam, n the parameter across it and t that along it on S, φ the affine map to T's
+parameters.  The joint of the input is
 
     G0   S = T∘φ,    G1   T_n = a S_n + b S_t,    G2   T_nn = a² S_nn + r S_n + s S_t   (a constant, b = 0)
 
 with scalar functions of t that are polynomials as simple as the input allows.  With a, b, r, s kept, these are linear
-conditions on a displacement; what the input misses them by (gap, tilt) is then carried unchanged.
+conditions on a displacement; the errors of the input (gap, angle) then stay unchanged.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ SLIP = 1e-4
 """Largest distance between points of equal parameter measured along the seam, as a share of its length."""
 
 EXACT, CLOSE = 1e-8, 2e-3
-"""A joint's polynomials fit when they miss the input by EXACT of |T_n|; they serve up to CLOSE: the angle of the seam
-then grows by at most CLOSE of the angle by which the normal turns."""
+"""A joint's polynomials are exact if they miss the input by at most EXACT of |T_n|, and usable up to CLOSE: the angle
+of the seam then grows by at most CLOSE of the angle by which the normal turns."""
 
 _SHAPES = ((0, -1), (0, 0), (1, -1), (1, 1), (2, -1), (2, 2))
 
@@ -49,9 +49,9 @@ class Joint:
     missed : float
         Largest part of T_n within the tangent plane that a S_n + b S_t misses, relative.
     close, fit : bool
-        Whether the gap and the tilt of the input are to be pulled shut instead of carried.
+        Whether the gap and the angle of the input are to be closed instead of kept.
     smoother : Joint or None
-        What there is of second order, where only the first is kept.
+        The joint of second order that exists, where only the first is kept.
     """
 
     order: int
@@ -70,7 +70,7 @@ class Joint:
         return self.order > 0 and (len(self.across) > 1 or len(self.along) > 0)
 
     def part(self, low: float, high: float) -> Joint:
-        """The same between two fractions of the edge, of which it is then the whole."""
+        """The joint of the part between two fractions of the edge, rescaled to 0 … 1."""
         size = high - low
         across, along = (_composed(law, low, size) for law in (self.across, self.along))
         smoother = self.smoother and self.smoother.part(low, high)
@@ -80,7 +80,7 @@ class Joint:
 def joint_of(
     model: Model, borders: tuple[Border, Border], found: tuple[Jet, Jet], order: int, wishes: Wishes
 ) -> Joint | Cause:
-    """The joint between two borders, as much of an order as has a law; or why there is none."""
+    """The joint between two borders, of the highest order with a law; or why there is none."""
     (a, b), ((s, sn, st, snn), (t, tn, tt, tnn)) = borders, found
     length = np.linalg.norm(st, axis=1).mean()
     slip = np.abs(((s - t) * st).sum(axis=1) / np.maximum(np.linalg.norm(st, axis=1), 1e-12 * length)).max()

@@ -1,10 +1,10 @@
 """Knot ladders that surfaces share along their seams.
 
-A level of joined patches is a level of the surface that they make, so that a coarse knot on one side of a seam must be
-one on the other side, too, whatever the knots, degrees and orientations.  The directions of surfaces that run along a
-seam side by side are therefore mapped affinely onto one common parameter, seam by seam across all patches; the ladder
-is walked on the union of their knots there, and each surface takes what lies within its own domain, as simple knots of
-the highest of their degrees.
+A level of joined patches is a level of the surface that they form, so a coarse knot on one side of a seam must also be
+one on the other side, whatever the knots, degrees and orientations.  The directions of surfaces that run along a seam
+side by side are therefore mapped affinely onto one common parameter, seam by seam across all patches.  The ladder is
+built on the union of their knots, and each surface takes the knots within its own domain, as simple knots of the
+highest of their degrees.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ Creases = tuple[frozenset[float], frozenset[float]]
 """Crease lines of a surface in u and v."""
 
 SAME = 1e-9
-"""Fraction of the common domain within which knots are the same."""
+"""Fraction of the common domain within which knots count as equal."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,9 +40,9 @@ class Ladder:
     members : mapping of Direction to Map
         Onto the common parameter.
     levels : sequence of KnotVector
-        Over the common parameter, all knots first.
+        Over the common parameter, from all knots to the coarsest.
     degrees : (int, int)
-        Of the coarse splines: on the first level and on the others.
+        Degrees of the coarse splines, on the first level and on the others.
     creases : mapping of Direction to mapping of float to int
         Knots that a surface keeps on every level, and by how much their multiplicity exceeds the degree.
     """
@@ -53,7 +53,7 @@ class Ladder:
     creases: Mapping[Direction, Mapping[float, int]]
 
     def coarse(self, direction: Direction, level: int, fine: KnotVector) -> KnotVector:
-        """The knots of one direction that a level leaves; beyond the last level, those of the last.
+        """The knots of one direction on a level; beyond the last level, those of the last.
 
         Parameters
         ----------
@@ -61,7 +61,7 @@ class Ladder:
         level : int
             0 for all knots.
         fine : KnotVector
-            Of the direction, with its own knots and those of its neighbours; perhaps more, or of higher degree.
+            Knots of the direction, with those of its neighbours; possibly more, or of higher degree.
         """
         rung = self.levels[min(level, len(self.levels) - 1)]
         whole = rung is self.levels[0]
@@ -103,7 +103,7 @@ def ladders(nets: Mapping[int, Net], creases: Mapping[int, Creases], seams: Sequ
 
 
 def _linked(knots: Mapping[Direction, KnotVector], seams: Sequence[Seam]) -> list[dict[Direction, Map]]:
-    """Directions that seams link, directly or through others, by surface; a seam that contradicts others links none."""
+    """Directions that seams link, directly or through others, by surface; a seam that contradicts others is ignored."""
     of: dict[Direction, dict[Direction, Map]] = {m: {m: (1.0, 0.0)} for m in knots}
     for seam in seams:
         one, two = (seam.a.surface, 1 - seam.a.axis), (seam.b.surface, 1 - seam.b.axis)
@@ -131,7 +131,7 @@ def _alike(one: KnotVector, two: KnotVector, slope: float, shift: float) -> bool
 
 @dataclass(frozen=True, eq=False)
 class _Placed:
-    """A direction on the common parameter, which ascends: its knots in some degree, what it keeps, lengths of spans."""
+    """A direction on the common ascending parameter: its knots in some degree, the knots it keeps, lengths of spans."""
 
     knots: KnotVector
     kept: Array
@@ -149,8 +149,8 @@ class _Placed:
 def _ladder(nets: Mapping[int, Net], creases: Mapping[int, Creases], members: Mapping[Direction, Map]) -> Ladder:
     """The ladder on the union of the members' own knots.
 
-    A level is the densest that is no denser than those of the members are on average, and of the lowest degree whose
-    splines all of them hold.
+    A level is the densest that is no denser than the average of its members', of the lowest degree whose splines they
+    all contain.
     """
     degrees = [(nets[i].u, nets[i].v)[axis].degree for i, axis in members]
     placed = [_placed(nets[m[0]], creases[m[0]][m[1]], m[1], way, min(degrees)) for m, way in members.items()]
@@ -165,7 +165,7 @@ def _ladder(nets: Mapping[int, Net], creases: Mapping[int, Creases], members: Ma
 
 
 def _placed(net: Net, creases: frozenset[float], axis: int, way: Map, degree: int) -> _Placed:
-    """A direction on the common parameter, its knots as smooth as they are but of a lower degree."""
+    """A direction on the common parameter, its knots of a lower degree but the same smoothness."""
     knots, lengths = (net.u, net.v)[axis], arc_lengths(net, axis)
     order = slice(None, None, 1 if way[0] > 0 else -1)
     counts = np.clip(knots.multiplicities + degree - knots.degree, 1, degree)
@@ -179,7 +179,7 @@ def _placed(net: Net, creases: frozenset[float], axis: int, way: Map, degree: in
 
 
 def _union(placed: Sequence[_Placed], elevations: Sequence[int]) -> tuple[_Placed, int]:
-    """All knots, where they begin and end among what stays, and mean lengths; the least multiplicity once elevated."""
+    """All knots, their ends among the knots that stay, and mean lengths; the least multiplicity once elevated."""
     every = np.sort(np.concatenate([one.knots.breaks for one in placed]))
     breaks = every[np.append(True, np.diff(every) > SAME * (every[-1] - every[0]))]
     middle = (breaks[:-1] + breaks[1:]) / 2

@@ -1,8 +1,8 @@
 """The surface in whose metric displacements are measured: a smoothed copy of the edited one.
 
-In a surface's own metric its second derivatives are purely normal, so that noise along the surface is invisible and
-the noise of its Christoffel symbols is differentiated.  Two passes: the net of mean chord lengths, a plane; in its
-metric, the surface smoothed at a few wavelengths.
+In a surface's own metric its second derivatives are purely normal: noise along the surface is invisible, and the noise
+of the Christoffel symbols is differentiated.  Hence two passes: a plane net of mean chord lengths; then, in its metric,
+the surface smoothed at a few wavelengths.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ from mracad.seam.solve import Problem, Space
 Array = np.ndarray
 
 SMOOTHER = 2.5
-"""The metric is smoothed at so many times the wavelength of the edit."""
+"""Wavelength at which the metric is smoothed, over that of the edit."""
 
 BARELY = 1e-6
-"""Share of the whole of a function's mass that must lie in a face: others would go anywhere, for hardly any effect."""
+"""Share of a function's mass that must lie in a face: others could go anywhere, with hardly any effect."""
 
 
 def planar(net: Net) -> Net:
@@ -37,7 +37,7 @@ def planar(net: Net) -> Net:
 
 
 def _walked(count: int, steps: Array) -> Array:
-    """Where steps lead from 0, ``(count,)``; none of them is nothing."""
+    """Positions after steps from 0, ``(count,)``; every step counts as positive."""
     steps = np.maximum(steps, 1e-9 * steps.max(initial=1e-300))
     return np.append(0.0, np.cumsum(steps))[:count]
 
@@ -58,7 +58,7 @@ def creases(net: Net, points: Array) -> tuple[frozenset[float], frozenset[float]
 
 
 def smoothed(net: Net, rule: Quadrature, stiffness: float) -> Net:
-    """The surface smoothed by itself, in the metric of its mean chord lengths.
+    """The surface smoothed alone, in the metric of its mean chord lengths.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Seams that can move: where two edited faces meet along isoparametric curves, and what keeps the others still."""
+"""Seams that can move, where two edited faces meet along isoparametric curves, and why other edges stay."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Seam:
     gap, angle : float
         Largest distance at equal fractions, mm, and angle between the outward normals.
     loose : bool
-        Whether the joint keeps less than was asked for, no law being known for the rest.
+        Whether the joint keeps less than was asked for, because the rest has no law.
     """
 
     edge: int
@@ -47,14 +47,14 @@ class Seam:
     loose: bool = False
 
     def part(self, low: float, high: float) -> Seam:
-        """What lies between two fractions of it."""
+        """The part between two fractions."""
         a, b = (border.part(low, high) for border in (self.a, self.b))
         return replace(self, a=a, b=b, joint=self.joint.part(low, high))
 
 
 @dataclass(frozen=True)
 class Treatment:
-    """What an edit did about one seam or free edge.
+    """The treatment of one seam or free edge by an edit.
 
     Attributes
     ----------
@@ -63,7 +63,7 @@ class Treatment:
     faces : tuple of int
         Faces that meet there.
     how : {"coupled", "to tolerance", "mended", "frozen"}
-        ``mended``: it moves as a coupled one does, and its gap or tilt is pulled shut.
+        ``mended``: it moves like a coupled one, and its gap or angle is closed.
     reason : Cause or None
         Why it is frozen.
     """
@@ -81,12 +81,12 @@ class Meeting:
     Attributes
     ----------
     order : {0, 1, 2}
-        Derivatives that it keeps with what lies beyond it.
+        Derivatives that it keeps with its other side.
     gap, bend : float
         Largest distance between them, mm, and jump of the curvature across it, 1/mm.
     faces : tuple of int
     sides : tuple of Side
-        Where both pass the samples of the edge; empty for the longer one at a T-junction.
+        Both sides at the samples of the edge; empty for the longer edge at a T-junction.
     """
 
     order: int
@@ -96,7 +96,7 @@ class Meeting:
     sides: tuple[Side, ...] = ()
 
     def with_(self, other: Meeting | None) -> Meeting:
-        """The same with what is known of it elsewhere along the edge."""
+        """The two meetings of one edge, combined."""
         if other is None:
             return self
         faces = (*self.faces, *(face for face in other.faces if face not in self.faces))
@@ -106,14 +106,14 @@ class Meeting:
 
 @dataclass(frozen=True, eq=False)
 class Seams:
-    """What is known of the edges of the faces that an edit may move.
+    """The edges of the faces that an edit may move, sorted.
 
     Attributes
     ----------
     found : list of Seam
-        Those that can move exactly.
+        Seams that can move exactly.
     closing : dict of int to (Border, Border)
-        Closing edges inside a periodic direction, which its spline space keeps as smooth as its knots say by itself.
+        Closing edges inside a periodic direction, which its spline space keeps as smooth as its knots allow.
     frozen : dict of int to Cause
         Every other edge, and why it does not move.
     twins : dict of int to int
@@ -130,7 +130,7 @@ class Seams:
 
     @property
     def orders(self) -> dict[int, int]:
-        """Derivatives that edges keep with what lies beyond them, if it stays."""
+        """Derivatives that edges keep with their other side, if that stays."""
         return {edge: each.order for edge, each in self.meetings.items()}
 
 
@@ -160,7 +160,7 @@ def seams(model: Model, movable: Collection[int], wishes: Wishes) -> Seams:
 
 
 def _meetings(model: Model, wishes: Wishes, found: Sequence[tuple[Edge, Edge, Sequence[Side]]]) -> dict[int, Meeting]:
-    """How two faces meet at edges: at one, or at an edge and another one of which it is a part or the whole."""
+    """How two faces meet: at one edge, or at an edge and another one that contains it."""
     looks = views(model, [(edge, side) for edge, _, sides in found for side in sides])
     result: dict[int, Meeting] = {}
     for (edge, other, sides), a, b in zip(found, looks[::2], looks[1::2], strict=True):
@@ -174,7 +174,7 @@ def _meetings(model: Model, wishes: Wishes, found: Sequence[tuple[Edge, Edge, Se
 
 
 def _still(edge: Edge, wishes: Wishes) -> Cause | None:
-    """Why an edge stays whatever its faces do; None where it may move."""
+    """Why an edge stays whatever its faces do; None if it may move."""
     if edge.index in wishes.hold:
         return Cause(Still.HELD)
     if edge.degenerate:
@@ -185,7 +185,7 @@ def _still(edge: Edge, wishes: Wishes) -> Cause | None:
 
 
 def _sort(result: Seams, edge: Edge, seam: Seam | Cause | tuple[Border, Border]) -> None:
-    """Put what is known of an edge where it belongs."""
+    """File an edge under its kind."""
     if isinstance(seam, Seam):
         result.found.append(seam)
         for each in (seam.edge, seam.twin):
@@ -199,7 +199,7 @@ def _sort(result: Seams, edge: Edge, seam: Seam | Cause | tuple[Border, Border])
 def _unsewn(
     result: Seams, model: Model, movable: Collection[int], wishes: Wishes, edge: Edge, sides: tuple[Side, Side]
 ) -> None:
-    """Look at a free edge that coincides with one of another face."""
+    """Treat a free edge that coincides with one of another face."""
     other = _twin(model, edge, sides[1].face)
     if edge.index not in result.frozen or (other and other.index not in result.frozen):
         return
@@ -216,7 +216,7 @@ def _unsewn(
 
 
 def _twin(model: Model, edge: Edge, face: int) -> Edge | None:
-    """The free edge of a face that coincides with another free edge, known to lie on one of that face, as a whole."""
+    """The free edge of a face that coincides as a whole with another free edge, which lies on one of that face."""
     own = length(edge)
     others = [
         other
@@ -242,7 +242,7 @@ def _seam(
     edges: tuple[Edge, Edge],
     sides: Sequence[Side],
 ) -> Seam | Cause | tuple[Border, Border]:
-    """The seam, why there is none, or its borders where a periodic space closes it."""
+    """The seam, the cause if there is none, or its borders if a periodic space closes it."""
     if reason := _fixed(model, movable, sides):
         return reason
     a, b = (border(model, edge, side, use) for use, (edge, side) in enumerate(zip(edges, sides, strict=True)))
@@ -270,7 +270,7 @@ def _seam(
 
 
 def _fixed(model: Model, movable: Collection[int], sides: Sequence[Side]) -> Cause | None:
-    """Why one of two faces cannot move; None where both can."""
+    """Why one of two faces cannot move; None if both can."""
     for side in sides:
         face = model.faces[side.face]
         if face.surface is None:
@@ -281,6 +281,6 @@ def _fixed(model: Model, movable: Collection[int], sides: Sequence[Side]) -> Cau
 
 
 def _room(model: Model, border: Border) -> int:
-    """Derivatives across a border that may be kept, and on the other side of the surface, without tying all points."""
+    """Derivatives that can be kept across a border, and on the opposite one, without tying all control points."""
     net = model.surfaces[border.surface].net
     return 2 if (net.u, net.v)[border.axis].count > 6 else 1

@@ -1,4 +1,4 @@
-"""What faces do beside their edges: points, normals and curvatures, seen from inside each face."""
+"""Faces along their edges: points, normals and curvatures, seen from inside each face."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Array = np.ndarray
 
 
 def views(model: Model, uses: Sequence[tuple[Edge, Side]]) -> list[Array]:
-    """How faces look at the samples of edges; each is evaluated once for all its edges.
+    """Faces at the samples of edges; each face is evaluated once for all its edges.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ def _net(model: Model, face: Face) -> Net:
 def from_inside(face: Face, net: Net, edge: int, uv: Array) -> tuple[Array, tuple[Limit, Limit]]:
     """Parameters ``uv`` (k, 2) along an edge of a face, moved onto the knot line that it lies on, and the limits there.
 
-    They matter where the surface goes on beyond the edge, unseen, another way.
+    They matter where the surface continues differently beyond the edge.
     """
     found: list[Limit] = ["right", "right"]
     for axis, knots in enumerate((net.u, net.v)):
@@ -79,6 +79,6 @@ def from_inside(face: Face, net: Net, edge: int, uv: Array) -> tuple[Array, tupl
 
 
 def inner_side(face: Face, edge: int, axis: int, at: float) -> Limit:
-    """On which side of the line ``at`` the rest of the face's boundary lies."""
+    """The side of the line ``at`` on which the rest of the face's boundary lies."""
     others = [trim.curve.poles[:, axis] for trim in face.trims if trim.edge != edge]
     return "right" if others and np.concatenate(others).mean() > at else "left"

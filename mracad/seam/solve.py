@@ -1,4 +1,4 @@
-"""The one solver: displacements of joined surfaces that are nearest to what an edit wants, under exact conditions.
+"""The one solver: displacements of joined surfaces nearest to the target of an edit, under exact conditions.
 
     filtered   (M + aK) δ = −aK f         gain 1 / (1 + x),   x = (ℓ ω)⁴,  a = ℓ⁴   (m2)
                Re (M + iaK) δ = −i aK f   gain 1 / (1 + x²)                          (b4)
@@ -9,9 +9,9 @@ over all δ that vanish on held control points and satisfy L δ = r; contacts ad
 
     δ_m2 = −B⁻¹ aK f,      δ_b4 = p(C) δ_m2,      p(c) = (1 − c) / (1 − 2c + 2c²),
 
-so that one factorisation serves both.  p is expanded in Chebyshev polynomials on [0, 1]: its poles at (1 ± i) / 2 make
-the error fall by 2.4 with every term.  The map from f to δ is linear: it commutes with rotation, and half the noise
-gives half the displacement.
+so one factorisation serves both.  p is expanded in Chebyshev polynomials on [0, 1]: its poles at (1 ± i) / 2 make the
+error fall by a factor of 2.4 with every term.  The map from f to δ is linear: it commutes with rotation, and half the
+noise gives half the displacement.
 """
 
 from __future__ import annotations
@@ -35,16 +35,16 @@ TERMS = 8
 """Degree of the Chebyshev expansion of p: an error of the gain of 1e-4."""
 
 KEPT = 60_000
-"""Control points of which factors are kept, beside the last one."""
+"""Control points whose factors are cached, besides the last one."""
 
 OVERLAP = 2.0
-"""Most control points in strips, over those that there are, where surfaces are solved in turn with strips."""
+"""Most control points in strips, over all, for the alternating method."""
 
 WIDTH = 7.0
-"""Width of strips in lengths within which what joints do fades."""
+"""Width of strips, in lengths within which the effect of joints fades."""
 
 MASS = 0.37
-"""Length within which masses alone make it fade, in chords of the control net and degrees."""
+"""Length within which masses alone make it fade, in chords of the control net times degrees."""
 
 
 def _expansion() -> Array:
@@ -71,9 +71,9 @@ class Space:
     seen : ndarray of bool (nu, nv)
         Control points that the edited faces depend on.
     trend : ndarray (nu, nv, 3), optional
-        Control points of what is shape in the net, mm; none of it by default.
+        Control points of the part of the net that is shape, mm; zero by default.
     away : ndarray (nu, nv), optional
-        Distance of the surface at the Greville points from what holds it, mm; infinite by default.
+        Distance at the Greville points from where the surface is held, mm; infinite by default.
     """
 
     net: Net
@@ -134,13 +134,13 @@ class Problem:
     rows : scipy.sparse matrix (conditions, points)
         L, on the control points of the spaces laid out one after another.
     goal : ndarray (conditions, 3), optional
-        r; zero by default: every joint stays what it is.
+        r; zero by default: every joint stays as it is.
     soft : scipy.sparse matrix (points, points), optional
         Cᵀ W C.
     pull : ndarray (points, 3), optional
         Cᵀ W c, where contacts are to be mended.
     between : scipy.sparse matrix (points, points), optional
-        That part of ``soft`` which joins the surfaces to each other, where the rest holds them.
+        The part of ``soft`` that joins the surfaces to each other; the rest holds them.
     effort : Effort
     """
 
@@ -174,16 +174,16 @@ class Problem:
         self.above = above - above[self.seen].mean(axis=0)
 
     def filtered(self, stiffness: float, free: Array | None = None, of: Array | None = None) -> Array:
-        """δ of the filter of gain 1 / (1 + x²), which takes nothing of the bending of trends.
+        """δ of the filter of gain 1 / (1 + x²), which leaves the bending of trends alone.
 
         Parameters
         ----------
         stiffness : float
             a = ℓ⁴, mm⁴.
         free : ndarray of bool (points,), optional
-            Control points that may move, instead of those of the spaces; contacts then only join the surfaces.
+            Control points that may move, instead of those of the spaces; then only contacts between surfaces count.
         of : ndarray (points, 3), optional
-            What is filtered instead of what is above trends.
+            Displacements to filter, instead of the part above trends.
 
         Returns
         -------
@@ -205,8 +205,8 @@ class Problem:
     def nearest(self, wanted: Array, stiffness: float = 0.0, beyond: bool = False) -> Array:
         """The admissible δ nearest to ``wanted``, both ``(points, 3)``, over the faces.
 
-        Its distance is ‖δ − w‖²_M + a |δ − w|²_K, with ``stiffness`` a (mm⁴): what is added is then smooth.
-        ``beyond``: control points that the faces hardly depend on move as wanted, too; else they stay.
+        The distance is ‖δ − w‖²_M + a |δ − w|²_K, with ``stiffness`` a (mm⁴): δ − w is then smooth.
+        ``beyond``: control points that the faces hardly depend on also move as wanted; otherwise they stay.
         """
         moving = self.free | ~self.seen if beyond else self.free
         kept = np.where(moving[:, None], wanted, 0.0)
@@ -221,7 +221,7 @@ class Problem:
         return np.asarray(kept + self._solver(stiffness, self.free)(pull, start=kept, goal=self.goal))
 
     def settled(self, delta: Array, stiffness: float = 0.0) -> Array:
-        """A displacement ``(points, 3)`` with what it misses of the conditions put right as smoothly as can be."""
+        """A displacement ``(points, 3)`` corrected as smoothly as possible to meet the conditions."""
         return np.asarray(delta + self._solver(stiffness, self.free)(np.zeros_like(delta), start=delta, goal=self.goal))
 
     def _solver(self, stiffness: float, free: Array) -> Constrained | Divided:
@@ -249,7 +249,7 @@ class Problem:
         return Constrained(form if soft is None else form + soft, self.rows, free)
 
     def _layout(self, stiffness: float) -> Layout:
-        """Control points, and how far what a joint does reaches among them."""
+        """The layout of control points, and how far the effect of a joint reaches among them."""
         reach = []
         for net in (space.net for space in self.spaces.values()):
             chord = max(float(np.linalg.norm(np.diff(net.poles, axis=k), axis=2).mean()) for k in (0, 1))
@@ -259,18 +259,18 @@ class Problem:
 
     @property
     def rimmed(self) -> bool:
-        """Whether something holds the surfaces."""
+        """Whether the surfaces are held anywhere."""
         return self.soft is not None or bool((self.seen & ~self.free).any())
 
     def fading(self, width: float) -> Array:
-        """0 at what is held, 1 farther than ``width`` (mm) from it, smooth between, ``(points, 1)``."""
+        """0 where held, 1 farther than ``width`` (mm) from there, smooth between, ``(points, 1)``."""
         every = [np.full(s.free.shape, np.inf) if s.away is None else s.away for s in self.spaces.values()]
         away = np.concatenate([each.ravel() for each in every])
         share = np.minimum(away / width, 1.0)[:, None]
         return np.asarray(share**3 * (10 - 15 * share + 6 * share**2))
 
     def gains(self, delta: Array, target: Array, amounts: Sequence[float]) -> list[float]:
-        """By how much amounts of a displacement bring each surface nearer to a target, as a squared norm."""
+        """How much nearer amounts of a displacement bring each surface to a target, as a squared norm."""
         size = np.repeat(amounts, [space.free.size for space in self.spaces.values()])[:, None]
         done = size * delta
         return [float(part.sum()) for part in self.split(done * (self.mass @ (2 * target - done))).values()]

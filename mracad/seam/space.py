@@ -1,4 +1,4 @@
-"""Where a surface needs more control points for an edit: beside rims that are held."""
+"""More control points for an edit, beside rims that are held."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ HALVINGS = 12
 def refined(net: Net, held: Sequence[tuple[Face, Trim]], longest: float) -> Net:
     """A surface with its knot spans halved beside held boundary curves until they are at most ``longest`` (mm) there.
 
-    Across a curve that is a parameter line spans get shorter towards it, step by step; along it they stay.
+    Across a curve that is a parameter line, spans get shorter towards it step by step; along it they stay.
     """
     for _ in range(HALVINGS):
         halves = _halves(net, held, longest)

@@ -1,4 +1,4 @@
-"""Control points of joined surfaces: those that joints join, and strips along joints."""
+"""Control points of joined surfaces: those in joints, and strips along joints."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Layout:
 
 @dataclass(frozen=True, eq=False)
 class Division:
-    """What surfaces are solved in.
+    """The parts in which surfaces are solved.
 
     Attributes
     ----------
@@ -76,7 +76,7 @@ def joints(layout: Layout, rows: Any, soft: Any, free: Array) -> dict[tuple[int,
 
 
 def strips(layout: Layout, joined: dict[tuple[int, int], Array], free: Array, most: float) -> list[Array] | None:
-    """The free points near the points of each joint, of its surfaces and of those that others join to them.
+    """The free points near the points of each joint, on its surfaces and on their joined neighbours.
 
     None where these are more than ``most`` in all.
     """
@@ -117,13 +117,13 @@ def _box(places: Array) -> tuple[Array, Array]:
 
 
 def _along(places: Array, points: Array) -> Array:
-    """Points in their order along the direction in which they extend most: a narrow band in a strip."""
+    """Points sorted along the direction in which they extend most: that keeps the band of a strip narrow."""
     off = places[points] - places[points].mean(axis=0)
     return points[np.argsort(off @ np.linalg.eigh(off.T @ off)[1][:, -1], kind="stable")]
 
 
 def coloured(strips: Sequence[Array], conditions: Sequence[Array], size: int) -> list[list[int]]:
-    """Strips in sets of such as share neither points nor conditions."""
+    """Strips in sets that share neither points nor conditions."""
     from scipy.sparse import csr_array
 
     if not strips:

@@ -22,7 +22,7 @@ from mracad.seam.sides import from_inside
 Array = np.ndarray
 
 SAMPLES = 1025
-"""Points of a trace between which it counts as straight in search of crossings."""
+"""Points of a trace between which it counts as straight when searching for crossings."""
 
 NEAR = 1e-9
 """Crossings closer than this fraction of the edge are one."""
@@ -31,7 +31,7 @@ EVENLY = np.linspace(0.0, 1.0, SAMPLES)
 """Fractions of a trace at its points."""
 
 LOOKS = shares(75)
-"""Fractions of a trace at which it is looked at, those of the report."""
+"""Fractions of a trace at which it is measured, as in the report."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +44,7 @@ class Trace:
     curve : Curve
         In the parameter plane, over the edge's range.
     law : (ndarray, ndarray), optional
-        Fractions of the seam and the fractions of the curve that belong to them, where these are not the same.
+        Fractions of the seam and the corresponding fractions of the curve, if different.
     line : (int, float), optional
         The axis and the knot line on which it lies.
     limits : (str, str)
@@ -84,7 +84,7 @@ class Trace:
         return meeting(net.u, net.v, np.stack([uv, uv], axis=1))
 
     def part(self, low: float, high: float) -> Trace:
-        """What lies between two fractions of the seam, itself from 0 to 1."""
+        """The part between two fractions of the seam, rescaled to 0 … 1."""
         share = np.linspace(low, high, 2 if self.law is None else SAMPLES)
         whole = share if self.law is None else np.interp(share, *self.law)
         return replace(self, law=(np.linspace(0.0, 1.0, len(share)), whole))
@@ -135,7 +135,7 @@ def crossings(trace: Trace, spaces: tuple[KnotVector, KnotVector]) -> Array:
 
 
 def derived(table: Sequence[Array], way: Array, bend: Array, order: int) -> Array:
-    """D_c of an order of basis functions, and D_z with the second.
+    """D_c of some order of basis functions, plus D_z for order 2.
 
     Parameters
     ----------

@@ -1,12 +1,12 @@
-"""Seams that can move only to a tolerance: along trim curves, or where the parameters of the two sides have no law.
+"""Seams that can only move to a tolerance: along trim curves, or where the parameters of the two sides have no law.
 
-On such a seam no two spline spaces match.  Its conditions on a displacement δ (:mod:`mracad.seam.contact`) are asked at
-points of the two curves in the parameter planes that belong together:
+On such a seam no two spline spaces match.  Its conditions on a displacement δ (:mod:`mracad.seam.contact`) hold at
+corresponding points of the two curves in the parameter planes:
 
     G0   δ_b = δ_a,      G1   D_c δ_b = D_c δ_a,      G2   D_c² δ_b + D_z δ_b = D_c² δ_a,
 
-D_c the derivative in the direction of the conormal c of the input (the unit vector in the tangent plane of side a,
-across the edge), z the direction that makes the second derivatives of the input differ along the normal only.
+with D_c the derivative in the direction of the conormal c of the input (the unit vector in the tangent plane of side a,
+across the edge), z the direction in which the second derivatives of the input differ only along the normal.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ GAUSS = 4
 """Conditions in each piece of a seam between crossings."""
 
 NEWTON = 6
-"""Steps in which the fractions of two edges that belong together are found."""
+"""Newton steps to find corresponding fractions of two edges."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +48,7 @@ class TrimmedSeam:
     opening : ndarray (3,)
         Largest gap, angle and curvature jump of the input, as :func:`parted` measures them.
     close, fit : bool
-        Whether the gap and the tilt of the input are to be pulled shut instead of carried.
+        Whether the gap and the angle of the input are to be closed instead of kept.
     since : {0, 1, 2}
         The least of the derivatives that are kept to the tolerance: an exact seam keeps those below.
     """
@@ -66,16 +66,15 @@ class TrimmedSeam:
     def excess(
         self, before: Model, after: Model, allowed: Sequence[float], more: Sequence[float]
     ) -> tuple[Array, Array]:
-        """Opening after an edit, relative to what it may be, the worst of all that the seam keeps.
+        """Opening after an edit over the allowed one, the worst of all that the seam keeps.
 
-        It may be what the input had at its worst; the gap no more than what it had at the same place and the tolerance.
+        Allowed is the worst of the input; for the gap, that of the same place plus the tolerance.
 
         Parameters
         ----------
         before, after : Model
         allowed, more : sequence of float
-            Gap (mm), angle and curvature jump (1/mm) that a seam may have whatever it had, and that it may have more
-            than it had.
+            Gap (mm), angle and curvature jump (1/mm) that are always allowed, and their allowed growth.
 
         Returns
         -------
@@ -130,7 +129,7 @@ def _followed(model: Model, a: Trace, b: Trace, back: bool) -> Array:
 
 
 def beside(model: Model, seam: Seam, wishes: Wishes) -> TrimmedSeam | Cause:
-    """What the joint of a seam does not keep, to the tolerance."""
+    """The continuity that the joint of a seam does not keep exactly, kept to the tolerance."""
     found = _judged(model, seam.edge, seam.twin, (along(seam.a), along(seam.b)), wishes)
     return replace(found, since=seam.joint.order + 1) if isinstance(found, TrimmedSeam) and seam.joint.order else found
 
@@ -159,7 +158,7 @@ def judged(model: Model, traces: tuple[Trace, Trace]) -> Array:
 
 
 def parted(model: Model, a: Trace, b: Trace, share: Array) -> Array:
-    """Gap (mm, what lies along the seam left out), angle between outward normals, curvature jump (1/mm): ``(3, q)``."""
+    """Gap (mm, without its part along the seam), angle between outward normals, curvature jump (1/mm): ``(3, q)``."""
     apart, angles, bends = _opened(model, (a, b), share)
     return np.stack([apart, angles, np.abs(bends[0] - bends[1])])
 
@@ -182,7 +181,7 @@ def _opened(model: Model, traces: tuple[Trace, Trace], share: Array) -> tuple[Ar
 
 
 def fine_sites(traces: tuple[Trace, Trace], spaces: Mapping[int, tuple[KnotVector, KnotVector]]) -> tuple[Array, Array]:
-    """Fractions at which conditions are asked of fine spaces, and their weights: Gauss points of all spans."""
+    """Fractions of the conditions on fine spaces, and their weights: Gauss points of all spans."""
     breaks = np.sort(np.concatenate([crossings(trace, spaces[trace.surface]) for trace in traces]))
     breaks = breaks[np.append(True, np.diff(breaks) > NEAR)]
     place, weight = gauss_pieces(breaks, GAUSS)

@@ -1,4 +1,4 @@
-"""What an edit is to keep of seams, and what it is to mend."""
+"""What an edit should keep of seams, and what it should mend."""
 
 from __future__ import annotations
 
@@ -11,31 +11,31 @@ from mracad.seam.hold import CONTINUITY
 Array = np.ndarray
 
 CREASE = np.radians(1.0)
-"""A seam along which the normals differ by more anywhere is a crease: it keeps G0 only."""
+"""A seam whose normals differ by more than this anywhere is a crease: it only keeps G0."""
 
 BENT = 0.01
-"""Share of the curvature by which it may jump along a seam that counts as continuous in curvature."""
+"""Jump of the curvature, as a share of it, up to which a seam counts as continuous in curvature."""
 
 
 @dataclass(frozen=True)
 class Wishes:
-    """What seams are to keep, and what is to be mended.
+    """What seams should keep, and what should be mended.
 
     Attributes
     ----------
     keep : {"g0", "g1", "g2", "as-is"}
-        As it is: as much as each of them has.
+        As-is: as much as each of them has.
     fit : float
         Seams whose normals differ by up to this angle anywhere are made tangent.
     close_gaps : bool
     hold : frozenset of int
         Edges that must not move.
     bend : float
-        Jump of the curvature, 1/mm, that counts for nothing beside :data:`BENT` of the curvature itself.
+        Jump of the curvature, 1/mm, that is allowed besides :data:`BENT` of the curvature itself.
     open : bool
         Whether free edges and poles move with their faces.
     free : bool
-        Whether free edges do, but for the corners of faces between two of them.
+        Whether free edges do, except for the corners of faces between two of them.
     """
 
     keep: str = "g1"
@@ -47,7 +47,7 @@ class Wishes:
     free: bool = False
 
     def order(self, angles: Array, one: Array, other: Array) -> int:
-        """Derivatives across an edge that are kept, from what there is along it.
+        """Number of derivatives kept across an edge, given those along it.
 
         Parameters
         ----------
