@@ -126,7 +126,7 @@ class Divided:
         from scipy.sparse import csr_array, diags_array, vstack
 
         layout, strips = division.layout, division.strips
-        self.size, self.least = len(free), left
+        self.size, self.left = len(free), left
         diagonal = diagonal if soft is None else diagonal + soft.diagonal()
         self.scale = free / np.sqrt(diagonal + LEAST * diagonal[free].max(initial=0.0) + 1e-300)
         rows = (rows @ diags_array(self.scale)).tocsr()
@@ -219,7 +219,7 @@ class Divided:
             found += rest
             left[self.inner] = 0.0
             left[self.at] -= self.tied_form @ rest
-            if np.linalg.norm(left) <= self.least * first:
+            if np.linalg.norm(left) <= self.left * first:
                 break
         return found
 
