@@ -1,1 +1,1 @@
-"""What can be seen of a face: where it lies on its surface, how rough it is."""
+"""Measurements of faces and seams, their roughness, and verdicts on documents and files."""

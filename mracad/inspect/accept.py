@@ -1,7 +1,7 @@
 """Whether a file, read back, is as good as the document that it was written from: facts of both, and the faults.
 
-A fault is where the file is worse than memory.  What a bare read and write of the input in the same format does as
-well (the *copy*) is the kernel's own doing and is forgiven, but never that a face is lost or is another one.
+A fault is a place where the file is worse than memory.  A fault that a bare read and write of the input in the same
+format (the *copy*) has as well is the kernel's own doing and is forgiven, unless a face is lost or replaced.
 """
 
 from __future__ import annotations
@@ -35,10 +35,10 @@ PLACED = 1e-6
 """The same for the box, as a share of the diagonal."""
 
 CONTENT = frozenset({FaultKind.UNREAD, FaultKind.LOST, FaultKind.AREA, FaultKind.VOLUME, FaultKind.BOX})
-"""What is not forgiven though the kernel's own copy has it, too."""
+"""Faults that are not forgiven even if the kernel's own copy has them too."""
 
-_LAID = 1e-8  # mm: an edge of which no point lies farther off is the same
-_TURNED = 2e-5  # radians: nor has a face turned there that turned by less
+_LAID = 1e-8  # mm: an edge is the same if none of its points lies farther off
+_TURNED = 2e-5  # radians: and its faces have not turned by more
 _NEAR = 0.1  # share of the diagonal: faces that are farther apart are not the same
 
 _COUNTS = {
@@ -50,7 +50,7 @@ _COUNTS = {
 
 
 def meshed(open_faces: Collection[int], before: Collection[int]) -> ReadBack:
-    """The verdict on a mesh that leaves faces of closed bodies open, those that it did ``before`` forgiven."""
+    """The verdict on a mesh with open faces of closed bodies; those open ``before`` are forgiven."""
     fresh = tuple(sorted(set(open_faces) - set(before)))
     known = tuple(sorted(set(open_faces) & set(before)))
     faults, forgiven = ((Fault(FaultKind.OPEN, faces),) if faces else () for faces in (fresh, known))
@@ -78,14 +78,14 @@ def read_back(file: Facts, faults: tuple[Fault, ...], forgiven: tuple[Fault, ...
 
 @dataclass(frozen=True)
 class Slack:
-    """What may differ.
+    """Allowed differences.
 
     Attributes
     ----------
     moved : collection of tuple of int
         Pairs of faces whose seams moved with both.
     gaps : mapping of tuple of int to float
-        How wide seams may gape, and their edges be, between faces that moved otherwise, mm.
+        Allowed gaps of seams, and tolerances of their edges, between faces that moved otherwise, mm.
     parts : mapping of int to int
         Faces that were written in parts.
     """
@@ -124,7 +124,7 @@ class _File:
         return found
 
     def areas(self) -> Mapping[int, list[int]]:
-        """The faces that each face of the document is, one for each place."""
+        """The faces of the file for each face of the document, one for each place."""
         found: dict[int, list[int]] = defaultdict(list)
         for face in self.facts.owners.tolist():
             if face in self.partners:
@@ -135,16 +135,16 @@ class _File:
 def judge(
     memory: Facts, file: Facts, slack: Slack, copy: Callable[[], tuple[Facts, Facts]] | None = None
 ) -> tuple[tuple[Fault, ...], tuple[Fault, ...]]:
-    """Where a file is worse than the document: unforgivably, and only as the kernel's own copy of its input is.
+    """Where a file is worse than the document: the faults, and those forgiven because the kernel's own copy has them.
 
     Parameters
     ----------
     memory, file : Facts
-        Of the document that was written, and of the file.
+        Facts of the document that was written, and of the file.
     slack : Slack
     copy : callable, optional
-        Gives the facts of the input and of the kernel's own copy of it, where they are needed; without it all that
-        is no loss of content is forgiven.
+        Gives the facts of the input and of the kernel's own copy of it, if needed; without it everything except
+        loss of content is forgiven.
     """
     base, new = _File(memory, memory), _File(file, memory, slack.parts)
     faults = tuple(_faults(base, new, slack))
@@ -182,7 +182,7 @@ def _beside(base: _File, file: _File, slack: Slack, pairs: Collection[tuple[int,
 
 
 def _changed(memory: _File, file: _File, room: Callable[[Line], float]) -> set[tuple[int, ...]]:
-    """The faces of edges that are not the same in the file, within a distance."""
+    """The faces of edges that differ in the file by more than a distance."""
     same: set[int] = set()
     left: dict[tuple[int, ...], list[int]] = defaultdict(list)
     for number, pair in enumerate(memory.pairs):
@@ -217,10 +217,10 @@ def _same(memory: _File, one: int, file: _File, other: int, room: Callable[[Line
 
 
 def _bodies(memory: _File, file: _File) -> Iterator[Fault]:
-    """Faces that are lost or others, and the volume and box of everything.
+    """Faces that are lost or replaced, and the volume and box of everything.
 
-    A face of which no edge lies farther off than its tolerance is the same, unless its edges do not tell which side
-    of them is meant.
+    A face is the same if no edge lies farther off than its tolerance, unless its edges do not tell which side of them
+    is meant.
     """
     old, new = memory.facts, file.facts
     changed = {face for pair in _changed(memory, file, lambda edge: max(edge.tolerance, SLACK)) for face in pair}
@@ -240,7 +240,7 @@ def _bodies(memory: _File, file: _File) -> Iterator[Fault]:
             others.append(Fault(FaultKind.AREA, (face,), value, was))
     yield from others
     solids = old.counts.solids and new.counts.solids
-    if solids and (lost or old.counts.solids != new.counts.solids):  # exact volumes take long, and say nothing more
+    if solids and (lost or old.counts.solids != new.counts.solids):  # exact volumes are slow, and add nothing otherwise
         value, was = new.probe.volume(), old.probe.volume()
         if abs(value - was) > SAME * abs(was):
             yield Fault(FaultKind.VOLUME, tuple(lost), value, was)
@@ -252,7 +252,7 @@ def _bodies(memory: _File, file: _File) -> Iterator[Fault]:
 
 
 def _borders(facts: Facts) -> Array:
-    """Area that the tolerances of each face's edges leave open, ``(f,)``, mm²."""
+    """Uncertainty of each face's area by the tolerances of its edges, ``(f,)``, mm²."""
     found = np.zeros(facts.count)
     for edge in facts.edges:
         length = float(np.linalg.norm(np.diff(edge.points[0, :, :3], axis=0), axis=1).sum())
@@ -299,7 +299,7 @@ def _seams(base: _File, file: _File, slack: Slack, pairs: Collection[tuple[int, 
 
 
 def _worst(found: list[SeamMeasure], before: list[SeamMeasure], what: str, room: float) -> tuple[float, float]:
-    """The figures of the seam that grew most: the least of those found beside those before, in order of size."""
+    """The figures of the seam that grew most, comparing the seams found with those before, in order of size."""
     old, new = (sorted(getattr(m, what) for m in each) for each in (before, found))
     if len(before) != len(found) and what == "gap":
         return new[-1], old[-1]
@@ -308,10 +308,10 @@ def _worst(found: list[SeamMeasure], before: list[SeamMeasure], what: str, room:
 
 
 def match(document: Facts, file: Facts, parts: Collection[int] = ()) -> dict[int, int]:
-    """The face of the document that each face of a file is.
+    """The face of the document for each face of a file.
 
-    Faces of the same number in the same place are; of the others those that are nearest; and what is left over and
-    lies within one of the ``parts`` is a part of that.
+    Faces with the same number in the same place match; the others match the nearest; a face left over that lies within
+    one of the ``parts`` is a part of that.
     """
     scale = max(document.diagonal, 1e-300)
     old, new = document.spots, file.spots
@@ -341,7 +341,7 @@ def match(document: Facts, file: Facts, parts: Collection[int] = ()) -> dict[int
 
 
 def spoilt(faults: Iterable[Fault], edited: Collection[int], memory: Facts) -> set[int]:
-    """The edited faces to which faults are put down: those that they name, else their neighbours, else all."""
+    """The edited faces blamed for faults: those that they name, else their neighbours, else all."""
     named = {face for fault in faults for face in fault.faces}
     own = named & set(edited)
     if own:

@@ -18,12 +18,12 @@ Array = np.ndarray
 
 
 def turned(uses: Iterable[tuple[int, int, bool]]) -> set[int]:
-    """Faces that look the other way than most of their neighbours.
+    """Faces whose orientation is opposite to that of most of their neighbours.
 
     Parameters
     ----------
     uses : iterable of (edge, face, forward)
-        Every use of an edge by a face.  Two faces look the same way when they use their edge in opposite directions.
+        Every use of an edge by a face.  Two faces have the same orientation if they use it in opposite directions.
     """
     by_edge: dict[int, list[tuple[int, bool]]] = defaultdict(list)
     for edge, face, forward in uses:
@@ -54,7 +54,7 @@ def turned(uses: Iterable[tuple[int, int, bool]]) -> set[int]:
 
 
 def brep(validity: Validity, inward: Iterable[int] = ()) -> Layer:
-    """The kernel's own check, and faces of the file that look against their surface, which it turned on reading."""
+    """The kernel's own check, and faces flipped against their surface in the file, which it turned on reading."""
     findings = tuple(
         Finding(failure.status, () if failure.face is None else (failure.face,), figures={"kind": failure.kind})
         for failure in validity.failures
@@ -65,7 +65,7 @@ def brep(validity: Validity, inward: Iterable[int] = ()) -> Layer:
 
 
 def shells(model: Model, validity: Validity, inverted: Iterable[int]) -> Layer:
-    """Whether every shell is closed, and all faces look outward."""
+    """Whether every shell is closed, and all faces point outward."""
     free = [edge for edge in model.edges if edge.free]
     findings = [Finding("free-edge", (e.sides[0].face,), e.index, _at(e.points)) for e in free]
     findings += [Finding("flipped-face", (face,)) for face in sorted(inverted)]
@@ -84,13 +84,13 @@ def _at(points: Array) -> tuple[float, float, float]:
 
 @dataclass(frozen=True)
 class Smoothness:
-    """How many seams are smooth, and how near the next one is.
+    """The number of smooth seams, and the angle of the next one.
 
     Attributes
     ----------
     seams, smooth : int
     next : float or None
-        Least angle of the others, degrees; None where all are smooth.
+        Least angle of the others, degrees; None if all are smooth.
     """
 
     seams: int
@@ -105,11 +105,11 @@ class SeamLimits:
     Attributes
     ----------
     kink : float
-        Degrees: a seam with a smaller angle is meant to be smooth.
+        Degrees: a seam with a smaller angle should be smooth.
     gap, angle : float or None
-        Largest gap, mm; largest angle of those meant to be smooth, degrees.
+        Largest gap, mm; largest angle of seams that should be smooth, degrees.
     expected : int or None
-        How many are to be smooth.
+        Number of seams that should be smooth.
     freeform : bool
         Whether only seams of NURBS faces are counted for that.
     """
@@ -146,7 +146,7 @@ def seams(model: Model, measures: list[SeamMeasure], limits: SeamLimits) -> Laye
 
 
 def _missing(model: Model, measures: list[SeamMeasure], limits: SeamLimits) -> list[Finding]:
-    """That fewer seams are smooth than expected, and which are the nearest to it."""
+    """Findings if fewer seams are smooth than expected, with the nearest ones."""
     if limits.expected is None:
         return []
     nurbs = {face.index for face in model.faces if face.surface is not None}
@@ -177,7 +177,7 @@ def tolerances(model: Model, validity: Validity, limit: float | None) -> Layer:
 
 
 def mesh(found: Triangles, open_faces: set[int]) -> Layer:
-    """Whether the mesh of what is closed is watertight."""
+    """Whether the mesh of closed bodies is watertight."""
     findings = [Finding("no-mesh", (face,)) for face in found.missing]
     lookup: dict[tuple[int, int], set[int]] = defaultdict(set)
     for (a, b), face in zip(np.sort(found.sides, axis=1).tolist(), np.repeat(found.faces, 3).tolist(), strict=True):

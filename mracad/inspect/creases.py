@@ -1,4 +1,4 @@
-"""How far the normal turns across the knot lines of a surface on which its derivatives may jump."""
+"""Angles of the normal across knot lines of a surface where its derivatives may jump."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ CLUSTER = 1e-4, 1e-6
 """Knots closer than this, mm, or than this fraction of the surface, count as one."""
 
 BESIDE = 1e-5
-"""Where a face is looked for beside a knot line, as a fraction of the span there."""
+"""Distance from a knot line at which a face is looked for, as a fraction of the span there."""
 
 LIMITS: tuple[Side, Side] = "left", "right"
 
@@ -49,7 +49,7 @@ def lines(net: Net, axis: int) -> Array:
 
 
 def _even(spans: Array) -> bool:
-    """Whether no knots lie so close together that they may count as one."""
+    """Whether no two knots are close enough to count as one."""
     return bool(spans.min() > 1e-2 * spans.mean())
 
 
@@ -74,8 +74,8 @@ class Crossing:
     seen: Array
 
     def angles(self, net: Net) -> Array:
-        """Angles between the normals of a surface, of which these are knot lines, on either side; radians, NaN where it
-        is degenerate."""
+        """Angles between the normals on either side of these knot lines of a surface; radians, NaN where it is
+        degenerate."""
         normals = []
         for side, limit in enumerate(LIMITS):
             at, limits = (self.at[:, side], self.places), (limit, LIMITS[1])

@@ -1,4 +1,4 @@
-"""Where a mesh crosses itself, and where its sides do not pair up."""
+"""Places where a mesh crosses itself, and where its sides do not pair up."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from itertools import pairwise
 import numpy as np
 
 Array = np.ndarray
-_BLOCK = 200_000  # pairs of triangles looked at in one go
+_BLOCK = 200_000  # pairs of triangles tested at once
 
 
 def unpaired(sides: Array) -> Array:
-    """Those of the sides ``(k, 2)`` of triangles that are not there exactly once in each direction."""
+    """The sides ``(k, 2)`` of triangles that do not occur exactly once in each direction."""
     unique, counts = np.unique(sides, axis=0, return_counts=True)
     known = {tuple(side): count for side, count in zip(unique.tolist(), counts.tolist(), strict=True)}
     bad = [(a, b) for (a, b), count in known.items() if count != 1 or known.get((b, a)) != 1]
@@ -46,7 +46,7 @@ def crossings(points: Array, corners: Array, parts: Array) -> tuple[Array, Array
 
 
 def _pierced(start: Array, end: Array, triangle: Array) -> Array:
-    """Where on each segment it passes through the inside of its triangle (a share), or NaN."""
+    """The fraction of each segment at which it passes through the inside of its triangle, or NaN."""
     along = end - start
     u, v = triangle[:, 1] - triangle[:, 0], triangle[:, 2] - triangle[:, 0]
     p = np.cross(along, v)

@@ -16,16 +16,16 @@ THIN = 1e-6
 """Sine of the angle between S_u and S_v below which a surface counts as degenerate."""
 
 VOID = 1e-40
-"""|S_u × S_v| up to which it does, too: powers of less are no numbers."""
+"""|S_u × S_v| up to which it does too: powers of smaller numbers underflow."""
 
 
 MANY = 7_000_000
-"""Points after which those that follow are worth the import of a compiler."""
+"""Number of points after which importing a compiler pays."""
 
 
 @dataclass(frozen=True, eq=False)
 class Forms:
-    """What the derivatives of a surface say at points.
+    """Curvature figures of a surface at points.
 
     Attributes
     ----------
@@ -42,7 +42,7 @@ class Forms:
     largest : ndarray (q,)
         max(|κ₁|, |κ₂|).
     shape : ndarray (3, q)
-        The shape operator in the frame of S_u / |S_u| and what is normal to it: its 11, 12 and 22 components.
+        The shape operator in the frame of S_u / |S_u| and the tangent normal to it: its 11, 12 and 22 components.
     slope : ndarray (2, q)
         ∇H in that frame.
     regular : ndarray of bool (q,)
@@ -80,7 +80,7 @@ class _Work:
 def forms(jet: Array) -> Forms:
     """The forms of a surface with derivatives ``jet``, see :func:`mracad.bspline.jets.jets`.
 
-    They are the same bits however many points there are.
+    The results are the same, bit for bit, however many points there are.
     """
     _Work.done += jet.shape[2]
     return forms_at_once(jet) if _Work.done < MANY else forms_one_by_one(jet)
@@ -174,7 +174,7 @@ def _swept(jet: Any, thin: Any, void: Any, found: Any) -> None:
 
 @cache
 def _compiled() -> Callable[..., None]:
-    """:func:`_swept`, compiled: once, and kept on disk as long as this file stays what it is."""
+    """:func:`_swept`, compiled once, and cached on disk until this file changes."""
     from numba import njit
 
     figures = njit(error_model="numpy")(_figures)

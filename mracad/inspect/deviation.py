@@ -26,7 +26,7 @@ class Deviation:
     largest, mean : float
         Over the sample of the face.
     bound : float
-        Certified bound: the longest pole offset.
+        Certified bound: the longest offset of a control point.
     where : tuple of float
         Point of the largest displacement, before the edit, in the part's frame, mm.
     """

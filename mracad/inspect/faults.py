@@ -1,4 +1,4 @@
-"""What is known of a document and of a file, read back; what may be worse in the file, and its figures."""
+"""A file as read back: its figures, and how it is worse than the document."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Array = np.ndarray
 
 
 class FaultKind(StrEnum):
-    """What is worse in a file."""
+    """How a file is worse."""
 
     UNREAD = "not read back"
     INVALID = "invalid"
@@ -40,11 +40,11 @@ class Fault:
     ----------
     reason : FaultKind
     faces : tuple of int
-        Indices in the document of the faces that it concerns; empty where it cannot be told.
+        Indices in the document of the faces that it concerns; empty if unknown.
     value, was : float
         The figure in the file and in the document: a count, mm, mm², mm³ or degrees.
     status : str
-        What the kernel calls it, for ``INVALID``; what the reader says, for ``UNREAD``.
+        The kernel's name of it, for ``INVALID``; the reader's message, for ``UNREAD``.
     """
 
     reason: FaultKind
@@ -55,13 +55,13 @@ class Fault:
 
     @property
     def key(self) -> tuple[FaultKind, tuple[int, ...], str]:
-        """What identifies it in another file."""
+        """The key that identifies it in another file."""
         return self.reason, self.faces, self.status
 
 
 @dataclass(frozen=True)
 class ReadBack:
-    """What a file is, as read back.
+    """A file as read back.
 
     Attributes
     ----------
@@ -72,17 +72,17 @@ class ReadBack:
     box : ((float, float, float), (float, float, float)) or None
         Lowest and highest corner of the boxes of its faces, mm; never too small.
     volume : (float, float) or None
-        In the document and in the file, mm³; None where no face is another one, so that it was not measured.
+        In the document and in the file, mm³; None if no face was replaced, so that it was not measured.
     tolerance : float
         The largest, mm.
     seams : int
-        Seams that a reader lays otherwise than in the document, so that they were measured.
+        Seams that lie elsewhere in the file than in the document, so that they were measured.
     gap, angle : float
         The largest of these, mm, and of the smooth ones among them, degrees.
     faults : tuple of Fault
-        What is worse than in the document and than in the kernel's own copy of the input.
+        Faults that neither the document nor the kernel's own copy of the input has.
     forgiven : tuple of Fault
-        What is worse than in the document, as it is in the kernel's own copy.
+        Faults that the kernel's own copy has too.
     """
 
     valid: bool

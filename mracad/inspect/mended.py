@@ -1,4 +1,4 @@
-"""What became of the defects of seams that an edit was asked to mend."""
+"""Results for the defects of seams that an edit was asked to mend."""
 
 from __future__ import annotations
 
@@ -12,33 +12,33 @@ from mracad.spec.quantity import length
 from mracad.spec.steps import Fitting
 
 LEFT = 0.1
-"""A defect is mended where no more than this share of it is left, beside what counts for none."""
+"""Share of a defect that may be left if it is mended, besides what counts as none."""
 
 MOSTLY = 0.3
-"""Where its mean falls to this share, it is mended but for the ends of the seam, beside points that stay."""
+"""If its mean falls to this share, it is mended except at the ends of the seam, beside points that stay."""
 
 TANGENT = 0.01
-"""Angle, degrees, that counts for none."""
+"""Angle, degrees, that counts as none."""
 
 
 @dataclass(frozen=True)
 class Mending:
-    """What became of the gaps or angles that were to be mended.
+    """The result for gaps or angles that were to be mended.
 
     Attributes
     ----------
     what : {"close-gaps", "fit-g1"}
         The option.
     least, most : float
-        Between which there is a defect: mm or degrees.
+        Bounds between which a gap or angle is a defect: mm or degrees.
     defects, left, mostly : int
-        How many there were; are not mended; of these are, but for the ends of their seams.
+        Number of defects; of those not mended; of those among them that are mended except at the ends of their seams.
     edge : int or None
-        The one that is farthest off.
+        The edge with the largest remaining defect.
     after : float
-        By how much.
+        That defect, mm or degrees.
     next : float or None
-        Where there was no defect: the widest gap, or the least angle above ``most``.
+        If there was no defect: the widest gap, or the least angle above ``most``.
     """
 
     what: Literal["close-gaps", "fit-g1"]
@@ -59,13 +59,13 @@ def unmended(
     before: Sequence[SeamMeasure],
     after: Sequence[SeamMeasure],
 ) -> tuple[Mending, ...]:
-    """Gaps and angles that were to be mended and were not, or were not there; nothing where all were.
+    """Gaps and angles that were to be mended and were not, or did not exist; empty if all were.
 
     Parameters
     ----------
     options : Fitting
     diagonal : float
-        Of the model, mm.
+        Diagonal of the model, mm.
     movable : collection of int
         Faces that the edit could move: only seams between two of them count.
     before, after : sequence of SeamMeasure
@@ -100,7 +100,7 @@ class _Defect:
 
 
 def _became(none: Mending, defects: Sequence[_Defect], other: float | None) -> Mending | None:
-    """What became of defects; None where all are mended, ``other`` where there were none."""
+    """The result for defects; None if all are mended, ``other`` if there were none."""
     if not defects:
         return replace(none, next=other)
     left = [defect for defect in defects if defect.after > LEFT * defect.before + none.least]

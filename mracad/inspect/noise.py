@@ -1,8 +1,8 @@
-"""The noise of a control net: what no smooth surface explains.
+"""The noise of a control net: the part that no smooth surface explains.
 
-Divided differences of an order, divided by the root of the sum of the squares of their weights, of noise that is white
-on control points, are such noise again; those of a smooth surface are small.  The noise is the least of what
-differences of order 3 along both axes, and of order 4 along one, make of it, or the mean of those that agree with it.
+Divided differences with weights of unit norm keep the standard deviation of white noise on control points; those of a
+smooth surface are small.  The noise is the least of the estimates by differences of order 3 along both axes and of
+order 4 along each, or the mean of those that agree with it.
 """
 
 from __future__ import annotations
@@ -17,16 +17,16 @@ from mracad.bspline.surface import Net
 Array = np.ndarray
 
 ORDERS = (3, 3), (4, 0), (0, 4)
-"""Of the differences, along u and v."""
+"""Orders of the differences along u and v."""
 
 MEDIAN = 1.5381723
 """Median length of a vector of three standard normal numbers: of χ with three degrees of freedom."""
 
 AGREE = 1.15
-"""What is more than this times the least has shape in it."""
+"""An estimate above this times the least contains shape."""
 
 FEWEST, ACROSS = 40, 6
-"""Differences, and control points along either axis, from which on noise can be told."""
+"""Least number of differences, and of control points along either axis, to tell noise."""
 
 
 def noise(net: Net, points: Array) -> float | None:
@@ -45,7 +45,7 @@ def noise(net: Net, points: Array) -> float | None:
 
 
 def _lengths(net: Net, points: Array) -> Iterator[Array]:
-    """Lengths of the differences of each of the orders that take these points alone."""
+    """Lengths of the differences of each order that only involve these points."""
     for orders in ORDERS:
         window = orders[0] + 1, orders[1] + 1
         if all(count >= size for count, size in zip(points.shape, window, strict=True)):

@@ -1,9 +1,9 @@
 """Roughness place by place: whether an edit made waves where a face was smooth, which no sum over the face shows.
 
-A face is divided into places with sides of half the wavelength of the edit.  What it has beyond its base bends by
-|S − S₀|² and varies by |∇H − ∇H₀|², S the shape operator and ₀ the base: beside the curvature of the base itself,
-waves that reflections show are small.  What an edit takes from one place spreads to those beside it, so these figures
-(their means over a place) are compared with the largest of the place itself and of the eight about it before.
+A face is divided into places with sides of half the wavelength of the edit.  Its part beyond the base bends by
+|S − S₀|² and varies by |∇H − ∇H₀|², S the shape operator and ₀ the base: next to the curvature of the base, waves that
+reflections show are small.  A change at one place spreads to its neighbours, so these figures (means over a place) are
+compared with the largest that the place and its eight neighbours had before.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ from mracad.model.cells import Quadrature
 Array = np.ndarray
 
 SIDES = 2
-"""Sides of a place in a wavelength."""
+"""Places per wavelength."""
 
 SLOPE = 1.4e-4
-"""Steepest slope of a wave that shows nowhere, radians: what an edit may add to an angle between faces."""
+"""Steepest slope of an invisible wave, radians: as much as an edit may add to an angle between faces."""
 
 SMALL = 0.05
-"""Area over that of the largest place up to which a place at the boundary counts for nothing."""
+"""Area over that of the largest place up to which a place at the boundary is ignored."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,13 +36,13 @@ class Placed:
     Attributes
     ----------
     spread : ndarray
-        By how much what the place bends or varies beyond its base exceeds the largest about it before, over that.
+        Bending or variation of the place beyond its base, over the largest around it before, less 1.
     lost : ndarray
-        Share of its bending or curvature variation that the place lost, of the one of which it lost more.
+        Share of its bending or curvature variation that the place lost, whichever is larger.
     rise : ndarray (2, nu, nv)
-        By how much bending and curvature variation of the place grew, over the mean of those that grew.
+        Growth of bending and curvature variation of the place, over the mean growth of all places.
     curvature : ndarray
-        Largest curvature now, 1/mm.
+        Largest curvature after the edit, 1/mm.
     turn : ndarray
         Largest angle between normals before and after, radians.
     opened : ndarray
@@ -79,7 +79,7 @@ class Places:
     order : ndarray of int (q,)
         The points of a quadrature, place by place.
     first, filled : ndarray of int (places,)
-        Where each place that has points begins among them, and its number.
+        Where each place with points begins among them, and its number.
     shape : (int, int)
         Places along u and v.
     ends : (ndarray, ndarray)
@@ -91,7 +91,7 @@ class Places:
     before : ndarray (2, nu, nv)
         Means of bending and curvature variation.
     most, around : ndarray (2, nu, nv)
-        The largest of each place and those beside it, and of what shows nowhere: of these, and beyond the base.
+        The largest of each place, its neighbours and the invisible wave: of bending and variation, and beyond the base.
     """
 
     order: Array
@@ -107,8 +107,8 @@ class Places:
 
     @classmethod
     def of(cls, rule: Quadrature, form: Forms, base: Forms | None, areas: Array, wavelength: float) -> Places:
-        """Places of the faces that a rule goes over, with forms of the surface and of what is shape in it, and areas
-        (mm²) at its points."""
+        """Places of the faces of a quadrature rule, with the forms of the surface and of its base, and areas (mm²), at
+        its points."""
         (rows, u), (columns, v) = (_divided(rule, form, axis, wavelength / SIDES) for axis in (0, 1))
         shape = len(u), len(v)
         cell = rows * shape[1] + columns
@@ -126,18 +126,18 @@ class Places:
     def compared(
         self, form: Forms, areas: Array, turned: Array, unsettled: Array, opened: Iterable[tuple[Crossing, Array]]
     ) -> Placed:
-        """What became of them.
+        """The changes of the places.
 
         Parameters
         ----------
         form : Forms
-            Now.
+            After the edit.
         areas : ndarray (q,)
             mm², zero at points that do not count.
         turned, unsettled : ndarray (q,)
-            Turns of normals (radians), and what became of singular points.
+            Turns of normals (radians), and changes of singular points.
         opened : iterable of (Crossing, ndarray)
-            By how much angles across knot lines grew, radians.
+            Growth of angles across knot lines, radians.
         """
         counts = self.area > 0
         spread = np.where(counts, (self._beyond(form, areas) / self.around - 1).max(axis=0), 0.0)
@@ -170,7 +170,7 @@ class Places:
         return self._mean(areas, form.bending, form.variation)
 
     def _beyond(self, form: Forms, areas: Array) -> Array:
-        """Means of what bends and varies beyond the base, ``(2, nu, nv)``."""
+        """Means of bending and variation beyond the base, ``(2, nu, nv)``."""
         off = _bent(form) - self.base
         off *= off
         return self._mean(areas, off[0] + 2 * off[1] + off[2], off[3] + off[4])
@@ -186,7 +186,7 @@ def _bent(form: Forms) -> Array:
 
 
 def _around(figures: Array, least: Array) -> Array:
-    """The largest of each place and of those beside it, and no less than what shows nowhere, ``(2, nu, nv)``."""
+    """The largest of each place and its neighbours, and no less than an invisible wave, ``(2, nu, nv)``."""
     from scipy.ndimage import maximum_filter
 
     most = maximum_filter(figures, (1, 3, 3), mode="nearest")

@@ -43,7 +43,7 @@ class Roughness:
     variation : float
         ∫ |∇H|² dA, H the mean curvature, 1/mm².
     curvature : float
-        Largest |κ₁| or |κ₂|, 1/mm, less what rounding may make of it.
+        Largest |κ₁| or |κ₂|, 1/mm, less the possible effect of rounding.
     kink : float
         Largest angle between the normals on the two sides of a knot line, degrees.
     """
@@ -63,13 +63,12 @@ class Change:
     ----------
     before, after : Roughness
     noise : Roughness
-        The figures of a ripple that counts for nothing, see :data:`mracad.inspect.survey.RIPPLE`; ``kink`` is its
-        steepest slope.
+        The figures of a negligible ripple, see :data:`mracad.inspect.survey.RIPPLE`; ``kink`` is its steepest slope.
     opened : float
-        By how much the angle across a knot line grew, where it grew most, degrees.
+        Largest growth of the angle across a knot line, degrees.
     turn : float
-        Largest angle between the normals before and after, degrees; where noise goes, between a normal after and the
-        nearest of those before within a knot span of there.
+        Largest angle between the normals before and after, degrees; where noise is removed, between a normal after and
+        the nearest of those before within a knot span.
     deviation : float
         Largest motion along the normal, mm.
     motion : float
@@ -77,7 +76,7 @@ class Change:
     unsettled : float
         Largest relative change of the curvature at singular points that stay singular.
     placed : Placed, optional
-        What became of its places.
+        Changes of its places.
     """
 
     before: Roughness
@@ -92,23 +91,23 @@ class Change:
 
     @property
     def spread(self) -> float:
-        """By how much bending or curvature variation of a place exceeds all that was about it before, relative."""
+        """Largest relative excess of bending or curvature variation of a place over all that was around it before."""
         return 0.0 if self.placed is None else float(self.placed.spread.max(initial=0.0))
 
     @property
     def lost(self) -> float:
-        """Largest share of the one or the other that a place lost."""
+        """Largest share of bending or curvature variation that a place lost."""
         return 0.0 if self.placed is None else float(self.placed.lost.max(initial=0.0))
 
     @property
     def fairer(self) -> float:
-        """What places lost in the mean over the area, less what they gained."""
+        """The mean, by area, of the shares that places lost; gains are negative."""
         if self.placed is None or not self.placed.area.any():
             return 0.0
         return float((self.placed.lost * self.placed.area).sum() / self.placed.area.sum())
 
     def undone(self) -> Change:
-        """Nothing done instead."""
+        """No change instead."""
         return Change(self.before, self.before, self.noise)
 
 
@@ -125,7 +124,7 @@ class Growth:
     fold : float
         By how much a normal may turn, degrees.
     spread : float
-        By how much the figures of a place may exceed all that was about it, relative.
+        By how much the figures of a place may exceed all that was around it, relative.
     """
 
     bending: float = 0.0
@@ -138,8 +137,8 @@ class Growth:
 
 @dataclass(frozen=True)
 class Worse:
-    """One figure of a face that got worse, before and after; of a fold 0 and the angle (degrees), of a singular point 0
-    and the share by which its curvature changed, of a place 1 and its figure over the largest about it before."""
+    """One figure of a face that got worse, before and after; for a fold 0 and the angle (degrees), for a singular point
+    0 and the relative change of its curvature, for a place 1 and its figure over the largest around it before."""
 
     what: Rougher
     before: float
@@ -147,7 +146,7 @@ class Worse:
 
 
 def worse(change: Change, allowed: Growth) -> tuple[Worse, ...]:
-    """In what a change made faces rougher than allowed, in the order of :class:`Rougher`."""
+    """The figures in which a change made faces rougher than allowed, in the order of :class:`Rougher`."""
     before, after, noise = change.before, change.after, change.noise
     found = [
         Worse(what, *(float(getattr(each, what.name.lower())) for each in (before, after)))
@@ -168,7 +167,7 @@ def worse(change: Change, allowed: Growth) -> tuple[Worse, ...]:
 
 
 def _grown(change: Change, what: Rougher, allowed: Growth) -> bool:
-    """Whether bending or curvature variation of all grew by more than allowed."""
+    """Whether total bending or curvature variation grew by more than allowed."""
     name = what.name.lower()
     old, new, ripple, share = (
         float(getattr(each, name)) for each in (change.before, change.after, change.noise, allowed)
@@ -177,12 +176,12 @@ def _grown(change: Change, what: Rougher, allowed: Growth) -> bool:
 
 
 def _most(old: float, share: float) -> float:
-    """What a figure may grow to by a share of itself."""
+    """The largest allowed value of a figure that may grow by a share."""
     return old * (1 + share) if share < np.inf else np.inf
 
 
 def places(change: Change, allowed: Growth) -> Array:
-    """The places of a face that got worse than allowed, or by which all of it did, ``(nu, nv)``."""
+    """The places of a face that got worse than allowed, or that made the whole face worse, ``(nu, nv)``."""
     found = change.placed
     assert found is not None
     most = _most(change.before.curvature, allowed.curvature) + change.noise.curvature
@@ -194,8 +193,8 @@ def places(change: Change, allowed: Growth) -> Array:
 
 
 def better(change: Change, share: float, local: float = np.inf, mean: float = 0.0) -> bool:
-    """Whether a change took more than a share of the bending or of the curvature variation of all; or more than another
-    of that of a place, and than a third of that of all places in the mean."""
+    """Whether a change reduced bending or curvature variation by more than ``share`` in total; or by more than
+    ``local`` at a place and more than ``mean`` as the mean over places."""
     both = (change.before.bending, change.after.bending), (change.before.variation, change.after.variation)
     noise = change.noise.bending, change.noise.variation
     whole = any(old - new > share * old + ripple for (old, new), ripple in zip(both, noise, strict=True))

@@ -1,7 +1,7 @@
-"""What there is to smooth on the faces of a model, told from knots and nets: nothing is edited, no seam looked at.
+"""Detail on the faces of a model at a scale, from knots and nets alone: nothing is edited, no seam measured.
 
-At a scale s the surface S_f of each face is projected onto the coarse space that its knots leave there, as smoothing
-does; what that takes away, d = S_f − S_{Pf}, is looked at in the knot cells that the face touches.
+At a scale s the surface S_f of each face is projected onto the coarse space of its knots at that scale, as in
+smoothing; the difference d = S_f − S_{Pf} is measured in the knot cells that the face touches.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ from mracad.wavelet.project import at_scale
 Array = np.ndarray
 
 LEAST = 1e-7
-"""Height, mm, from which on something counts as detail: the kernel's coincidence tolerance."""
+"""Least height of detail, mm: the kernel's coincidence tolerance."""
 
-_POINTS = 2  # places at which a knot cell is looked at in each direction
+_POINTS = 2  # places at which a knot cell is sampled in each direction
 
 
 @dataclass(frozen=True)
 class FaceScales:
-    """What one NURBS face holds of scales.
+    """Scales and detail of one NURBS face.
 
     Attributes
     ----------
@@ -40,13 +40,13 @@ class FaceScales:
     spans : (float, float)
         Least and largest knot span, mm.
     finest : float
-        Least wavelength whose removal the knots allow, mm; 0 where there is none.
+        Least wavelength that the knots allow to remove, mm; 0 if there is none.
     creases : int
         Crease lines inside the face, which every edit keeps.
     coarser : bool
         Whether the knots allow a coarser surface at the scale.
     detail, rms : float
-        Largest and root mean square height of what smoothing at the scale takes away were nothing held, mm.
+        Largest and root mean square height of the detail that smoothing would remove if nothing were held, mm.
     free, points : int
         Control points that can move while all edges stay, and all on which the face depends.
     """
@@ -65,7 +65,7 @@ class FaceScales:
 def scales(
     model: Model, scale: float, keep: str = "g1", progress: Callable[[int, int], None] | None = None
 ) -> dict[int, FaceScales]:
-    """Look at the NURBS faces of a model.
+    """Measure the NURBS faces of a model.
 
     Parameters
     ----------

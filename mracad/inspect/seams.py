@@ -25,7 +25,7 @@ SMOOTH = 1.0
 """Degrees: a seam whose largest angle is below this counts as smooth in summaries."""
 
 FLAT = 1e-9
-"""Curvature, 1/mm, below which a face counts as flat: jumps are not measured against less."""
+"""Curvature, 1/mm, below which a face counts as flat: jumps are not divided by less."""
 
 
 @dataclass(frozen=True)
@@ -88,7 +88,7 @@ def seams(model: Model, every: bool = False) -> list[SeamMeasure]:
 
 
 def remeasured(model: Model, before: list[SeamMeasure], moved: Collection[int]) -> list[SeamMeasure]:
-    """What :func:`seams` measures after some surfaces ``moved``, from what it measured ``before``."""
+    """The result of :func:`seams` after some surfaces ``moved``, given that of ``before``."""
     pairs = _pairs(model)
     touched = [any(model.faces[side.face].surface in moved for side in sides) for _, _, sides in pairs]
     fresh = iter(_measured(model, [pair for pair, new in zip(pairs, touched, strict=True) if new]))
@@ -109,7 +109,7 @@ def summary(measures: list[SeamMeasure], smooth: frozenset[tuple[int, tuple[int,
 
 
 def key(measure: SeamMeasure) -> tuple[int, tuple[int, int]]:
-    """What identifies a seam before and after an edit."""
+    """The key that identifies a seam before and after an edit."""
     return measure.edge, measure.faces
 
 

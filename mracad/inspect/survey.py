@@ -21,30 +21,30 @@ from mracad.model.cells import Quadrature, quadrature
 Array = np.ndarray
 
 POINTS, FEWEST = 5, 24
-"""Points a span, its ends among them, and at least along a face, in either direction: curvature peaks at knots."""
+"""Points a span, including its ends, and the least along a face, in either direction: curvature peaks at knots."""
 
 RIPPLE = 1e-8
-"""Amplitude, mm, of a ripple one mean span long that counts for nothing: a tenth of a point of the kernel."""
+"""Amplitude, mm, of a negligible ripple one mean span long: a tenth of a point of the kernel."""
 
 ROUNDING = 16 * float(np.finfo(float).eps)
 """Error of a point of a surface, relative to its largest coordinate: a ripple as long as the span where it lies."""
 
 NOISY, STEEP = 1.0, 20.0
-"""Where normals turn by more than the first in the median, degrees, noise goes; those that turn by more than the second
-are then compared with those around, too."""
+"""If normals turn by more than the first in the median, degrees, noise is being removed; those that turn by more than
+the second are then also compared with those around."""
 
 STEADY = 0.05
-"""What a turn of the normal at a singular point counts for beside a change of its curvature, per radian."""
+"""Weight of a turn of the normal at a singular point, per radian, against a relative change of its curvature."""
 
 _BLOCK = 50_000
 
 _ENOUGH = 4096
-"""Points that are worth being gone through together."""
+"""Number of points that is worth processing together."""
 
 
 @dataclass(frozen=True, eq=False)
 class Survey:
-    """Faces of a surface before an edit, with all that their later states are compared with.
+    """Faces of a surface before an edit, with everything needed to compare later states.
 
     Attributes
     ----------
@@ -65,7 +65,7 @@ class Survey:
         Where tangents may jump, and the angles by which they do.
     roughness, noise : Roughness
     places : Places or None
-        Where it is looked at place by place.
+        If it is measured place by place.
     """
 
     net: Net
@@ -90,18 +90,18 @@ def surveys(
     reach: float = 0.0,
     bases: Sequence[Net] = (),
 ) -> list[Survey]:
-    """Look at surfaces before an edit.
+    """Measure surfaces before an edit.
 
     Parameters
     ----------
     surfaces : iterable of (Net, sequence of Face, KnotVector, KnotVector)
-        The surface, those of its faces that are to be seen as one, and the knots that it will have afterwards.
+        The surface, the faces on it that are measured as one, and the knots that it will have afterwards.
     points : int
         Points a span of those knots, in either direction.
     singular : float
-        Curvature, 1/mm, from which on a point is singular: what a grid sees of it depends on where its points lie.
+        Curvature, 1/mm, above which a point is singular: there, figures on a grid depend on where its points lie.
     reach : float
-        Within which what an edit takes spreads, mm: faces are then looked at place by place, too.
+        Distance within which the edit spreads a change, mm: faces are then also measured place by place.
     bases : sequence of Net
         Smooth copies of the surfaces, beside which waves show; planes by default.
     """
@@ -135,7 +135,7 @@ def surveys(
 
 
 def changes(surveyed: Sequence[Survey], nets: Sequence[Net]) -> list[Change]:
-    """What became of surveyed surfaces.
+    """The changes of surveyed surfaces.
 
     Parameters
     ----------
@@ -183,8 +183,8 @@ def _unsettled(survey: Survey, form: Forms) -> Array:
 def _turned(survey: Survey, normals: Array, counted: Array) -> Array:
     """How far normals ``(3, q)`` are from those before, as chords, ``(q,)``.
 
-    Where noise goes all over the face, what is far is taken from the nearest of those within as many points as a span
-    has: noise that goes turns normals into what they were beside it, a fold turns them over.
+    If noise is removed all over the face, large turns are measured to the nearest normal within one span: removing
+    noise turns a normal to those beside it, a fold turns it over.
     """
     off = np.where(counted, np.linalg.norm(normals - survey.normals, axis=0), 0.0)
     rule, (noisy, most) = survey.rule, 2 * np.sin(np.radians([NOISY / 2, STEEP / 2]))
@@ -208,7 +208,7 @@ def _rule(faces: Sequence[Face], u: KnotVector, v: KnotVector, points: int) -> Q
 
 
 def _seen(surfaces: Sequence[tuple[Net, Quadrature, Array]]) -> Iterator[tuple[Array, Forms]]:
-    """Points and forms of each surface at the points of its rule; small ones are gone through together."""
+    """Points and forms of each surface at the points of its rule; small ones are processed together."""
     sizes = np.array([int(rule.mask.sum()) for _, rule, _ in surfaces])
     block = (sizes.cumsum() - sizes) // _BLOCK
     for number in np.unique(block):
@@ -236,7 +236,7 @@ def _gathered(parts: Iterable[Array]) -> Iterator[Array]:
 
 
 def _areas(rule: Quadrature, form: Forms) -> Array:
-    """Area that each point of a rule stands for, mm²."""
+    """Area of each point of a rule, mm²."""
     return np.asarray(rule.weights.T[rule.mask.T] * form.density)
 
 
@@ -274,7 +274,7 @@ def _roughness(areas: Array, form: Forms, counts: Array, rounding: Array, kink: 
 def _noise(areas: Array, sides: Array, rounding: Array) -> Roughness:
     """Figures of a ripple z = a sin kx: ½ a² k⁴, ⅛ a² k⁶, a k² and slope a k, by :data:`RIPPLE` and rounding.
 
-    k is that of the mean span; where spans are shorter, only what rounding makes of a span is added.
+    k is that of the mean span; where spans are shorter, only the effect of rounding on a span is added.
     """
     total = float(areas.sum())
     if not total:

@@ -91,7 +91,7 @@ class Effort:
     Attributes
     ----------
     direct : int
-        Most control points that are solved in one go.
+        Most control points that are solved at once.
     left : float
         Of more: see :class:`mracad.seam.divided.Divided`.
     """
