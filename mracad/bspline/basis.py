@@ -10,7 +10,7 @@ from mracad.bspline.knots import Array, KnotVector, Side
 from mracad.memo import kept
 
 SHORT = 64
-"""Most parameters for which values are kept."""
+"""Most parameters for which values are cached."""
 
 
 def basis(kv: KnotVector, x: Array, derivative: int = 0, side: Side = "right") -> tuple[Array, Array]:
@@ -20,7 +20,7 @@ def basis(kv: KnotVector, x: Array, derivative: int = 0, side: Side = "right") -
     ----------
     kv : KnotVector
     x : array_like (q,)
-        Parameters; wrapped where the vector is periodic, otherwise the end polynomials serve beyond the domain.
+        Parameters; wrapped if the vector is periodic, otherwise the end polynomials continue beyond the domain.
     derivative : int
         Order of the derivative, with respect to the parameter.
     side : {"right", "left"}
@@ -30,7 +30,7 @@ def basis(kv: KnotVector, x: Array, derivative: int = 0, side: Side = "right") -
     -------
     first : ndarray (q,) of int
     values : ndarray (q, d + 1)
-        ``values[:, k]`` belongs to pole ``(first + k) mod count``.
+        ``values[:, k]`` belongs to control point ``(first + k) mod count``.
 
     Notes
     -----
@@ -51,7 +51,7 @@ def jet(kv: KnotVector, x: Array, orders: Sequence[int], side: Side = "right") -
 
 @kept(4096)
 def _remembered(kv: KnotVector, at: bytes, orders: tuple[int, ...], side: Side) -> tuple[Array, Array]:
-    """Few places are often asked for again: the samples of a seam before and after an edit."""
+    """Values at a few parameters are often needed again, as at the samples of a seam before and after an edit."""
     return _computed(kv, np.frombuffer(at), orders, side)
 
 

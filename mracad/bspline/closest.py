@@ -1,8 +1,8 @@
 """Nearest points on NURBS surfaces.
 
 Newton's method on half the squared distance, all points at once, from the nearest of a grid of points; where the
-Hessian is not positive definite the Gauss–Newton matrix takes its place.  Parameters stay within the domain (their
-components that push against its ends are held), and a step that does not come nearer is halved.
+Hessian is not positive definite, the Gauss–Newton matrix replaces it.  Parameters stay within the domain (components
+that push against its ends are fixed), and a step that does not come nearer is halved.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from mracad.bspline.surface import Net
 
 Array = np.ndarray
 _STEPS = 30
-_SEEDS = 3  # from the nearest only, a point by a thin edge may end on the wrong side of it
+_SEEDS = 3  # from the nearest alone, a point near a thin edge may end on its wrong side
 _PLACES = 100  # at least, in each direction
 
 
@@ -57,7 +57,7 @@ def feet(net: Net, points: Array, uv: Array) -> tuple[Array, Array]:
     distances : ndarray (q,)
     """
     uv, best = _descend(net, points, uv)
-    # distances say little of parameters near the least of them
+    # near their minimum, distances hardly depend on parameters
     low, high = _limits(net)
     tried = np.clip(uv + _newton(net, points, uv, low, high), low, high)
     good = np.linalg.norm(net.evaluate(tried) - points, axis=1) <= best * (1 + 1e-15)

@@ -1,4 +1,4 @@
-"""Crease lines: knot lines inside a face along which it is meant to be sharp."""
+"""Crease lines: knot lines inside a face along which it is sharp."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from mracad.bspline.surface import Net
 Array = np.ndarray
 
 KINK = math.radians(0.1)
-"""A knot line of full multiplicity is a crease line where the normal turns by more than this across it."""
+"""A knot line of full multiplicity is a crease line if the normal turns by more than this across it."""
 
 
 def crease_lines(net: Net, axis: int, visible: Array) -> frozenset[float]:
-    """Knots of full multiplicity, one at the end of a period among them, across which the normal turns by more than the
+    """Knots of full multiplicity, including one at the end of a period, across which the normal turns by more than the
     kink angle.
 
     Parameters

@@ -46,7 +46,7 @@ class Curve:
         Parameters
         ----------
         t : array_like (q,)
-            Parameters; wrapped where periodic, otherwise the end polynomials serve beyond the domain.
+            Parameters; wrapped if periodic, otherwise the end polynomials continue beyond the domain.
         derivatives : int
             Highest derivative wanted.
         side : {"right", "left"}
@@ -117,7 +117,7 @@ def check_weights(weights: Array | None, shape: tuple[int, ...]) -> None:
 
 
 def homogeneous(poles: Array, weights: Array | None) -> Array:
-    """``(w P, w)``, or the poles themselves."""
+    """``(w P, w)``, or the control points themselves."""
     if weights is None:
         return poles
     return np.concatenate([poles * weights[..., None], weights[..., None]], axis=-1)

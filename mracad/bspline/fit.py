@@ -1,4 +1,4 @@
-"""Splines that take given values at the Greville points, and knots divided until they do between them, too."""
+"""Splines with given values at the Greville points, and spans divided until they also fit between them."""
 
 from __future__ import annotations
 
@@ -16,22 +16,22 @@ Knots = tuple[KnotVector, KnotVector]
 """In u and v."""
 
 Sites = Sequence[tuple[Array, Array]]
-"""For each direction: parameters, and the spans of that direction that they are in."""
+"""For each direction: parameters, and the spans that contain them."""
 
 SPARE = 1.5
-"""Spans are not divided that are at most so many times as wide as they need be."""
+"""Spans at most so many times as wide as necessary are not divided."""
 
 ROUNDS, PIECES = 5, 6
-"""Times that spans are divided, and into how many pieces at most each time."""
+"""Times that spans are divided, and the most pieces each time."""
 
 
 def interpolated(u: KnotVector, v: KnotVector, values: Array) -> Array:
-    """Poles ``(nu, nv, k)`` of the polynomial surface with ``values`` at the Greville points of both knot vectors."""
+    """Control points ``(nu, nv, k)`` of the polynomial surface with ``values`` at the Greville points of both."""
     return np.asarray(_solver(v).solve(_solver(u).solve(values, 0), 1))
 
 
 def through(net: Net, values: Array) -> Array:
-    """Control points ``(nu, nv, k)`` over the knots, and with the weights, of a net that take values at its Greville
+    """Control points ``(nu, nv, k)`` over the knots, and with the weights, of a net that give values at its Greville
     points."""
     if net.weights is None:
         return interpolated(net.u, net.v, values)
@@ -43,7 +43,7 @@ def through(net: Net, values: Array) -> Array:
 def divided(
     knots: tuple[KnotVector, KnotVector], more: Callable[..., Sequence[Array]]
 ) -> tuple[KnotVector, KnotVector]:
-    """Knots with those that ``more`` asks for, a few times over."""
+    """Knots with those that ``more`` adds, repeated a few times."""
     for _ in range(ROUNDS):
         extra = more(knots)
         if not any(map(len, extra)):
@@ -53,7 +53,7 @@ def divided(
 
 
 def offsets_over(net: Net, knots: Knots, poles: Array) -> Net:
-    """Control points over finer knots of a surface as a surface of offsets."""
+    """The surface of offsets with given control points over finer knots of a surface."""
     return Net(*knots, poles, net.over(*knots).weights)
 
 
@@ -76,9 +76,9 @@ def missing(
     ideal : callable
         The displacement ``(q, 3)`` at parameters.
     limit : float
-        By how much they may miss it, mm.
+        Allowed error, mm.
     least : pair of float
-        Width of spans in u and v that are narrow enough, mm.
+        Least width of spans in u and v, mm.
     """
     more = []
     for axis, (kv, (uv, span)) in enumerate(zip((delta.u, delta.v), sites, strict=True)):
@@ -94,19 +94,19 @@ def spans(kv: KnotVector, x: Array) -> Array:
 
 
 def split(kv: KnotVector, span: Array, missed: Array, speed: Array, least: float) -> Array:
-    """Knots that divide spans until they miss nothing, none narrower than need be.
+    """Knots that divide spans until their errors are allowed, none narrower than necessary.
 
     Parameters
     ----------
     kv : KnotVector
     span : ndarray (q,) of int
-        Of points in them.
+        Spans of the points.
     missed : ndarray (q,)
-        By how much the points are off, as a multiple of what they may be.
+        Errors of the points, over the allowed error.
     speed : ndarray (q,)
         Length by parameter there.
     least : float
-        Width that is narrow enough, mm.
+        Least width of a span, mm.
     """
     worst, fastest = np.zeros(kv.spans), np.zeros(kv.spans)
     np.maximum.at(worst, span, missed)

@@ -13,7 +13,7 @@ from mracad.bspline.surface import Net, surface_quotient
 Array = np.ndarray
 
 ORDERS = ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))
-"""Derivatives, by how often they are taken along u and v, in the order in which they are given."""
+"""Orders of the derivatives along u and v, in the order in which they are given."""
 
 
 def functions(

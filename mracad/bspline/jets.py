@@ -14,15 +14,15 @@ from mracad.bspline.surface import Net
 Array = np.ndarray
 
 ORDERS = ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2), (3, 0), (2, 1), (1, 2), (0, 3))
-"""Derivatives, by how often they are taken along u and v, in the order in which they are given."""
+"""Orders of the derivatives along u and v, in the order in which they are given."""
 
 
 _BLOCK = 8192
-"""Points that are gone through at once: what is computed of them fits the processor's cache."""
+"""Points that are processed at once: their figures fit the processor's cache."""
 
 
 def jets(net: Net, u: Array, v: Array, mask: Array, centre: Array, most: int = 3) -> Array:
-    """Points and derivatives at the products of parameters that a mask takes.
+    """Points and derivatives at the pairs of parameters that a mask selects.
 
     Parameters
     ----------
@@ -31,14 +31,14 @@ def jets(net: Net, u: Array, v: Array, mask: Array, centre: Array, most: int = 3
         Parameters; each piece lies in one knot span.
     mask : ndarray of bool (u.size, v.size)
     centre : ndarray (3,)
-        Points are given relative to it: what is close to the origin keeps more digits.
+        Points are given relative to it: numbers near 0 keep more digits.
     most : {1, 2, 3}
         Highest order.
 
     Returns
     -------
     ndarray (10, 3, q)
-        By ``ORDERS``, as many as the highest order asks, coordinate and point, v slowest.
+        By ``ORDERS`` up to the highest order, coordinate and point, v slowest.
     """
     return np.concatenate(list(blocks(net, u, v, mask, centre, most)), axis=2)
 

@@ -25,7 +25,7 @@ class KnotVector:
         Flat, non-decreasing, knots repeated as often as their multiplicity.  The domain is ``[t_d, t_n]`` with
         ``n = len(knots) - d - 1``; knots beyond it only shape the first and last functions (unclamped ends).
         A periodic vector is laid out as by OCCT's ``BSplCLib::KnotSequence``: with ``m`` the multiplicity of the
-        end knot it holds ``count + (d + 1 - m) + d + 1`` knots, and extended function ``i`` belongs to pole
+        end knot it holds ``count + (d + 1 - m) + d + 1`` knots, and extended function ``i`` belongs to control point
         ``i mod count``.
     degree : int
         At least 1.
@@ -42,7 +42,7 @@ class KnotVector:
     multiplicities : ndarray (s + 1,) of int
         Of each break.  For a periodic vector the last entry repeats the first.
     count : int
-        Dimension of the space, the number of poles.
+        Dimension of the space, the number of control points.
 
     Raises
     ------
@@ -192,7 +192,7 @@ class KnotVector:
         -------
         span : ndarray of int
             Index ``k`` in ``knots`` of the non-empty span that holds ``x``: ``t_k ≤ x < t_{k+1}``, or
-            ``t_k < x ≤ t_{k+1}`` for ``side="left"``; the end spans serve what lies beyond them.
+            ``t_k < x ≤ t_{k+1}`` for ``side="left"``; the end spans also cover what lies beyond them.
         offset : ndarray
             ``x - t_k``, after wrapping.
         """
@@ -226,13 +226,13 @@ class KnotVector:
         return KnotVector(np.sort(np.concatenate([self.knots, extra])), self.degree)
 
     def beyond(self, coarse: KnotVector) -> Array:
-        """Knots, each as often as it is to be inserted, that refine ``coarse`` of the same degree to this."""
+        """Knots to insert, repeated as necessary, that refine ``coarse`` of the same degree to this."""
         place = np.minimum(np.searchsorted(coarse.breaks, self.breaks), len(coarse.breaks) - 1)
         there = np.where(coarse.breaks[place] == self.breaks, coarse.multiplicities[place], 0)
         return np.repeat(self.breaks[1:-1], (self.multiplicities - there)[1:-1])
 
     def elevated(self, degree: int) -> KnotVector:
-        """The least vector of that degree whose splines include all of this one's; itself where its degree suffices.
+        """The least vector of that degree whose splines include all of this one's; itself if its degree suffices.
 
         Every knot is repeated as many times more as the degree grows; unclamped ends become clamped ones.
         """
@@ -247,7 +247,7 @@ class KnotVector:
     def with_multiplicities(self, mults: Array) -> KnotVector:
         """This vector with the multiplicities of its breaks replaced; 0 removes a break.
 
-        The ends of a non-periodic vector stay as they are, whatever ``mults`` says of them.
+        The ends of a non-periodic vector stay as they are, whatever ``mults`` says.
         """
         counts = np.array(mults, dtype=int)
         if counts.shape != self.multiplicities.shape:
@@ -272,10 +272,10 @@ class KnotVector:
         Returns
         -------
         KnotVector
-            Itself where it is clamped or periodic.
+            Itself if it is clamped or periodic.
         (int, int)
-            The functions of this vector are all of that one's but so many first and last ones: those that vanish to
-            these orders at the ends.
+            How many first and last functions of that vector this one lacks: this one's functions vanish to these orders
+            at the ends.
         """
         if self.periodic:
             return self, (0, 0)
@@ -285,7 +285,7 @@ class KnotVector:
         return KnotVector(np.pad(self.knots, (before, after), "edge"), self.degree), (before, after)
 
     def unrolled(self) -> KnotVector:
-        """The same flat knots as a non-periodic vector: function ``i`` is pole ``i mod count`` of this one."""
+        """The same flat knots as a non-periodic vector: function ``i`` is control point ``i mod count`` of this one."""
         return KnotVector(self.knots, self.degree) if self.periodic else self
 
 

@@ -25,7 +25,7 @@ def is_nested(coarse: KnotVector, fine: KnotVector) -> bool:
 
 @kept(256)
 def refinement(coarse: KnotVector, fine: KnotVector) -> Rows:
-    """The matrix P that takes poles over ``coarse`` to the poles of the same spline over ``fine``.
+    """The matrix P that takes control points over ``coarse`` to those of the same spline over ``fine``.
 
     ``P[i, j]`` is the blossom of coarse function ``j`` at ``t_{i+1}, …, t_{i+d}`` on a piece where fine function ``i``
     lives.  The arguments enter the recursion in an order in which every term is non-negative, so entries are exact to

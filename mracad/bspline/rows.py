@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     import scipy.sparse
 
 LARGE = 200_000
-"""Number of values from which compiled sweeps pay for the import of their compiler."""
+"""Number of values above which compiled sweeps are worth importing their compiler."""
 
 
 class Rows:

@@ -63,7 +63,7 @@ class BandSolver:
         return np.asarray(np.abs(self._factor[self._below + self._above]))
 
     def solve(self, b: Array, axis: int = 0, overwrite: bool = False) -> Array:
-        """The solution of ``A x = b`` along ``axis``; it may take the place of ``b`` if ``overwrite`` says so."""
+        """The solution of ``A x = b`` along ``axis``; with ``overwrite`` it may overwrite ``b``."""
         b = np.asarray(b, dtype=float)
         if b.size >= LARGE:
             from mracad.bspline import sweeps
@@ -82,7 +82,7 @@ class BandSolver:
     def triangles(self) -> tuple[Rows, Rows, Array, Array]:
         """Strict L (unit diagonal) and strict U with ``A[rows][:, column_order] = L U``, 1 / diag U, and ``rows``."""
         n, below, reach = len(self.row_order), self._below, self._below + self._above
-        # gbtrf leaves each multiplier where the row stood at its step: follow the rows to where they end up.
+        # gbtrf leaves each multiplier in the row's place at its step: follow the rows to their final places.
         at = np.arange(n + below)
         owner = np.empty((n, below), dtype=int)
         for j, p in enumerate(self._pivots.tolist()):

@@ -64,7 +64,7 @@ class Net:
         Parameters
         ----------
         uv : array_like (q, 2)
-            Parameters; wrapped where periodic, otherwise the end polynomials serve beyond the domain.
+            Parameters; wrapped if periodic, otherwise the end polynomials continue beyond the domain.
         derivatives : {0, 1, 2}
         side : pair of {"right", "left"}
             Which limit is taken at a knot of u and of v.
@@ -142,8 +142,8 @@ class Net:
         """Unit normals ``S_u × S_v / |…|``, ``(q, 3)``.
 
         Where the surface is degenerate (a collapsed side, a cusp) the limit from the middle of the domain is taken, by
-        the second derivatives or, where those say nothing either, from a point nearby; NaN where there is none.
-        ``tangents`` are ``S_u`` and ``S_v``, where they are known.
+        the second derivatives or, if those vanish too, from a point nearby; NaN where there is none.
+        ``tangents`` are ``S_u`` and ``S_v``, if known.
         """
         uv = np.asarray(uv, dtype=float).reshape(-1, 2)
         su, sv = tangents or self.evaluate(uv, 1, side)[1:]
@@ -183,7 +183,7 @@ class Net:
         return self.over(self.u.refined(u_knots), self.v.refined(v_knots))
 
     def over(self, u: KnotVector, v: KnotVector) -> Net:
-        """The same surface over finer knot vectors, or such of higher degree, exactly; itself over its own."""
+        """The same surface over finer knot vectors, or ones of higher degree, exactly; itself over its own."""
         if (u, v) == (self.u, self.v):
             return self
         poles = homogeneous(self.poles, self.weights)

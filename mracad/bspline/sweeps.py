@@ -16,7 +16,7 @@ from mracad.bspline.rows import Rows
 
 _LINES = 48
 _UNROLL = 4
-# One signature a kernel, so that each is compiled once, and kept on disk.  Lines come as flat memory and its layout:
+# One signature per kernel, so that each is compiled once and cached on disk.  Lines come as flat memory and its layout:
 # sizes (before, along, after) and the steps of the first two; a band as its taps, and where each row of them begins or
 # ends.
 _REAL = types.Array(types.float64, 1, "C", readonly=True)
@@ -56,7 +56,7 @@ def combine(matrix: Rows, columns: Array, rows: Array, coarse: Array, detail: Ar
 
 
 def solve(triangles: tuple[Rows, Rows, Array, Array], columns: Array, b: Array, axis: int, out: Array) -> None:
-    """``L U out[columns] = b[rows]`` along ``axis``, which may take the place of ``b``.
+    """``L U out[columns] = b[rows]`` along ``axis``; ``out`` may be ``b``.
 
     The triangles come as strict L and U, one over the diagonal of U, and ``rows``.
     """
@@ -82,7 +82,7 @@ def _lines(c: Array, axis: int) -> _Lines:
 
 
 def _target(out: Array, axis: int) -> _Lines:
-    """The same of an array that is to be written to."""
+    """The same for an array to be written to."""
     flat, layout = _lines(out, axis)
     if not np.may_share_memory(flat, out):
         raise ValueError("results cannot be written to an array of this layout")
@@ -90,7 +90,7 @@ def _target(out: Array, axis: int) -> _Lines:
 
 
 def _padded(values: Array) -> tuple[Array, Array]:
-    """Runs as wide as a multiple of the unrolling, and how far each has to be followed."""
+    """Runs padded to a multiple of the unrolling, and the used length of each."""
     taps = np.pad(values, ((0, 0), (0, -values.shape[1] % _UNROLL)))
     length = taps.shape[1] - np.argmax(taps[:, ::-1] != 0, axis=1)
     return taps, -(-length // _UNROLL) * _UNROLL

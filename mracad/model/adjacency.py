@@ -1,11 +1,11 @@
 """Free edges that coincide: the seams of a model whose faces were never sewn.
 
-Each edge is known at samples with unit tangents; between two samples it is taken as the cubic Hermite arc, which is
-off by the fourth power of the step.  An edge belongs to another when all of its samples lie on the other's arcs.
+Each edge is known at samples with unit tangents; between two samples it is the cubic Hermite arc, whose error is of
+fourth order in the step.  An edge coincides with another if all of its samples lie on the other's arcs.
 
-How near that is depends on the model alone, so that a model means the same at every size: within the tolerances that
-the edges themselves have, or a share of the edge and of the model, whichever is less (:func:`reach`).  Parts that
-stand once and in the same place (the roots of an IGES file, the products of many a STEP file) are one space.
+The distance for that depends on the model alone, so that its size does not matter: the tolerances of the edges, or a
+share of the edge and of the model, whichever is less (:func:`reach`).  Parts that stand once and in the same place (the
+roots of an IGES file, the products of many STEP files) share one space.
 """
 
 from __future__ import annotations
@@ -22,16 +22,16 @@ from mracad.model.sampling import length as polygon
 Array = np.ndarray
 
 GAP = 1.0
-"""How far apart, in units of :func:`reach`, free edges of different faces are taken for a seam."""
+"""Distance, in units of :func:`reach`, within which free edges of different faces count as a seam."""
 
 TORN = 5.0
-"""How far apart, in the same units, two free edges are told to be one that was torn open."""
+"""Distance, in the same units, within which two free edges count as a torn seam."""
 
 OF_MODEL, OF_EDGE, PRECISION = 1e-4, 2e-3, 1e-6
-"""Shares of the diagonal and of the length of an edge, and the share of the diagonal that numbers are good for."""
+"""Shares of the diagonal and of the length of an edge, and the precision of coordinates as a share of the diagonal."""
 
 BEYOND = 0.125
-"""Share of the first and last steps by which an edge goes on beyond its samples."""
+"""Share of the first and last steps by which an edge continues beyond its samples."""
 
 
 def reach(model: Model, edge: Edge, other: Edge) -> float:
@@ -44,7 +44,7 @@ def coinciding(model: Model, gap: float = GAP) -> list[tuple[Edge, Edge, tuple[S
     """Seams of free edges within ``gap`` times their :func:`reach` of each other: an edge, the other one, and the sides
     of both faces at the places of the first.
 
-    Where one edge is a part of the other (a T-junction) the shorter one comes first.
+    Where one edge is part of the other (a T-junction) the shorter one comes first.
     """
     free = [e for e in model.edges if e.free and len(e.points) > 1]
     found: dict[tuple[int, int], tuple[Edge, Edge, tuple[Side, Side]]] = {}
@@ -61,7 +61,7 @@ def coinciding(model: Model, gap: float = GAP) -> list[tuple[Edge, Edge, tuple[S
 
 
 def touching(model: Model) -> frozenset[int]:
-    """Free edges that coincide, where they stand, with one of another instance, whose numbers are in another space."""
+    """Free edges that coincide in space with one of another instance, whose coordinates are in another space."""
     if len(set(model.spaces)) < 2 and all(len(frames) == 1 for frames in model.places):
         return frozenset()
     free = [

@@ -1,8 +1,8 @@
 """The box of a trimmed NURBS face itself, which may be far smaller than that of its control points.
 
 Each coordinate has its extremes on the boundary, or inside where its gradient vanishes.  The boundary is known from
-its edges; inside, the best points of a grid are sharpened by Newton's method.  Where the box of the control points goes
-no further than the boundary, nothing inside has to be looked at.
+its edges; inside, the best points of a grid are refined by Newton's method.  Where the box of the control points does
+not exceed the boundary's, the inside is skipped.
 """
 
 from __future__ import annotations
@@ -20,20 +20,20 @@ from mracad.model.sampling import between, hermite, slopes
 Array = np.ndarray
 
 CLOSE = 1e-6
-"""Share of a face's size that its box may miss."""
+"""Error allowed of a face's box, as a share of the face's size."""
 
 PER_SPAN, MOST = 2, 64
-"""Grid lines in a span, and about the most of them in all, in either direction."""
+"""Grid lines per span, and about the most in all, in either direction."""
 
 STEPS = 4
-"""Of Newton's method."""
+"""Steps of Newton's method."""
 
-_FEW = 16  # knots of an edge that its samples do justice to
+_FEW = 16  # most knots of an edge that its samples resolve
 
 
 def rims(edges: Sequence[Edge]) -> list[Array]:
-    """The box (2, 3) of each edge between its first and last samples, in its part's frame; an empty one for those that
-    have none."""
+    """The box (2, 3) of each edge between its first and last samples, in its part's frame; empty for edges without
+    samples."""
     result = [np.array([np.full(3, np.inf), np.full(3, -np.inf)])] * len(edges)
     shown = [k for k, edge in enumerate(edges) if len(edge.points)]
     if shown:
@@ -52,11 +52,11 @@ def box(face: Face, net: Net, rim: Array, outer: Array, slack: float = 0.0) -> A
     net : Net
         Its surface.
     rim : ndarray (2, 3)
-        That of its edges, by :func:`rims`, and vertices.
+        The box of its edges, by :func:`rims`, and vertices.
     outer : ndarray (2, 3)
-        One around its control points: nothing of the face is beyond.
+        A box around its control points, which contains the face.
     slack : float
-        What it may miss, mm, beside ``CLOSE`` of the face's size.
+        Allowed error, mm, besides ``CLOSE`` of the face's size.
     """
     slack = max(slack, CLOSE * float(np.linalg.norm(outer[1] - outer[0])))
     if np.abs(outer - rim).max() > slack:
@@ -87,7 +87,7 @@ def box(face: Face, net: Net, rim: Array, outer: Array, slack: float = 0.0) -> A
 
 
 def _with_long(face: Face, net: Net, rim: Array) -> Array:
-    """The box of the boundary with what edges of many spans do between their samples."""
+    """The box of the boundary, with edges of many spans also between their samples."""
     long = [trim.curve for trim in face.trims if len(trim.curve.knots.breaks) > _FEW]
     if not long:
         return rim

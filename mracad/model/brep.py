@@ -74,7 +74,7 @@ class Face:
         ``"bspline"``, ``"bezier"``, ``"plane"``, ``"cylinder"``, ``"cone"``, ``"sphere"``, ``"torus"``,
         ``"extrusion"``, ``"revolution"``, ``"offset"``, ``"other"``.
     surface : int or None
-        Index in ``Model.surfaces`` of a NURBS face; None for a face that stays as it is.
+        Index in ``Model.surfaces`` of a NURBS face; None for any other face, which never changes.
     trims : tuple of Trim
         The boundary, one entry per use of an edge (two for a closing edge); empty unless ``surface`` is set.
     reversed : bool
@@ -82,8 +82,8 @@ class Face:
     frame : ndarray (4, 4)
         Rigid map from the surface's frame to the part's.
     box : ndarray (2, 3)
-        Lowest and highest corner of what is around its control points in the part's frame, mm; ``face_boxes`` of
-        ``occ.boxes`` has that of the face itself.
+        Lowest and highest corner of its control points' box in the part's frame, mm; ``face_boxes`` of ``occ.boxes``
+        gives that of the face itself.
     instances : int
         How often the part stands in the document.
     """
@@ -215,7 +215,7 @@ class Model:
 
     @cached_property
     def spaces(self) -> tuple[int, ...]:
-        """By part, which space its numbers are in: parts that stand once and in the same place have one in common."""
+        """By part, the space of its coordinates: parts that stand once and in the same place share one."""
         first: dict[bytes, int] = {}
         bases = [
             first.setdefault((frames[0].round(SAME) + 0.0).tobytes(), part) if len(frames) == 1 else part

@@ -20,12 +20,12 @@ PIECES = 4
 """Fewest pieces into which the extent of a trimmed face is divided in either direction."""
 
 ENOUGH = 16
-"""Fewest quadrature points on a face; pieces are halved until it has them, up to ``HALVINGS`` times."""
+"""Fewest quadrature points on a face; pieces are halved until it has so many, up to ``HALVINGS`` times."""
 
 HALVINGS = 5
 
 ASIDE = 1e-3
-"""How far inside a piece, as a fraction of it, a point on its end is taken to lie: boundaries run along ends."""
+"""Fraction of a piece by which points on its ends are moved inside, because boundaries run along ends."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +42,7 @@ class Quadrature:
     wu, wv : ndarray (pieces, points)
         Weights, in parameter units.
     mask : ndarray of bool (pieces_u · points_u, pieces_v · points_v)
-        Which products of them lie on one of the faces.
+        Which of their pairs lie on one of the faces.
     """
 
     u: Array
@@ -53,12 +53,12 @@ class Quadrature:
 
     @property
     def weights(self) -> Array:
-        """Weights of all products of parameters, zero off the faces, shaped as ``mask``."""
+        """Weights of all pairs of parameters, zero off the faces, shaped as ``mask``."""
         return np.asarray(self.wu.reshape(-1, 1) * self.wv.reshape(-1) * self.mask)
 
 
 def inside_grid(face: Face, net: Net, u: Array, v: Array) -> Array:
-    """Which products of parameters lie on a face.
+    """Which pairs of parameters lie on a face.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ def inside_grid(face: Face, net: Net, u: Array, v: Array) -> Array:
     Returns
     -------
     ndarray of bool (nu, nv)
-        What lies on the box around the boundary within 1e-7 of the domain is on the face if what is beside it is.
+        A point on the box around the boundary, within 1e-7 of the domain, is on the face if a point beside it is.
     """
     u, v = np.asarray(u, dtype=float), np.asarray(v, dtype=float)
     shape = outline(face, net)
@@ -103,7 +103,7 @@ def quadrature(
 
     Notes
     -----
-    Exact over natural faces and others bounded by parameter lines; elsewhere the boundary is followed by whole points.
+    Exact over faces bounded by parameter lines; elsewhere points count as wholly inside or outside the boundary.
     """
     shapes = [outline(face, net) for face in faces]
     for halvings in range(HALVINGS + 1):

@@ -24,7 +24,7 @@ class Offset:
     u_knots, v_knots : ndarray
         Knots to insert first (with repetition), beyond those the (elevated) surface has; empty for none.
     degrees : (int, int)
-        Degrees in u and v to which the surface is elevated before that; as it is where its own is no lower.
+        Degrees in u and v to which the surface is elevated before that, unless its own are higher.
     """
 
     poles: Array
@@ -54,7 +54,7 @@ class Offset:
 
 @dataclass(frozen=True, eq=False)
 class Displacement:
-    """What an edit does: pole offsets by surface index.  Surfaces that are not named do not move."""
+    """The result of an edit: offsets of control points by surface index.  Surfaces that are not named do not move."""
 
     offsets: dict[int, Offset] = field(default_factory=dict)
 

@@ -1,4 +1,4 @@
-"""What is found out about a document, in numbers and words: the kernel room makes it, and all others judge by it."""
+"""Facts about a document, in numbers and words: the kernel room makes them, and all others judge by them."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Failure:
 
 @dataclass(frozen=True)
 class Validity:
-    """What the kernel says of a document; a part that is instanced counts once.
+    """The kernel's verdict on a document; a part that is instanced counts once.
 
     Attributes
     ----------
@@ -67,7 +67,7 @@ class Validity:
 
 @dataclass(frozen=True)
 class Occurrence:
-    """One part, assembly or instance where it stands in the whole.
+    """One part, assembly or instance in its place in the document.
 
     Attributes
     ----------
@@ -85,7 +85,7 @@ class Occurrence:
 
 @dataclass(frozen=True, order=True)
 class Carrier:
-    """What carries an attribute: a product, one of its components, or something inside it.
+    """The carrier of an attribute: a product, one of its components, or something inside it.
 
     Attributes
     ----------
@@ -105,7 +105,7 @@ class Carrier:
 
 @dataclass(frozen=True)
 class Contents:
-    """What a document says beyond geometry.
+    """The content of a document beyond geometry.
 
     Attributes
     ----------
@@ -113,7 +113,7 @@ class Contents:
     products : tuple of str
         Of every part and assembly.
     usages : int
-        How often some product is used in an assembly definition.
+        Number of uses of products in assembly definitions.
     tree : tuple of Occurrence
     colours : tuple of (Carrier, str, str)
         Where, of what, ``"#rrggbb"`` or ``"#rrggbbaa"``; sorted.
@@ -122,7 +122,7 @@ class Contents:
     materials : tuple of (Carrier, float)
         Where, and the density as the kernel gives it; sorted.
     annotations : dict of str to int
-        How many ``"dimensions"``, ``"tolerances"`` and ``"datums"`` there are.
+        Number of ``"dimensions"``, ``"tolerances"`` and ``"datums"``.
     """
 
     unit: str
@@ -197,7 +197,7 @@ class Stated:
     centres : tuple of (float, float, float)
         Of the vertices of each face, in the file's unit.
     senses : tuple of (bool or None)
-        Whether each face looks as its surface does; None where that is not stated.
+        Whether each face has the orientation of its surface; None if that is not stated.
     broken : tuple of str
         Entities that could not be understood, at most a hundred: their place in the file and the reason.
     """
@@ -212,7 +212,7 @@ class Stated:
 
 @dataclass(frozen=True)
 class Counts:
-    """How many there are, all instances counted."""
+    """Numbers of shapes, all instances counted."""
 
     solids: int
     shells: int
@@ -222,12 +222,12 @@ class Counts:
 
 @dataclass(frozen=True, eq=False)
 class Line:
-    """An edge at a few places.
+    """An edge at a few points.
 
     Attributes
     ----------
     faces : tuple of int
-        Those that use it, once for each use.
+        Faces that use it, once for each use.
     points : ndarray (1 + n, k, 6)
         Points of its own curve and of each face along it, in the part's frame, mm; and the unit normals of the
         surfaces there (for the curve zero).
@@ -241,7 +241,7 @@ class Line:
 
 
 class Probe(Protocol):
-    """Measures that are taken only where something differs; see :class:`mracad.occ.facts.KernelProbe`."""
+    """Measurements taken only where something differs; see :class:`mracad.occ.facts.KernelProbe`."""
 
     def validity(self) -> Validity: ...
 
@@ -256,7 +256,7 @@ class Probe(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Facts:
-    """What is known of a document, in memory or as read back.
+    """Facts about a document, in memory or as read back.
 
     Attributes
     ----------
@@ -266,13 +266,13 @@ class Facts:
     spots : ndarray (p, 9)
         Where each placed face is: corners of its box, middle of its vertices, mm.
     owners : ndarray of int (p,)
-        The face that each of them is.
+        The face of each spot.
     closing : frozenset of int
-        Faces on surfaces that close, without a closing edge: the others do not tell which side of them is meant.
+        Faces on closed surfaces without a closing edge: their edges do not tell which side of them is meant.
     vertices : ndarray (f,)
         The largest tolerance among the vertices of each face, mm.
     edges : tuple of Line
-        All that are not degenerate or, where they are, have no faces.
+        All edges, except degenerate ones that have faces.
     probe : Probe
     """
 

@@ -53,7 +53,7 @@ class Outline:
         return np.array([points.min(axis=0), points.max(axis=0)])
 
     def lines(self, axis: int) -> Array:
-        """Where a good part of the boundary is a line ``u = const`` (axis 0) or ``v = const`` (axis 1)."""
+        """Places where a large part of the boundary is a line ``u = const`` (axis 0) or ``v = const`` (axis 1)."""
         low, high = self.box
         steps = np.abs(self.chords[:, 1] - self.chords[:, 0])
         straight = steps[:, axis] <= MARGIN * (high - low)[axis]
@@ -113,7 +113,7 @@ def _flattened(curves: Sequence[Curve], spans: Array) -> tuple[Array, Array]:
 def _chord_counts(points: Array, tolerance: Array) -> Array:
     """How many chords keep homogeneous Bézier pieces ``(q, p + 1, 3)`` within the tolerance.
 
-    Wang's bound ``max |Δ²P| p (p − 1) / 8 n²``; for rational pieces, about the middle of their control points, that of
+    Wang's bound ``max |Δ²P| p (p − 1) / 8 n²``; for rational pieces, around the middle of their control points, that of
     Zheng and Sederberg.
     """
     degree = points.shape[1] - 1
@@ -172,7 +172,7 @@ def _loops(ends: Array, lengths: Array, periods: Array) -> list[list[int]]:
 
 
 def _partners(points: Array, periodic: Array) -> Array:
-    """The end that follows on each end: rounds of mutual nearest neighbours, by whole periods only where need be."""
+    """The end that follows each end: rounds of mutual nearest neighbours, by whole periods only if necessary."""
     apart = points[:, None] - points
     distance = np.linalg.norm(apart, axis=2)
     if periodic.any():
@@ -189,7 +189,7 @@ def _partners(points: Array, periodic: Array) -> Array:
 
 
 def _closed(ends: Array, loops: list[list[int]], periods: Array) -> tuple[Array, Array, tuple[bool, bool]]:
-    """What makes loops continuous.
+    """Shifts and chords that make loops continuous.
 
     Returns
     -------
@@ -217,7 +217,7 @@ def _closed(ends: Array, loops: list[list[int]], periods: Array) -> tuple[Array,
 
 
 def _gathered(chords: Array, owners: Array, loops: list[list[int]], periods: Array) -> Array:
-    """The chords with every loop moved by whole periods to lie about the widest one."""
+    """The chords with every loop moved by whole periods to lie around the widest one."""
     loop_of = np.empty(owners.max() + 1, dtype=int)
     for number, loop in enumerate(loops):
         loop_of[np.array(loop) // 2] = number

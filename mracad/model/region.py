@@ -20,7 +20,7 @@ MARGIN = 1e-9
 """Fraction of the domain within which a curve counts as lying on a knot line."""
 
 DEPTH = 24
-"""Most halvings of one Bézier piece on the walk over the knot grid."""
+"""Most halvings of one Bézier piece in the walk over the knot grid."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,9 +30,9 @@ class Region:
     Attributes
     ----------
     inside : ndarray of bool (cells_u, cells_v)
-        Cells of which some part belongs to the face, those that its boundary crosses among them.
+        Cells that overlap the face, including those that its boundary crosses.
     crossed : tuple of ndarray of bool (cells_u, cells_v)
-        Per boundary curve, the cells that it may pass through, never too few; both sides of a knot line it lies on.
+        Per boundary curve, all cells that it may pass through; both sides of a knot line it lies on.
     """
 
     inside: Array
@@ -120,7 +120,7 @@ def _halved(points: Array) -> Array:
 
 
 def _wrapped(knots: KnotVector, x: Array) -> tuple[Array, Array]:
-    """Parameters moved into the period of a periodic direction, and by how much they were moved."""
+    """Parameters moved into the period of a periodic direction, and the shifts."""
     if not knots.periodic:
         return x, np.zeros_like(x)
     start, end = knots.domain

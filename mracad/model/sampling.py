@@ -1,4 +1,4 @@
-"""The law by which edges are sampled."""
+"""The sampling of edges."""
 
 from __future__ import annotations
 

@@ -66,17 +66,17 @@ def wavelets(coarse: KnotVector, fine: KnotVector, vanish: tuple[int, int] = (0,
         Nested, with any multiplicities.
     vanish : pair of int
         Work in the splines that vanish to this order at the start and at the end of the domain: so many functions
-        are left out there in both spaces, and rows of Q count from the first one that is left.
+        are left out there in both spaces, and rows of Q count from the first remaining one.
 
     Returns
     -------
     Columns (n, n − m)
-        n and m without what ``vanish`` leaves out.
+        n and m without the functions that ``vanish`` leaves out.
 
     Raises
     ------
     UsageError
-        Knots not nested, or more functions to vanish than there are.
+        Knots not nested, or not enough functions for ``vanish``.
 
     Notes
     -----
@@ -136,7 +136,7 @@ def _staircase(coarse: KnotVector, fine: KnotVector, vanish: tuple[int, int]) ->
 
 
 def _turns(kv: KnotVector, begin: int, end: int) -> Array:
-    """Knots ``begin … end − 1`` of the periodic vector continued for ever both ways."""
+    """Knots ``begin … end − 1`` of the periodic vector continued both ways."""
     seam = kv.degree + 1 - int(kv.multiplicities[0])
     turn, place = np.divmod(np.arange(begin, end) - seam, kv.count)
     values = np.repeat(kv.breaks[:-1], kv.multiplicities[:-1])[place] + turn * kv.period
@@ -192,7 +192,7 @@ def _energy(g: Gram, q: Array, column: Array) -> Array:
 
 
 def _dense(p: Rows, g: Gram) -> Array:
-    """All wavelets as rows, where supports would wrap round a short loop: the null space of the whole of ``PᵀG``."""
+    """All wavelets as rows, if supports would wrap round a short loop: the null space of the whole ``PᵀG``."""
     scale = 1.0 / np.sqrt(g.diagonal())
     matrix = g.apply(p.toarray()).T * scale
     q = np.linalg.svd(matrix)[2][p.columns :] * scale

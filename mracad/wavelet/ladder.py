@@ -30,14 +30,14 @@ def rungs_by_level(
     keep : set of float, or boolean mask (spans + 1,)
         Breaks that stay on every rung with all their multiplicity.
     lengths : array_like (spans,), optional
-        Arc length of each span, mm; where not given, parameters serve and ``tolerance`` does not apply.
+        Arc length of each span, mm; if not given, parameters are used and ``tolerance`` does not apply.
     tolerance : float
         Breaks closer than this (mm), or than 1e-6 of the whole, count as one knot.
 
     Returns
     -------
     list of KnotVector
-        ``kv`` first.  Where there are multiple knots or clusters, the second rung makes all of them simple.
+        ``kv`` first.  If there are multiple knots or clusters, the second rung makes all of them simple.
         The last has no free interior knots; a periodic one keeps its end knot and at least ``max(d + 1, 3)`` spans.
     """
     if lengths is None:
@@ -60,13 +60,13 @@ def ladder_for_scale(
     keep: AbstractSet[float] | Array = frozenset(),
     tolerance: float = 1e-4,
 ) -> KnotVector:
-    """The coarse knot vector for a scale, which is a wavelength: ripples of up to half of it go, those of three times
-    it stay.
+    """The coarse knot vector for a scale, which is a wavelength: ripples up to half of it go, those of three times it
+    stay.
 
-    Alternate knots are dropped, sweep by sweep, wherever the span that is left stays shorter than ``scale``, so that
+    Alternate knots are dropped, sweep by sweep, wherever the merged span stays shorter than ``scale``, so that
     knots end up ``scale / 2`` to ``scale`` apart: the projection onto spacing H removes wavelengths below 1.5 H and
-    keeps those above 2.5 H.  A knot of multiplicity r is as fine as r knots: where the spans beside it are on average
-    below ``scale`` it becomes simple, elsewhere it keeps at most three copies a ``scale``.
+    keeps those above 2.5 H.  A knot of multiplicity r is as fine as r knots: if the spans beside it average below
+    ``scale`` it becomes simple, otherwise it keeps at most three copies per ``scale``.
 
     Parameters
     ----------
@@ -83,12 +83,12 @@ def ladder_for_scale(
     Returns
     -------
     KnotVector
-        ``kv`` itself where nothing in it is finer than the scale.
+        ``kv`` itself if nothing in it is finer than the scale.
 
     Notes
     -----
-    Lengths are compared in whole millionths of the scale and ties go by the place counted from both ends, so that
-    neither rotating, scaling nor reversing the model selects other knots.
+    Lengths are compared in whole millionths of the scale, and ties are broken by the position from both ends, so that
+    rotating, scaling or reversing the model selects the same knots.
     """
     if not scale > 0:
         raise UsageError(f"scale {scale} is not positive")
@@ -109,7 +109,7 @@ def finest_scale(
     keep: AbstractSet[float] | Array = frozenset(),
     tolerance: float = 1e-4,
 ) -> float:
-    """The least scale for which :func:`ladder_for_scale` finds a coarser knot vector, mm; 0 where there is none.
+    """The least scale for which :func:`ladder_for_scale` finds a coarser knot vector, mm; 0 if there is none.
 
     The parameters are those of :func:`ladder_for_scale`.
     """
@@ -123,7 +123,7 @@ def finest_scale(
     stays = ladder.kept.copy()
     stays[[0, -1]] |= not kv.periodic
     cut = (total > 1) & ~np.logical_and.reduceat(stays, ladder.first)
-    # a cluster goes as a whole, or is cut down to one knot or to three a scale
+    # a cluster goes as a whole, or is reduced to one knot or to three per scale
     scales = np.concatenate([beside[~ladder.fixed], beside[cut] / 2, 1.5 * (beside / total)[cut & (total > 3)]])
     if not kv.periodic:
         return float(scales.min()) if len(scales) else 0.0
@@ -158,7 +158,7 @@ def arc_lengths(net: Net, direction: int) -> Array:
 
 
 class _Ladder:
-    """Clusters of breaks that are still there.
+    """The remaining clusters of breaks.
 
     Attributes
     ----------
@@ -194,18 +194,18 @@ class _Ladder:
         self.spans = np.rint(ratio * _RESOLUTION).astype(np.int64)
 
     def sensible(self, clusters: int) -> bool:
-        """Whether a space with so many clusters is worth having: a loop needs some spans."""
+        """Whether a space with so many clusters is useful: a loop needs some spans."""
         return not self.kv.periodic or clusters > max(self.kv.degree + 1, 3)
 
     def beside(self) -> Array:
-        """Sum of the spans before and after each cluster; at the ends twice the one there is (a loop goes on)."""
+        """Sum of the spans before and after each cluster; at the ends twice the only one (a loop continues)."""
         before, after = np.append(self.spans[0], self.spans), np.append(self.spans, self.spans[-1])
         if self.kv.periodic:
             before[0], after[-1] = self.spans[-1], self.spans[0]
         return np.asarray(before + after)
 
     def drop(self, candidate: Array) -> bool:
-        """Remove alternate clusters of each run of candidates; say whether any went."""
+        """Remove alternate clusters of each run of candidates; return whether any went."""
         gone = _alternate(candidate & ~self.fixed[self.alive], np.append(0, np.cumsum(self.spans)))
         if len(self.alive) < 2 or not gone.any() or not self.sensible(int(np.count_nonzero(~gone))):
             return False
@@ -214,7 +214,7 @@ class _Ladder:
         return True
 
     def thinned(self, copies: Array) -> KnotVector:
-        """The knot vector with the clusters that are left, those of more than ``copies`` knots cut down to that."""
+        """The knot vector with the remaining clusters, of at most ``copies`` knots each."""
         here = np.zeros(len(self.first), dtype=bool)
         here[self.alive] = True
         mults = np.where(np.repeat(here, self.last - self.first + 1), self.kv.multiplicities, 0)

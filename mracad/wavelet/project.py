@@ -19,13 +19,13 @@ from mracad.errors import UsageError
 from mracad.memo import kept
 from mracad.wavelet.ladder import arc_lengths, ladder_for_scale
 
-_SMALL = 256  # poles up to which the dense operator is as quick, and spares loading LAPACK's banded solvers
+_SMALL = 256  # control points up to which the dense operator is as fast, and avoids loading LAPACK's banded solvers
 _TAME = 1e3
 _LOW_DEGREE = 5
 
 
 class Projection:
-    """``c' = argmin ∫ (B c − B' c')² w dt``.  Get it from :func:`projection`, which keeps it factored.
+    """``c' = argmin ∫ (B c − B' c')² w dt``.  Get it from :func:`projection`, which caches its factors.
 
     Attributes
     ----------
@@ -46,7 +46,7 @@ class Projection:
 
     @cached_property
     def _normal(self) -> tuple[BandSolver, Array] | None:
-        """Factored normal equations ``PᵀGP`` and their scaling, or None where they would lose too many digits."""
+        """Factored normal equations ``PᵀGP`` and their scaling, or None if they would lose too many digits."""
         if self._fine.degree > _LOW_DEGREE or self._fine.count <= _SMALL:
             return None
         span, values, weight = self._coarse_at_fine()
@@ -107,7 +107,7 @@ class Projection:
         return span, values.reshape(-1, *offset.shape), weight
 
     def coarse(self, c: Array, axis: int = 0) -> Array:
-        """Coarse poles of the projection of poles ``c`` along ``axis``; ``c`` itself where the spaces are the same."""
+        """Coarse control points of the projection of ``c`` along ``axis``; ``c`` itself if the spaces are the same."""
         c = np.asarray(c, dtype=float)
         if c.shape[axis] != self.fine_knots.count:
             raise UsageError(
@@ -119,7 +119,7 @@ class Projection:
         return np.asarray(self._solved(c - middle, axis) + middle)
 
     def apply(self, c: Array, axis: int = 0) -> Array:
-        """Poles, over the fine knots, of the projection of poles ``c`` along ``axis``."""
+        """Control points, over the fine knots, of the projection of ``c`` along ``axis``."""
         if self.coarse_knots == self.fine_knots:
             return self.coarse(c, axis)
         return self._p.apply(self.coarse(c, axis), axis)
@@ -140,7 +140,7 @@ class Projection:
 
 
 def projection(coarse: KnotVector, fine: KnotVector, weights: Array | None = None) -> Projection:
-    """The L2 projection of splines over ``fine`` onto those over ``coarse``, factored once and kept.
+    """The L2 projection of splines over ``fine`` onto those over ``coarse``, factored once and cached.
 
     ``S = P (PᵀGP)⁻¹ PᵀG``: idempotent, reproduces coarse splines, and its rows sum to 1.
 
@@ -149,7 +149,7 @@ def projection(coarse: KnotVector, fine: KnotVector, weights: Array | None = Non
     coarse, fine : KnotVector
         Nested.
     weights : array_like (spans,), optional
-        Positive factor in the inner product on each span of ``fine`` (``|S_u|``, where the parameter runs unevenly).
+        Positive factor in the inner product on each span of ``fine`` (``|S_u|``, if the parameter is uneven).
 
     Returns
     -------
@@ -170,7 +170,7 @@ def projection(coarse: KnotVector, fine: KnotVector, weights: Array | None = Non
 
 
 def at_scale(net: Net, scale: float, keep: tuple[AbstractSet[float], AbstractSet[float]] = (frozenset(),) * 2) -> Net:
-    """A net over its own knots without what is finer than a scale (mm); breaks in u and v to keep stay as they are."""
+    """A net over its own knots without detail finer than a scale (mm); breaks in u and v to keep stay as they are."""
     poles = net.poles
     for axis, knots in enumerate((net.u, net.v)):
         coarse = ladder_for_scale(knots, arc_lengths(net, axis), scale, keep=keep[axis])
@@ -180,7 +180,7 @@ def at_scale(net: Net, scale: float, keep: tuple[AbstractSet[float], AbstractSet
 
 
 def band(net: Net, low: float, high: float) -> tuple[Net, Net]:
-    """A net without what is finer than a scale, and what of that a lower scale leaves as offsets; scales in mm."""
+    """A net without detail finer than ``high``, and the offsets of its detail between ``low`` and ``high``; in mm."""
     coarse = at_scale(net, high)
     fine = at_scale(net, low) if low else net
     return coarse, net.with_poles(fine.poles - coarse.poles)

@@ -1,4 +1,4 @@
-"""One step between two nested spaces, exactly: poles into coarse poles and details, and back."""
+"""One exact step between two nested spaces: control points to coarse ones and details, and back."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from mracad.wavelet.filters import wavelets
 from mracad.wavelet.project import projection
 
 EXACT = 1e-13
-"""What rounding may lose, of the whole signal."""
+"""Loss by rounding that is allowed, as a share of the whole signal."""
 
 
 class TwoScale:
@@ -28,8 +28,8 @@ class TwoScale:
     ----------
     coarse, fine : KnotVector
     exact : bool
-        Whether solving for poles and details gives a signal back to rounding.  Where it does not, the coarse poles come
-        from the projection, which is the better conditioned, details that would make things worse are left out, and
+        Whether solving for control points and details reproduces a signal to rounding.  If not, the coarse ones come
+        from the projection, which is better conditioned, details that would make it worse are left out, and
         :func:`mracad.wavelet.transform.decompose` keeps a residual.
     """
 
@@ -81,7 +81,7 @@ class TwoScale:
     def synthesise(self, coarse: Array, detail: Array, axis: int = 0, out: Array | None = None) -> Array:
         """The poles with the given coarse poles and details along ``axis``.
 
-        They are written to ``out`` if it is given, which may be the array of which the two are the parts.
+        They are written to ``out`` if given; the two may be parts of that array.
         """
         if (coarse.shape[axis], detail.shape[axis]) != (self._m, self.fine.count - self._m):
             raise UsageError(
@@ -136,7 +136,7 @@ class Chain:
 def step(coarse: KnotVector, fine: KnotVector) -> TwoScale | Chain:
     """The step between two nested spaces, factored once.
 
-    Where neighbouring knots are to go, or several copies of one, the step is a chain of steps that each remove
+    If neighbouring knots are removed, or several copies of one, the step is a chain of steps that each remove
     alternate ones: a single step would be badly conditioned.
     """
     between = _between(coarse, fine)
@@ -144,7 +144,7 @@ def step(coarse: KnotVector, fine: KnotVector) -> TwoScale | Chain:
 
 
 def _between(coarse: KnotVector, fine: KnotVector) -> list[KnotVector]:
-    """Knot vectors from fine to coarse, each without alternate ones of the knots that are still to go."""
+    """Knot vectors from fine to coarse, each without alternate ones of the knots still to be removed."""
     refinement(coarse, fine)  # raises where not nested
     wanted = np.zeros(len(fine.breaks), dtype=int)
     wanted[np.searchsorted(fine.breaks, coarse.breaks)] = coarse.multiplicities

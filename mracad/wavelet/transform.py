@@ -1,9 +1,9 @@
 """Analysis and synthesis of curves and nets on nested knots, exactly.
 
-Coefficient order.  A *step* turns ``n`` poles into ``m`` coarse poles followed by ``n − m`` details.  A *pyramid* holds
-the coarsest poles and its levels from the finest to the coarsest; a level has the bands ``LH`` (coarse in u, detail in
-v), ``HL`` (detail in u, coarse in v) and ``HH``, and lacks those of a direction that does not change there; of a curve,
-or where v does not change, the one band ``HL``.
+Coefficient order.  A *step* turns ``n`` control points into ``m`` coarse ones followed by ``n − m`` details.  A
+*pyramid* holds the coarsest control points and its levels from the finest to the coarsest.  A level has the bands
+``LH`` (coarse in u, detail in v), ``HL`` (detail in u, coarse in v) and ``HH``, without those of a direction that does not
+change there; a curve, or a level where v does not change, has only ``HL``.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from mracad.wavelet.step import EXACT, Chain, TwoScale, step
 
 @dataclass(frozen=True, eq=False)
 class LevelBands:
-    """What one level adds to the next coarser surface.
+    """The detail that one level adds to the next coarser surface.
 
     Attributes
     ----------
@@ -30,7 +30,7 @@ class LevelBands:
     bands : dict
         ``"LH"``, ``"HL"``, ``"HH"``: details (see the module).
     residual : ndarray or None
-        What rounding left over, in poles of the finer net, where it is more than 1e-13 of the whole net.
+        The loss by rounding, in control points of the finer net, if it is more than 1e-13 of the whole net.
     """
 
     u: TwoScale | Chain | None
@@ -44,7 +44,7 @@ class LevelBands:
         return replace(self, bands=bands, residual=None if self.residual is None else gain * self.residual)
 
     def synthesise(self, coarse: Array) -> Array:
-        """Poles of the finer net from those of the coarser one."""
+        """Control points of the finer net from those of the coarser one."""
         if self.u is not None and self.v is not None:
             poles = np.empty((self.u.fine.count, self.v.fine.count, *coarse.shape[2:]))
             low, high = poles[: len(coarse)], poles[len(coarse) :]
@@ -67,7 +67,7 @@ class Pyramid:
     Attributes
     ----------
     coarse : ndarray
-        Poles of the coarsest net, centroid subtracted.
+        Control points of the coarsest net, centroid subtracted.
     levels : tuple of LevelBands
         From the finest to the coarsest.
     centroid : ndarray (k,)
@@ -85,7 +85,7 @@ class Pyramid:
 
 
 def decompose(poles: Array, ladder_u: Sequence[KnotVector], ladder_v: Sequence[KnotVector] | None = None) -> Pyramid:
-    """Nonstandard decomposition of the poles of a net, or of a curve.
+    """Nonstandard decomposition of the control points of a net, or of a curve.
 
     Parameters
     ----------
@@ -118,11 +118,11 @@ def decompose(poles: Array, ladder_u: Sequence[KnotVector], ladder_v: Sequence[K
 
 
 def reconstruct(pyramid: Pyramid, level: float = 0.0) -> Array:
-    """The poles of a pyramid, without its finest ``level`` levels.
+    """The control points of a pyramid, without its finest ``level`` levels.
 
     ``level = k + t`` leaves out the ``k`` finest levels and a share ``t`` of the next one's details, which blends
     the two surfaces between which it lies: ``t f^j + (1 − t) f^{j+1}``.
-    The result always has the finest net's poles.
+    The result always has as many control points as the finest net.
 
     Raises
     ------
@@ -151,9 +151,9 @@ def _analysed(
 ) -> tuple[Array, list[LevelBands]]:
     """Coarsest poles and levels.
 
-    Unless all steps are exact, what a level loses to rounding is folded in once, and the rest is kept where it still
-    counts.  The rest is taken on the way back up, against what reconstruction will really find below, so that the large
-    poles of an ill-conditioned coarse net cost nothing.
+    Unless all steps are exact, the rounding loss of a level is folded in once, and the rest is kept where it still
+    matters.  The rest is taken on the way back up, against the actual reconstruction below, so that the large control
+    points of an ill-conditioned coarse net cost nothing.
     """
     exact = all(each is None or each.exact for pair in pairs for each in pair)
     small = 0.0 if exact else EXACT * np.abs(c).max(initial=0)
