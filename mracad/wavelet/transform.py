@@ -2,8 +2,8 @@
 
 Coefficient order.  A *step* turns ``n`` control points into ``m`` coarse ones followed by ``n − m`` details.  A
 *pyramid* holds the coarsest control points and its levels from the finest to the coarsest.  A level has the bands
-``LH`` (coarse in u, detail in v), ``HL`` (detail in u, coarse in v) and ``HH``, without those of a direction that does not
-change there; a curve, or a level where v does not change, has only ``HL``.
+``LH`` (coarse in u, detail in v), ``HL`` (detail in u, coarse in v) and ``HH``, without those of a direction that does
+not change there; a curve, or a level where v does not change, has only ``HL``.
 """
 
 from __future__ import annotations
