@@ -37,19 +37,19 @@ class Finding:
 
 @dataclass(frozen=True)
 class Layer:
-    """One thing that was looked at.
+    """One layer of a verdict.
 
     Attributes
     ----------
     name : str
     status : {"pass", "fail", "time limit", "skipped"}
     text : str
-        What was measured, or why not, in one line.
+        The measurement, or why there is none, in one line.
     findings : tuple of Finding
     figures : mapping
         What was measured, by name; lengths are millimetres, angles degrees.
     notes : tuple of Finding
-        What is worth saying and fails nothing.
+        Remarks that fail nothing.
     """
 
     name: str
@@ -70,7 +70,7 @@ class Verdict:
         Name of the file.
     layers : tuple of Layer
     valid : bool or None
-        None where it is unknown: something that decides it was not looked at to its end.
+        None if unknown: a check that decides it was not completed.
     """
 
     subject: str

@@ -1,1 +1,1 @@
-"""Detail features: named, told from what they stand above, and laid somewhere else."""
+"""Detail features: located, separated from the surface under them, and copied elsewhere."""

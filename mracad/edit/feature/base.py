@@ -1,4 +1,4 @@
-"""What a feature stands above: a thin plate through its surroundings."""
+"""The surface under a feature: a thin plate through its surroundings."""
 
 from __future__ import annotations
 
@@ -16,21 +16,21 @@ from mracad.errors import EditError
 Array = np.ndarray
 
 RING = 1.5
-"""What lies between the rim of a feature and so many times its radius tells what it stands above."""
+"""Outer radius, over that of the feature, of the ring that determines the surface under it."""
 
 WORTH, BETTER = 3e-3, 3.0
-"""A ground is bridged by more than a plane where that changes the ring by more than this share of the feature's height,
-and by degree 6 instead of 4 where that fits so many times better."""
+"""A polynomial bridges the ground if that changes the ring by more than this share of the feature's height, with degree
+6 instead of 4 if that fits so many times better."""
 
 SECTORS = 16
-"""The ring must be there in three quarters of so many directions."""
+"""The ring must be covered in three quarters of so many directions."""
 
 PLATE, CLOSE, CELLS = 600, 1.2, 64
 """Points of the ring that the thin plate passes through, first those up to so many times the reach; and the cells, up
 to there, over which it is tabulated."""
 
 NORMALS = 6
-"""Steps to the foot of a point on the plate."""
+"""Steps to find the foot of a point on the plate."""
 
 SPREAD = 48
 """Samples of a patch in each direction around a feature."""
@@ -38,7 +38,7 @@ SPREAD = 48
 
 @dataclass(frozen=True, eq=False)
 class Plate:
-    """What a thin plate through the surroundings of a window makes of the place.
+    """A thin plate through the surroundings of a window.
 
     Attributes
     ----------
@@ -55,7 +55,7 @@ class Plate:
     reach: float
 
     def feet(self, local: Array) -> Array:
-        """The points of the plate on whose normals points ``(q, 3)`` stand, both in the chart's axes, mm."""
+        """The feet on the plate of points ``(q, 3)``, along its normals; both in the chart's axes, mm."""
         at = local / self.reach
         height, foot = np.zeros(len(at)), at
         for _ in range(NORMALS):
@@ -74,7 +74,7 @@ def plate(ground: Ground, window: Window) -> Plate:
     Raises
     ------
     EditError
-        Where too little lies around the window.
+        If there is too little surface around the window.
     """
     from scipy.interpolate import RBFInterpolator, RectBivariateSpline
 
@@ -144,8 +144,8 @@ def _thinned(places: Array) -> Array:
 def _bridging(local: Array, ring: Array, within: Array) -> int:
     """Degree of the polynomial that the plate corrects.
 
-    A plate reproduces cubics whatever its hole; what a ground has beyond them a higher degree must bridge, which makes
-    more of the feature's own tails: only where that is much.
+    A plate reproduces cubics whatever its hole; beyond them a higher degree must bridge the ground.  That also
+    magnifies the feature's own tails, so it is only done where the effect is large.
     """
 
     def missed(degree: int) -> tuple[float, float]:

@@ -1,7 +1,7 @@
-"""Charts: geodesic normal coordinates around places, and the frames that go with them.
+"""Charts: geodesic normal coordinates around places, and the frames carried along.
 
-Around a place the coarse surface is the graph of a polynomial c(a, b) over its tangent plane, whatever faces, knots and
-parameters it is made of.  Geodesics of that graph (the exponential map) give coordinates (x, y) in millimetres; log
+Around a place the coarse surface is the graph of a polynomial c(a, b) over its tangent plane, whatever its faces, knots
+and parameters.  Geodesics of that graph (the exponential map) give coordinates (x, y) in millimetres; log
 and exp are polynomials fitted to a fan of them.  In normal coordinates the differential of the log map is, in the
 frame carried along geodesics by parallel transport, a symmetric matrix (Gauss' lemma), so that its polar
 decomposition gives that frame.
@@ -21,16 +21,16 @@ from mracad.memo import kept
 Array = np.ndarray
 
 DEGREE = 6
-"""Of the graph; the maps have one more."""
+"""Degree of the graph; the maps have one more."""
 
 RAYS, STEPS = 16, 8
 """The fan of geodesics."""
 
 AWAY = 1.5
-"""No geodesic of unit length goes farther than 1, nor faster: what does overstepped a place that is too steep."""
+"""No geodesic of unit length goes farther than 1, nor faster, unless it overstepped a place that is too steep."""
 
 RIDGE = 1e-9
-"""Keeps fits with few points from swinging."""
+"""Keeps fits with few points from oscillating."""
 
 
 @kept(16)
@@ -183,7 +183,7 @@ def charts(origin: Array, axes: Array, reach: Array, points: Array, mask: Array,
         As in :class:`Charts`; x runs along the first axis.
     points : ndarray (m, q, 3)
     mask : ndarray of bool (m, q)
-        Which of them count.
+        Points that count.
     degree : int
         Of the graph.
     """

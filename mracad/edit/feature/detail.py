@@ -1,8 +1,8 @@
-"""A detail feature: a displacement of compact support, told from what it stands above.
+"""A detail feature: a displacement of compact support, separated from the surface under it.
 
 The *table* of a feature holds its displacement in the frames carried from its place (along x, along y, along the
 normal) and its window, on a square grid of geodesic normal coordinates in millimetres: nothing in it depends on the
-parameters, knots or units of where it was found.
+parameters, knots or units of the source.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ Array = np.ndarray
 FORMAT = "mracad feature 1"
 
 LOST = 0.01
-"""Share of its height that frozen points may take from a feature unless parts may be clipped."""
+"""Share of its height that frozen points may cut off a feature unless clipping is allowed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,9 +52,9 @@ class Feature:
     Attributes
     ----------
     radius, reach : float
-        Where its taper begins and where it ends, mm.
+        Where its taper begins and ends, mm.
     spacing : float
-        Width of the knot spans that held it, mm.
+        Width of its knot spans in the source, mm.
     table : ndarray (n, n, 4)
         Displacement along x, y and the normal (mm) and window (0 to 1) over ``[-reach, reach]²``.
     name : str
@@ -91,7 +91,7 @@ class Feature:
 
 
 class _File(msgspec.Struct, forbid_unknown_fields=True):
-    """What a feature file holds; lengths in mm."""
+    """The content of a feature file; lengths in mm."""
 
     format: str
     name: str

@@ -1,7 +1,7 @@
-"""Detail features: move one, repeat it, carry it from another model (METHOD: a feature is a displacement).
+"""Detail features: move one, repeat it, transfer it from another model.
 
-A feature is told from what it stands above (:mod:`~mracad.edit.feature.extract`), tabulated in geodesic coordinates of
-its place, and laid on other places (:mod:`~mracad.edit.feature.lay`); seams between edited faces hold.
+A feature is separated from the surface under it (:mod:`~mracad.edit.feature.extract`), tabulated in geodesic
+coordinates of its place, and copied elsewhere (:mod:`~mracad.edit.feature.lay`); seams between edited faces are kept.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ def move(
     Raises
     ------
     EditError
-        For a place or a window off the faces, or a feature that does not fit where it is or is to go.
+        For a place or a window off the faces, or a feature that does not fit its old or new place.
     """
     scope = scope or scope_of(model, options)
     chosen = _movable(model, scope)
@@ -84,12 +84,12 @@ def transfer(
     scope: Scope | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Edit:
-    """Carry the detail of a face, or a feature, of another model onto this one.
+    """Transfer the detail of a face, or a feature, of another model to this one.
 
     Parameters
     ----------
     source : Model
-        The other one; the rest, and errors, as for :func:`move`.
+        The other model; other parameters and errors as for :func:`move`.
     """
     scope = scope or scope_of(model, options)
     ground = Ground.of(model, _movable(model, scope))
@@ -121,7 +121,7 @@ def _laid(
     scope: Scope,
     removed: Mapping[int, Array],
 ) -> Laid:
-    """Copies at places, with the offsets that take the source's feature away."""
+    """Copies at places, with the offsets that remove the source's feature."""
     least = min(found, key=lambda p: p.size, default=None)
     if least is not None and feature.spacing * least.size < NARROWEST:
         raise EditError(
@@ -154,7 +154,7 @@ def _edit(model: Model, scope: Scope, laid: Laid) -> Edit:
 
 
 def _outcome(model: Model, face: Face, laid: Laid, touched: Collection[int]) -> FaceOutcome:
-    """What became of a face that may move; copies lie on those ``touched``."""
+    """The outcome for a face that may move; copies lie on those ``touched``."""
     assert face.surface is not None
     surface, offset = model.surfaces[face.surface], laid.offsets.get(face.surface)
     points = int(np.prod(surface.net.poles.shape[:2]))

@@ -1,5 +1,4 @@
-"""Copies that are exact: where a target's control net is that of the source moved by whole spans, its offsets are those
-of the source, moved."""
+"""Exact copies: where a target's net is the source's shifted by whole spans, its offsets are the source's, shifted."""
 
 from __future__ import annotations
 
@@ -63,7 +62,7 @@ def shifted(copies: Copies) -> Shifts:
 
 
 def _source(copies: Copies) -> tuple[Origin, Patch, Array] | None:
-    """Where the feature was found and its offsets, where it lies on one patch and copies of it may be exact."""
+    """The source of the feature and its offsets, if it lies on one patch and copies of it can be exact."""
     origin = copies.feature.origin
     if origin is None or copies.overlap != "add" or copies.mirror or len(origin.offsets) != 1:
         return None
@@ -74,12 +73,12 @@ def _source(copies: Copies) -> tuple[Origin, Patch, Array] | None:
 
 
 def _there(target: Patch, box: _Box, steps: tuple[int, int]) -> tuple[Array, ...]:
-    """Control points of the target that answer to those of a box of the source."""
+    """Control points of the target that correspond to those of a box of the source."""
     return np.ix_(*((np.arange(a, b) + k) % kv.count for (a, b), k, kv in zip(box, steps, target.knots, strict=True)))
 
 
 def _congruent(source: Patch, target: Patch, box: _Box, steps: tuple[int, int], limit: float) -> Array | None:
-    """The rotation that takes the source's net to the target's, where they are congruent to a distance, mm."""
+    """The rotation that takes the source's net to the target's, if they are congruent to a distance, mm."""
     here, there = np.ix_(*(np.arange(a, b) for a, b in box)), _there(target, box, steps)
     one, two = source.net.poles[here].reshape(-1, 3), target.net.poles[there].reshape(-1, 3)
     weights = [
@@ -97,7 +96,7 @@ def _congruent(source: Patch, target: Patch, box: _Box, steps: tuple[int, int], 
 
 
 def _steps(source: Patch, target: Patch, box: _Box, way: Array) -> tuple[int, int] | None:
-    """By how many control points a target's knots are those of the source moved by ``way``; None where they are not."""
+    """Number of control points by which a target's knots are the source's shifted by ``way``; None if they are not."""
     u, v = (_moved(source.knots[axis], target.knots[axis], box[axis], float(way[axis])) for axis in (0, 1))
     return None if u is None or v is None else (u, v)
 

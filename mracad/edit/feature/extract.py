@@ -1,4 +1,4 @@
-"""Features taken from a model: above what surrounds them, or above a level."""
+"""Features taken from a model: above their surroundings, or above a level."""
 
 from __future__ import annotations
 
@@ -31,13 +31,13 @@ FINEST, COARSEST = 512, 64
 """Cells of a table across, at most and at least."""
 
 NEWTON = 8
-"""Steps to the parameters of a point over a place."""
+"""Steps to find the parameters of a point over a place."""
 
 
 @dataclass(frozen=True, eq=False)
 class Cut:
-    """What of a feature lies on a surface: offsets ``(nu, nv, 3)`` of its control points, and the window ``(nu, nv)``
-    in which they are."""
+    """The part of a feature on one surface: offsets ``(nu, nv, 3)`` of its control points, and the window ``(nu, nv)``
+    that contains them."""
 
     offset: Array
     window: Array
@@ -49,11 +49,11 @@ def feature_of(model: Model, options: Featured, faces: Collection[int], text: st
     Raises
     ------
     UsageError
-        For a text that is none.
+        For an invalid text.
     EditError
-        Where there is no feature, or an edge holds part of it.
+        If there is no feature, or an edge holds part of it.
     FileError
-        For a file that is none.
+        For an invalid file.
     """
     given = feature(text, "feature")
     if isinstance(given, Stored):
@@ -72,7 +72,7 @@ def feature_of(model: Model, options: Featured, faces: Collection[int], text: st
 
 
 def above_surroundings(ground: Ground, area: Window, keep: str) -> Feature:
-    """The feature under a window, above what a thin plate through its surroundings makes of the place.
+    """The feature under a window, above a thin plate through its surroundings.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ def above_surroundings(ground: Ground, area: Window, keep: str) -> Feature:
 
 
 def between_levels(ground: Ground, bands: Mapping[int, Array], area: Window, keep: str) -> Feature:
-    """The feature that bands of detail (offsets by surface) make under a window; ``ground`` is without them."""
+    """The feature formed by bands of detail (offsets by surface) under a window; ``ground`` is without them."""
     feet, reach, cuts = area.feet, area.reach, {}
     chart, _ = ground.charts(feet, feet.along, np.array([1.05 * reach]))
     for index, patch in ground.patches.items():
@@ -190,7 +190,7 @@ def _table(ground: Ground, chart: Charts, cuts: Mapping[int, Cut], reach: float,
 
 
 def _under(patch: Patch, chart: Charts, ab: Array) -> tuple[Array, Array]:
-    """Parameters of the points of a patch over places of a chart, and which of them exist."""
+    """Parameters of the points of a patch over places of a chart, and whether they exist."""
     from scipy.spatial import cKDTree
 
     (origin,), (frame,), (reach,) = chart.origin, chart.axes, chart.reach

@@ -1,8 +1,8 @@
-"""Features that a model proposes: places where the detail of a face stands out from what is usual on it.
+"""Proposed features: places where the detail of a face stands out.
 
-On each surface the detail finer than a scale (a projection, as for smoothing) is looked at for scales that double.  A
-place stands out where that detail is much larger than its median, on a small part of the face; the smallest scale at
-which it is nearly all there counts.
+On each surface the detail finer than a scale (by a projection, as for smoothing) is measured at scales that double.  A
+place stands out if that detail is much larger than its median, on a small part of the face; the smallest scale with
+nearly all of it counts.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from mracad.wavelet.project import at_scale
 Array = np.ndarray
 
 USUAL = 8.0
-"""Detail stands out that is so many times the median."""
+"""Detail stands out if it is so many times the median."""
 
 RIM = 0.1
 """A feature ends where its detail falls below this share of its height."""
@@ -29,13 +29,13 @@ LARGEST = 0.2
 """Share of a face that one feature may cover."""
 
 GROWS = 1.25
-"""A larger scale counts where the feature is so many times as high there."""
+"""A larger scale counts if the feature is so many times as high there."""
 
 LOBE, FAR = 0.15, 4.0
-"""What is lower than this share of a feature within so many times its largest scale is a side lobe of it."""
+"""Detail lower than this share of a feature, within so many times its largest scale, is a side lobe."""
 
 LEAST = 1e-4
-"""mm: what is lower is no feature."""
+"""Least height of a feature, mm."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class Found:
     place : (float, float, float)
         Its middle, mm.
     size, height : float
-        Across and high, mm.
+        Diameter and height, mm.
     scales : (float, float)
         Wavelengths between which most of it lies, mm.
     """
@@ -61,7 +61,7 @@ class Found:
 
     @property
     def text(self) -> str:
-        """It as ``--feature`` takes it, twice as wide as it is at its rim: what lies around it must be flat there."""
+        """The value for ``--feature``, twice as wide as its rim, so that the surroundings are flat there."""
         x, y, z = (f"{value:.6g}" for value in np.round(self.place, 6) + 0.0)
         return f"near:{x},{y},{z},radius:{self.size:.4g}"
 
@@ -116,12 +116,12 @@ def _on(patch: Patch) -> list[Found]:
 
 
 def _lobe(f: Found, g: Found) -> bool:
-    """Whether ``f`` is but a side lobe of ``g``."""
+    """Whether ``f`` is only a side lobe of ``g``."""
     return f.height < LOBE * g.height and bool(np.linalg.norm(np.subtract(f.place, g.place)) < FAR * g.scales[1])
 
 
 def _merged(kept: list[Found], new: Found) -> list[Found]:
-    """The list with a feature seen at a larger scale: instead of those it covers where it is higher by far."""
+    """The list with a feature found at a larger scale, which replaces those it covers if it is much higher."""
     near = [f for f in kept if np.linalg.norm(np.subtract(f.place, new.place)) < (f.size + new.size) / 4]
     if not near:
         return [*kept, new]

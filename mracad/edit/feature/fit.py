@@ -1,8 +1,8 @@
 """Control points that hold a displacement, and the knots that they need.
 
-Control points are those of the interpolant at the Greville points (W δ in the polynomial space where the surface is
-rational): a spline of the target's space is reproduced exactly.  Spans that are too wide are divided where the
-interpolant misses the ideal.
+The control points are those of the interpolant at the Greville points (of W δ in the polynomial space if the surface is
+rational), so splines of the target's space are reproduced exactly.  Spans where the interpolant misses the ideal are
+divided.
 """
 
 from __future__ import annotations
@@ -31,13 +31,13 @@ FIRST = 4.0
 """Spans under a copy are at first no longer than its reach over this."""
 
 UNEVEN = 1.4
-"""By how much a span may be wider somewhere than on average."""
+"""Largest width of a span over its average."""
 
 CHECKS, FEWEST, ALL = 300, 60, 30_000
 """Points in each direction at which a copy is compared with the ideal: at most, at least, and for all copies."""
 
 NARROWEST = 1e-3
-"""Least width of a knot span that is made for a copy, mm."""
+"""Least width of a knot span made for a copy, mm."""
 
 MOST = 4_000_000
 """Control points that a net may grow to."""
@@ -46,13 +46,13 @@ _ACROSS = 160
 
 
 def holding(copies: Copies, patch: Patch) -> tuple[Knots, Array]:
-    """Knots of a patch that hold copies, its own and such as divide spans too wide for them, and control points.
+    """Knots of a patch that hold copies (its own, with too wide spans divided), and control points.
 
     Returns
     -------
     knots : pair of KnotVector
     poles : ndarray (nu, nv, 3)
-        As :func:`over_knots` makes them.
+        As from :func:`over_knots`.
     """
     u, v = (kv.elevated(SMOOTH) if kv.degree == 1 else kv for kv in patch.knots)
     poles = cache(lambda knots: over_knots(copies, patch, knots))
@@ -77,7 +77,7 @@ def holding(copies: Copies, patch: Patch) -> tuple[Knots, Array]:
 
 
 def over_knots(copies: Copies, patch: Patch, knots: Knots) -> Array:
-    """Control points over some knots whose surface takes the ideal displacement, in the part's frame."""
+    """Control points over some knots that interpolate the ideal displacement, in the part's frame."""
     points, normals = patch.lattice(*(kv.greville() for kv in knots))
     values, count = copies.ideal(patch, points.reshape(-1, 3), normals.reshape(-1, 3))
     poles = through(patch.net.over(*knots), values.reshape(points.shape))
@@ -117,7 +117,7 @@ def _first(copies: Copies, patch: Patch, longest: float) -> tuple[Array, Array]:
 
 
 def _room(copies: Copies, patch: Patch, points: Array) -> Array:
-    """The least reach of copies that points ``(m, n)`` lie under; infinite where there is none."""
+    """The least reach of the copies over points ``(m, n)``; infinite if there is none."""
     from scipy.spatial import cKDTree
 
     room = np.full(points.shape[0] * points.shape[1], np.inf)
@@ -141,7 +141,7 @@ def _needed(kv: KnotVector, at: Array, points: Array, room: Array) -> Array:
 
 
 def between(copies: Copies, patch: Patch, knots: Knots) -> Sites:
-    """Places under copies half-way between Greville points in one direction, on them in the other."""
+    """Places under copies, halfway between Greville points in one direction and on them in the other."""
     from scipy.spatial import cKDTree
 
     at = [k.greville() for k in knots]

@@ -19,24 +19,24 @@ GRID = 11
 """Samples in each direction around a place."""
 
 STEEP = 0.2
-"""Least cosine between normals of what belongs to one place: beyond it is the other side of a wall."""
+"""Least cosine between normals at one place: beyond it is the other side of a wall."""
 
 SIDEWAYS = 1e-3
-"""Share of a distance by which a point may lie beside the normal at its foot: beyond, the ground has ended."""
+"""Share of a distance by which a point may lie off the normal at its foot: beyond, the ground has ended."""
 
 
 @dataclass(frozen=True, eq=False)
 class Feet:
-    """Where points stand on the ground.
+    """The feet of points on the ground.
 
     Attributes
     ----------
     surface : ndarray (m,) of int
     uv : ndarray (m, 2)
     points, normals, along : ndarray (m, 3)
-        Points there, outward normals, and unit tangents S_u.
+        The feet, outward normals, and unit tangents S_u.
     apart : ndarray (m,)
-        Distance, mm, that they were moved.
+        Distance of the points from their feet, mm.
     """
 
     surface: Array
@@ -51,7 +51,7 @@ class Feet:
         return Feet(*(getattr(self, name)[some] for name in self.__dataclass_fields__))
 
     def beside(self, points: Array) -> Array:
-        """How far points lie beside the normals at their feet, mm."""
+        """How far points lie off the normals at their feet, mm."""
         way = points - self.points
         return np.asarray(np.linalg.norm(way - (way * self.normals).sum(axis=1, keepdims=True) * self.normals, axis=1))
 
@@ -75,19 +75,19 @@ class Ground:
 
     @classmethod
     def of(cls, model: Model, faces: Collection[int], poles: Mapping[int, Array] | None = None) -> Ground:
-        """Faces of a model, with control points by surface in place of the model's."""
+        """Faces of a model, with control points by surface that replace the model's."""
         surfaces = sorted({s for i in faces if (s := model.faces[i].surface) is not None})
         return cls(model, frozenset(faces), {i: Patch.of(model, i, faces, (poles or {}).get(i)) for i in surfaces})
 
     def without(self, offsets: Mapping[int, Array]) -> Ground:
-        """The ground with offsets, by surface over the model's own nets, taken off."""
+        """The ground less offsets, by surface over the model's own nets."""
         return Ground.of(
             self.model, self.chosen, {i: self.model.surfaces[i].net.poles - each for i, each in offsets.items()}
         )
 
     @cached_property
     def _stands(self) -> list[tuple[int, Array]]:
-        """For surfaces that stand in several places, the motions from the others to the first."""
+        """For surfaces in several places, the motions from the other places to the first."""
         found: list[tuple[int, Array]] = []
         for index, patch in self.patches.items():
             for face in patch.faces:
@@ -98,8 +98,8 @@ class Ground:
         return found
 
     def brought(self, points: Array) -> Array:
-        """Points ``(m, 3)`` at any place of a surface that stands in several, brought to the first of them: an edit of
-        the surface is seen at all."""
+        """Points ``(m, 3)`` at any place of a surface with several, moved to the first: an edit of the surface shows at
+        all of them."""
         if not self._stands or not len(points):
             return points
         best, least = points, self.feet(points).apart
@@ -148,7 +148,7 @@ class Ground:
         return found
 
     def samples(self, feet: Feet, reach: Array, count: int = GRID) -> tuple[Array, Array, Array]:
-        """Points around feet on all surfaces, which of them count, and which feet reach which surface.
+        """Points around feet on all surfaces, the points that count, and the surfaces that each foot reaches.
 
         Returns
         -------
@@ -182,13 +182,13 @@ class Ground:
         return np.concatenate(points, axis=1), np.concatenate(near, axis=1), touched
 
     def charts(self, feet: Feet, directions: Array, reach: Array) -> tuple[Charts, Array]:
-        """Charts around feet with x along given directions, and which surfaces each of them reaches."""
+        """Charts around feet with x along given directions, and the surfaces that each reaches."""
         points, near, touched = self.samples(feet, reach)
         return charts(feet.points, axes(feet.normals, directions), reach, points, near), touched
 
 
 def axes(normals: Array, directions: Array) -> Array:
-    """Right-handed frames ``(m, 3, 3)`` with the given normals and x as near as can be to the given directions."""
+    """Right-handed frames ``(m, 3, 3)`` with the given normals and x as near as possible to the given directions."""
     x = directions - (directions * normals).sum(axis=1, keepdims=True) * normals
     size = np.linalg.norm(x, axis=1, keepdims=True)
     spare = np.cross(normals, np.eye(3)[np.abs(normals).argmin(axis=1)])

@@ -1,4 +1,4 @@
-"""Copies of a feature on the ground, and the ideal displacement that they are at any point of it.
+"""Copies of a feature on the ground, and their ideal displacement at any point of it.
 
 The ideal displacement of a copy at a point of the coarse surface is that of the feature at the same normal
 coordinates (turned, mirrored, scaled), in the frame carried there from the copy's place.
@@ -21,13 +21,13 @@ from mracad.edit.feature.patch import Patch
 Array = np.ndarray
 
 BATCH = 48
-"""Copies worked on at a time."""
+"""Copies processed at a time."""
 
 
 @dataclass(frozen=True, eq=False)
 class Way:
-    """How detail is turned (radians), scaled along the face and along the normal, and mirrored: once, or point by
-    point ``(q,)``."""
+    """Rotation of detail (radians), scales along the face and along the normal, and mirroring: once, or point by point
+    ``(q,)``."""
 
     turn: Array | float
     size: Array | float
@@ -35,12 +35,12 @@ class Way:
     mirror: bool
 
     def back(self, xy: Array) -> Array:
-        """Places ``(q, 2)`` of the detail that come to places where it is laid."""
+        """Places ``(q, 2)`` of the detail for places of the copy."""
         (x, y), cos, sin = xy.T / self.size, np.cos(self.turn), np.sin(self.turn)
         return np.stack([cos * x + sin * y, self._flip * (cos * y - sin * x)], axis=1)
 
     def on(self, local: Array) -> Array:
-        """Displacements ``(q, 3)`` of the detail as they are where it is laid, along x, y and the normal."""
+        """Displacements ``(q, 3)`` of the copy for those of the detail, along x, y and the normal."""
         t, s, cos, sin = local[:, 0], self._flip * local[:, 1], np.cos(self.turn), np.sin(self.turn)
         along = self.size * (cos * t - sin * s), self.size * (sin * t + cos * s)
         return np.stack([*along, self.height * local[:, 2]], axis=1)
@@ -57,17 +57,17 @@ class Copies:
     Attributes
     ----------
     ground : Ground
-        What they stand on, the source's own feature taken away.
+        The ground without the source's own feature.
     feature : Feature
     places : sequence of Place
     feet : Feet
-        Where those stand.
+        Their feet on the ground.
     overlap : {"add", "max", "replace"}
     mirror : bool
     charts : Charts
         Of the ground around each.
     touched : ndarray of bool (copies, patches)
-        Which patches of the ground each reaches.
+        The patches of the ground that each reaches.
     """
 
     ground: Ground
@@ -102,11 +102,11 @@ class Copies:
         return float(self.feature.height * np.abs(self.heights).min())
 
     def on(self, patch: Patch) -> Array:
-        """Which copies ``(copies,)`` reach a patch."""
+        """The copies that reach a patch, ``(copies,)``."""
         return np.asarray(self.touched[:, list(self.ground.patches).index(patch.index)])
 
     def only(self, some: Array) -> Copies:
-        """Those of a mask, the others reaching nothing."""
+        """The copies of a mask; the others reach nothing."""
         return replace(self, touched=self.touched & some[:, None])
 
     def at(self, patch: Patch, uv: Array) -> Array:
@@ -139,7 +139,7 @@ class Copies:
         return total, count
 
     def _over(self, below: Array, delta: Array, window: Array) -> Array:
-        """One copy laid over what is there already."""
+        """One copy combined with what is already there."""
         if self.overlap == "max":
             return np.where(((delta**2).sum(axis=1) > (below**2).sum(axis=1))[:, None], delta, below)
         return np.asarray((1 - window[:, None]) * below + delta)

@@ -1,7 +1,8 @@
-"""Copies of a feature as offsets of control points: the ideal displacement as far as seams, edges and holes allow it.
+"""Copies of a feature as offsets of control points: the ideal displacement, as far as seams, edges and holes allow.
 
-Where copies lie over a seam between two faces that move, it moves with them: exactly where both sides end there along
-parameter lines, to a tolerance along trim curves.  A seam that would not hold stays, and takes its part of the copies.
+Where copies lie over a seam between two faces that move, it moves with them: exactly if both sides end there along
+parameter lines, to a tolerance along trim curves.  A seam that would open or lose its smoothness stays, and cuts off
+its part of the copies.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ from mracad.seam.wishes import Wishes
 Array = np.ndarray
 
 WIDER = 1e-7
-"""An exact seam may gape so much more (mm) and turn as much more as the others; otherwise it stays."""
+"""Allowed growth of the gap of an exact seam, mm; its angle may grow as much as that of others.  Otherwise it stays."""
 
 MOVED = 1e-7
 """A seam moves where a copy displaces it by more than this share of its height."""
@@ -68,22 +69,22 @@ class Laid:
 
 @dataclass(frozen=True, eq=False)
 class _Task:
-    """Copies that are to be laid.
+    """Copies to be made.
 
     Attributes
     ----------
     copies : Copies
         All that are not exact shifts.
     known, removed : mapping of int to ndarray (nu, nv, 3)
-        By surface, offsets over its own net: exact shifts and what is removed, and the latter alone.
+        By surface, offsets over its own net: exact shifts and removed features; and the latter alone.
     nets : dict of int to Net
         The surfaces with the knots that hold the copies.
     poles : dict of int to ndarray (nu, nv, 3)
-        Offsets over these that the copies are.
+        Offsets of the copies over these.
     joints : Joints
         Of the faces under them.
     size : (float, float)
-        By how much the least copy may be off, and how far the largest reaches, mm.
+        Allowed error of the least copy, and the largest reach, mm.
     """
 
     copies: Copies
@@ -101,7 +102,7 @@ class _Task:
 
 @dataclass(frozen=True, eq=False)
 class _Attempt:
-    """What comes of moving some seams: by surface, what was wanted, the offsets that obey them, and what moves."""
+    """The result of moving some seams: by surface, the wanted offsets, those that obey the seams, and what moves."""
 
     wanted: dict[int, Wanted]
     done: dict[int, Array]
@@ -118,14 +119,14 @@ def laid(copies: Copies, wishes: Wishes, coupled: bool, clip: bool, removed: Map
     coupled : bool
         Whether edges between faces of the ground may move.
     clip : bool
-        Whether what stays may take more than a little of a copy.
+        Whether edges that stay may cut off more than a little of a copy.
     removed : mapping of int to ndarray (nu, nv, 3)
-        Offsets over the surfaces' own nets to be added: those that take the source's feature away.
+        Offsets over the surfaces' own nets to be added: those that remove the source's feature.
 
     Raises
     ------
     EditError
-        For a copy that points which stay take too much of.
+        For a copy of which held control points cut off too much.
     """
     shifts = shifted(copies)
     task = _task(copies, shifts, wishes, removed)
@@ -157,8 +158,8 @@ def _task(copies: Copies, shifts: Shifts, wishes: Wishes, removed: Mapping[int, 
 
 
 def _sewn(joined: Joints) -> Joints:
-    """Joints without the trimmed seams between edges that only coincide: which of their points belong together is not
-    known to the tolerance of a copy."""
+    """Joints without the trimmed seams between edges that only coincide: their corresponding points are not known to
+    the tolerance of a copy."""
     loose = tuple(seam for seam in joined.loose if seam.edge == seam.twin)
     apart = {edge: Cause(Still.UNSEWN) for seam in joined.loose if seam not in loose for edge in (seam.edge, seam.twin)}
     exact = tuple(seam for seam in joined.exact if seam.edge not in apart)
@@ -166,7 +167,7 @@ def _sewn(joined: Joints) -> Joints:
 
 
 def _told(ground: Ground, under: Collection[int], joined: Joints) -> Joints:
-    """Joints with what is to be said of edges beyond which a face could move if a copy lay there, too."""
+    """Joints with the cause for edges whose other face could move if a copy lay there too."""
     apart = ground.chosen - set(under)
     bare = Cause(Still.BARE)
     sides = {e: {side.face for side in ground.model.edges[e].sides} for e in joined.frozen}
@@ -174,7 +175,7 @@ def _told(ground: Ground, under: Collection[int], joined: Joints) -> Joints:
 
 
 def _crossings(task: _Task, copies: Copies) -> list[Crossing]:
-    """The seams that copies, or what is removed, displace."""
+    """The seams that copies, or removed features, displace."""
     every: tuple[Seam | TrimmedSeam, ...] = task.joints.exact + task.joints.loose
     found = [seam for seam in every if any(_reached(copies, trace(x), task.removed) for x in (seam.a, seam.b))]
     moved = {i: np.any(_wanted(task, i, net)[0], axis=2) for i, net in task.nets.items()} if found else {}
@@ -182,7 +183,7 @@ def _crossings(task: _Task, copies: Copies) -> list[Crossing]:
 
 
 def _reached(copies: Copies, side: Trace, removed: Mapping[int, Array]) -> bool:
-    """Whether copies, or what is removed (offsets by surface over its own net), displace one side of a seam."""
+    """Whether copies, or removed features (offsets by surface over its own net), displace one side of a seam."""
     patch, uv = copies.ground.patches[side.surface], side.places(_EVENLY)
     moved = [copies.at(patch, uv)]
     if side.surface in removed:
@@ -191,7 +192,7 @@ def _reached(copies: Copies, side: Trace, removed: Mapping[int, Array]) -> bool:
 
 
 def _wanted(task: _Task, index: int, net: Net) -> tuple[Array, Array]:
-    """Offsets over a net of a surface, ``(nu, nv, 3)``: of all that is wanted, and of the copies alone."""
+    """Offsets over a net of a surface, ``(nu, nv, 3)``: all that are wanted, and those of the copies alone."""
     own, patch, poles = task.model.surfaces[index].net, task.copies.ground.patches[index], task.poles[index]
     every = alone = lifted(own, net, task.known[index])
     if index in task.removed:
@@ -202,9 +203,9 @@ def _wanted(task: _Task, index: int, net: Net) -> tuple[Array, Array]:
 
 
 def _settled(task: _Task, found: Sequence[Crossing]) -> tuple[_Attempt, Sequence[Crossing], dict[int, Cause]]:
-    """The copies with those seams moved that hold, which these are, and why others do not move.
+    """The copies with the seams that can move, these seams, and why others do not.
 
-    The spans under a trimmed seam that does not hold are halved a few times before it is given up.
+    The spans under a trimmed seam that opens are halved a few times before it is given up.
     """
     given_up: dict[int, Cause] = {}
     while True:
@@ -240,7 +241,7 @@ def _attempt(task: _Task, found: Sequence[Crossing]) -> _Attempt:
 
 
 def _holds(task: _Task, each: Crossing, after: Model) -> bool:
-    """Whether a seam is no worse than it may be after an edit."""
+    """Whether a seam is within its tolerances after an edit."""
     seam = each.seam
     if isinstance(seam, TrimmedSeam):
         gap, angle, bend = ALLOWED.contact(task.size[1])
@@ -255,7 +256,7 @@ def _holds(task: _Task, each: Crossing, after: Model) -> bool:
 
 
 def _finer(each: Crossing, attempt: _Attempt) -> bool:
-    """Whether the spans under a seam can be halved, and that can be of use."""
+    """Whether halving the spans under a seam is possible and can help."""
     nets = (attempt.wanted[i].net for i in each.surfaces)
     small = all(net.u.count * net.v.count <= LARGEST for net in nets)
     return small and isinstance(each.seam, TrimmedSeam) and each.halvings < HALVINGS

@@ -1,4 +1,4 @@
-"""The words for places and windows, and what they mean on a model."""
+"""Places and windows, from text to geometry on a model."""
 
 from __future__ import annotations
 
@@ -32,12 +32,12 @@ def face_number(model: Model, text: str, what: str, hint: str) -> int:
 
 @dataclass(frozen=True, eq=False)
 class Place:
-    """A place as it was given.
+    """A place as given.
 
     Attributes
     ----------
     label : str
-        It in messages.
+        Its name in messages.
     point : ndarray (3,)
         In space, mm; for parameters the point there.
     face : int or None
@@ -70,7 +70,7 @@ def place(ground: Ground, given: Point | OnFace, label: str) -> Place:
 
 
 def patch_of(ground: Ground, face: int, label: str) -> Patch:
-    """The patch of a face; raises EditError where the face does not belong to the ground."""
+    """The patch of a face; raises EditError if the face does not belong to the ground."""
     surface = ground.model.faces[face].surface
     if face not in ground.chosen or surface is None:
         kind = ground.model.faces[face].kind
@@ -81,7 +81,7 @@ def patch_of(ground: Ground, face: int, label: str) -> Patch:
 
 
 def standing(ground: Ground, places: Sequence[Place], far: float) -> Feet:
-    """Where places stand; raises EditError for one that is farther than ``far`` (mm) from the ground."""
+    """The feet of places; raises EditError for one farther than ``far`` (mm) from the ground."""
     points = np.array([p.point for p in places]).reshape(-1, 3)
     feet = ground.feet(points)
     surface, uv, apart = feet.surface.copy(), feet.uv.copy(), feet.apart.copy()
@@ -109,12 +109,12 @@ def _domain(patch: Patch) -> str:
 
 @dataclass(frozen=True, eq=False)
 class Window:
-    """Which part of the ground a feature covers: a geodesic disc, or a rectangle in parameters.
+    """The part of the ground that a feature covers: a geodesic disc, or a rectangle in parameters.
 
     Attributes
     ----------
     name : str
-        It as it was given.
+        The text as given.
     feet : Feet
         Its middle.
     point : ndarray (3,)
@@ -136,18 +136,18 @@ class Window:
 
     @property
     def label(self) -> str:
-        """It in messages."""
+        """Its name in messages."""
         return f"feature {self.name}"
 
     @property
     def reach(self) -> float:
-        """How far it reaches with its taper, mm."""
+        """Its radius with the taper, mm."""
         return self.radius + self.width
 
     def shares(self, patch: Patch, points: Array, xy: Array) -> Array:
         """How far into the taper the Greville points ``(nu, nv)`` of a patch lie: below 0 inside, 1 and more beyond.
 
-        Only those may lie inside of which flat indices and normal coordinates ``(q, 2)`` are given.
+        Only points with given flat indices and normal coordinates ``(q, 2)`` may lie inside.
         """
         if self.box is None:
             beyond = np.linalg.norm(xy, axis=1) - self.radius
@@ -176,7 +176,7 @@ def _beyond(net: Net, box: Array) -> Array:
 
 
 def window(ground: Ground, given: Disc | Rectangle, text: str, width: float | None) -> Window:
-    """A window on the ground, called by its text; raises UsageError and EditError.
+    """A window on the ground, named by its text; raises UsageError and EditError.
 
     ``width`` of the taper (mm) is a quarter of the radius, or of the shorter side of a rectangle, by default.
     """

@@ -104,7 +104,7 @@ class Patch:
 
     @cached_property
     def seeds(self) -> tuple[Array, Array]:
-        """Parameters spread over the faces, and their points."""
+        """Parameters distributed over the faces, and their points."""
         lists = []
         for k in self.knots:
             count = int(np.clip(3 * k.spans, 16, SEEDS))
@@ -120,7 +120,7 @@ class Patch:
         -------
         points, normals : ndarray (m, q, 3)
         near : ndarray of bool (m, q)
-            Which of them lie on the faces and within the reach.
+            Samples on the faces and within the reach.
         """
         s, su, sv, _ = self.evaluate(uv)
         share = np.linspace(0.0, 1.0, count)
@@ -137,7 +137,7 @@ class Patch:
         return points, normals, near
 
     def _room(self, uv: Array, points: Array, tangent: Array, reach: Array, axis: int, sign: float) -> Array:
-        """How far to go in one direction to get a little beyond the reach, as far as the domain goes."""
+        """The distance in one direction to get a little beyond the reach, within the domain."""
         low, high = self.domain
         room = np.full(len(uv), 0.5 * (high - low)[axis])
         if not self.periodic[axis]:
@@ -151,7 +151,7 @@ class Patch:
         return np.asarray(np.minimum(1.2 * step, room))
 
     def inside(self, face: Face, uv: Array) -> Array:
-        """Whether parameters ``(q, 2)`` lie within a face or on its boundary, as far as its outline tells."""
+        """Whether parameters ``(q, 2)`` lie within a face or on its boundary, by its outline."""
         return np.asarray(self._off(face, uv) <= FLAT)
 
     def _off(self, face: Face, uv: Array) -> Array:

@@ -1,4 +1,4 @@
-"""Patterns: the places of copies from the words for them."""
+"""Patterns: the places of copies from the options."""
 
 from __future__ import annotations
 
@@ -26,16 +26,16 @@ STRIDES = 4
 
 
 def places(ground: Ground, feature: Feature, options: Repeat) -> list[Place]:
-    """All places of copies, each with what turns and scales the copy there.
+    """All places of copies, each with the rotation and scales of the copy there.
 
     Raises
     ------
     UsageError
-        For words that are not right.
+        For invalid options.
     EditError
         For a place off the ground.
     FileError
-        For a file that is none of places.
+        For an invalid file of places.
     """
     found = listed(ground, options.at)
     if options.grid or options.polar:
@@ -90,7 +90,7 @@ def listed(ground: Ground, words: Sequence[str]) -> list[Place]:
 
 
 def grid(ground: Ground, given: spec.Grid, origin: Array, frame: Array, own: bool) -> list[Place]:
-    """A grid that follows the ground along the axes of a frame (rows); the first place is left out where the feature
+    """A grid that follows the ground along the axes of a frame (rows); the first place is left out if the feature
     is there already."""
     (wide, high), (dx, dy) = given.counts, given.steps
     rows = [(origin[None], frame[None])]
@@ -108,7 +108,7 @@ def grid(ground: Ground, given: spec.Grid, origin: Array, frame: Array, own: boo
 
 
 def _walked(ground: Ground, points: Array, frames: Array, axis: int, distance: float) -> tuple[Array, Array]:
-    """Points and frames (rows x, y, normal) after a walk over the ground; straight on where it ends."""
+    """Points and frames (rows x, y, normal) after a walk over the ground, continued straight where it ends."""
     on = np.ones(len(points), bool)
     for _ in range(STRIDES):
         ahead = points + distance / STRIDES * frames[:, axis]
@@ -120,7 +120,7 @@ def _walked(ground: Ground, points: Array, frames: Array, axis: int, distance: f
 
 
 def polar(given: spec.Polar, origin: Array, frame: Array, own: bool) -> list[Place]:
-    """Places around an axis; the first one is left out where the feature is there already."""
+    """Places around an axis; the first one is left out if the feature is there already."""
     centre, axis, count = np.array(given.centre), np.array(given.axis), given.count
     size = float(np.linalg.norm(axis))
     found = []

@@ -1,4 +1,4 @@
-"""How far copies of a feature came out from the ideal."""
+"""Deviation of copies of a feature from their ideal."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from mracad.errors import EditError
 Array = np.ndarray
 
 SHORT = 0.2
-"""Share of its height by which a copy may be off the ideal where nothing is held."""
+"""Share of its height by which a copy may be off the ideal if nothing is held."""
 
 
 @dataclass(frozen=True)
 class Copy:
-    """What became of one copy.
+    """The result for one copy.
 
     Attributes
     ----------
@@ -32,9 +32,9 @@ class Copy:
     faces : tuple of int
         Faces that it touches.
     deviation, rms : float
-        Largest and mean square distance from the ideal copy, mm, constraints included.
+        Largest and root mean square distance from the ideal copy, mm, constraints included.
     lost : float
-        Largest part of it that constraints took away, mm.
+        Largest part of it that constraints cut off, mm.
     short : float
         Largest part of it that the control points there cannot hold, mm.
     exact : bool
@@ -53,8 +53,8 @@ class Copy:
 
 @dataclass(frozen=True, eq=False)
 class Figures:
-    """Points of a copy on a patch: distances (mm) from the ideal, what constraints took, what control points cannot
-    hold, and faces, ``(q,)`` each."""
+    """Points of a copy on a patch: distances (mm) from the ideal, what constraints cut off, what control points
+    cannot hold, and faces, ``(q,)`` each."""
 
     missed: Array
     lost: Array
@@ -63,15 +63,15 @@ class Figures:
 
 
 def compared(copies: Copies, wanted: Mapping[int, Wanted], done: Mapping[int, Array], exact: Array) -> list[Copy]:
-    """Every copy beside its ideal.
+    """Every copy compared with its ideal.
 
     Parameters
     ----------
     copies : Copies
     wanted : mapping of int to Wanted
-        By surface, what copies are on it and what else is.
+        By surface, the offsets of copies on it, and all others.
     done : mapping of int to ndarray (nu, nv, 3)
-        What became of all of that.
+        The resulting offsets.
     exact : ndarray of bool (copies,)
         Which are exact shifts.
     """
@@ -86,7 +86,7 @@ def compared(copies: Copies, wanted: Mapping[int, Wanted], done: Mapping[int, Ar
 
 
 def copied(place: str, at: Array, found: Sequence[Figures], exact: bool = False) -> Copy:
-    """What became of a copy, from its points on all patches."""
+    """The result for a copy, from its points on all patches."""
     faces = {int(face) for each in found for face in np.unique(each.faces)} - {-1}
     worst, lost, short = (
         max((float(getattr(each, name).max()) for each in found), default=0.0) for name in ("missed", "lost", "short")
@@ -98,7 +98,7 @@ def copied(place: str, at: Array, found: Sequence[Figures], exact: bool = False)
 
 
 def _figures(copies: Copies, patch: Patch, wanted: Wanted, done: Array) -> Iterator[tuple[int, Figures]]:
-    """The figures of copies on a patch, of which ``done`` is what became of them."""
+    """The figures of copies on a patch with resulting offsets ``done``."""
     from scipy.spatial import cKDTree
 
     net = wanted.net
@@ -123,9 +123,9 @@ def _figures(copies: Copies, patch: Patch, wanted: Wanted, done: Array) -> Itera
 
 
 def refuse(copies: Copies, found: Sequence[Copy], clip: bool) -> None:
-    """Raise EditError for a copy of which the ground cannot hold enough, or points that stay take too much.
+    """Raise EditError for a copy that the ground cannot hold, or of which held control points cut off too much.
 
-    ``clip`` lets them take it.
+    ``clip`` allows the latter.
     """
     heights = [copies.feature.height * abs(place.height) for place in copies.places]
     for copy, height in zip(found, heights, strict=True):

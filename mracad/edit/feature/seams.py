@@ -1,7 +1,7 @@
 """Seams under copies of a feature: the stretches that move, and the admissible displacement nearest to the copies.
 
-Only control points beside the stretches of seams that copies lie over take part, in windows of the nets: all others
-have the displacement that the copies are.  Both sides of a stretch get the knots that its conditions need there.
+Only control points beside the stretches of seams that copies lie over take part, in windows of the nets; all others
+have exactly the displacement of the copies.  Both sides of a stretch get the knots that its conditions need there.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ Array = np.ndarray
 Stretch = tuple[float, float]
 
 ALLOWED = Tolerances()
-"""What a seam may lack after a copy."""
+"""Allowed errors of a seam after a copy."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,9 +45,9 @@ class Crossing:
     ----------
     seam : Seam or TrimmedSeam
     stretches : sequence of (float, float)
-        Fractions between which control points that move reach it: the rest of it stays.
+        Fractions between which control points that move reach it; the rest of it stays.
     halvings : int
-        How often the spans under them are to be halved.
+        How often the spans under them are halved.
     """
 
     seam: Seam | TrimmedSeam
@@ -63,21 +63,21 @@ class Crossing:
         return {self.seam.a.surface, self.seam.b.surface}
 
     def rests(self) -> Iterator[Stretch]:
-        """What is not in a stretch."""
+        """The parts outside all stretches."""
         ends = [0.0, *(x for stretch in self.stretches for x in stretch), 1.0]
         yield from ((low, high) for low, high in zip(ends[::2], ends[1::2], strict=True) if low < high)
 
 
 @dataclass(frozen=True, eq=False)
 class Wanted:
-    """What copies are on a surface.
+    """The wanted offsets of copies on a surface.
 
     Attributes
     ----------
     net : Net
         The surface undisplaced, in the space of its displacement.
     offset, alone : ndarray (nu, nv, 3)
-        Of its control points, mm: all that is wanted, and what the copies are of that.
+        Of its control points, mm: all that is wanted, and the copies alone.
     free : ndarray of bool (nu, nv)
         Control points that may move.
     face : Face
@@ -120,7 +120,7 @@ def crossing(seam: Seam | TrimmedSeam, nets: Mapping[int, Net], moved: Mapping[i
     for side in map(trace, (seam.a, seam.b)):
         net = nets[side.surface]
         knots = net.u, net.v
-        # over finer knots, other functions may reach as far as those that overlap these
+        # over finer knots, further functions may overlap these
         near = grown(moved[side.surface], knots, max(kv.degree for kv in knots))
         breaks = crossings(side, knots)
         shares = Net(*knots, near[..., None].astype(float)).evaluate(side.inside(net, (breaks[1:] + breaks[:-1]) / 2))
@@ -130,7 +130,7 @@ def crossing(seam: Seam | TrimmedSeam, nets: Mapping[int, Net], moved: Mapping[i
 
 
 def _merged(stretches: Sequence[Stretch]) -> Iterator[Stretch]:
-    """Stretches in order, those that meet as one."""
+    """Stretches in order, adjoining ones merged."""
     low = high = -1.0
     for start, stop in sorted(stretches):
         if start > high + SAME:
@@ -178,7 +178,7 @@ def held(wanted: Mapping[int, Wanted], found: Sequence[Crossing], size: tuple[fl
         By surface; those of both sides of a seam have the same knots where copies move it.
     found : sequence of Crossing
     size : (float, float)
-        By how much a copy may be off, and how far it reaches, mm.
+        Allowed error of a copy, and its reach, mm.
 
     Returns
     -------
@@ -206,11 +206,11 @@ def _problem(
     found: Sequence[Crossing],
     size: tuple[float, float],
 ) -> Problem:
-    """The changes of offsets ``(points, 3)`` that make seams hold, nearest to none."""
+    """The least changes of offsets ``(points, 3)`` that satisfy the seams."""
     nets = {i: window.net for i, window in windows.items()}
     spaces = {}
     for i, window in windows.items():
-        # copies go on beyond trim curves: what barely reaches into a face stays near them
+        # copies continue beyond trim curves, so control points that barely reach into a face stay near them
         masses = forms(window.net, window.net, quadrature(window.net, [replace(faces[i], trims=())]))
         spaces[i] = Space(window.net, masses, window.local, np.ones_like(window.local))
     rows, _ = seam_rows(nets, _exact_parts(found), everywhere=True)
@@ -249,7 +249,7 @@ def _window(net: Net, near: Array, local: Array) -> _Window:
 
 
 def _cut(kv: KnotVector, functions: Array) -> tuple[slice, KnotVector]:
-    """The functions that overlap some, and their knots; all of them in a periodic direction."""
+    """The functions that overlap given ones, and their knots; all in a periodic direction."""
     if kv.periodic:
         return slice(None), kv
     low = max(int(functions.min()) - kv.degree, 0)

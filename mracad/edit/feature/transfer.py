@@ -1,4 +1,4 @@
-"""The character of a surface: all its detail within a band, carried to another surface.
+"""The character of a surface: all its detail within a band, transferred to another surface.
 
 Points of two faces correspond when they lie at the same arc lengths from the low corners of their parameter
 rectangles; where the target is larger, the source is mirrored at its borders.  The detail is carried from the frame
@@ -34,7 +34,7 @@ from mracad.wavelet.project import band as band_of
 Array = np.ndarray
 
 STEPS, LINES = 4000, 9
-"""Steps along (at least one a span), and lines across, from which arc lengths are measured."""
+"""Steps along (at least one per span), and lines across, to measure arc lengths."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +44,7 @@ class Character:
     Attributes
     ----------
     coarse : Patch
-        The surface without what is finer than the band's largest wavelength.
+        The surface without detail finer than the band's largest wavelength.
     detail : Net
         Offsets: the band.
     tables : pair of (ndarray, ndarray)
@@ -103,7 +103,7 @@ def _lengths(net: Net, axis: int, low: Array, high: Array) -> tuple[Array, Array
 
 @dataclass(frozen=True, eq=False)
 class Carried:
-    """The detail of one surface at the places of another, so much of it."""
+    """The detail of one surface at the places of another, times a factor."""
 
     own: Character
     other: Character
@@ -131,7 +131,7 @@ def laid_on(
         Wavelengths, mm.
     options : Transfer
     width : float or None
-        Over which the detail fades towards points that stay, mm; half of the largest wavelength by default.
+        Width over which the detail fades towards held control points, mm; half the largest wavelength by default.
     """
     own, other = Character.of(target, band), Character.of(source, band)
     stays, comes = options.share()
@@ -165,7 +165,7 @@ def laid_on(
 
 
 def _compared(target: Patch, ideal: Carried, delta: Net, gone: Net) -> Copy:
-    """What became of the detail, of which something is taken away."""
+    """The result for the detail, after constraints."""
     uv = _middles(target, delta.u, delta.v)
     missed = np.linalg.norm(np.asarray(delta.evaluate(uv)) - ideal(uv), axis=1)
     lost = np.linalg.norm(np.asarray(gone.evaluate(uv)), axis=1)
@@ -186,13 +186,13 @@ def _poles(target: Patch, ideal: Carried, knots: Knots) -> Array:
 
 
 def _middles(target: Patch, u: KnotVector, v: KnotVector) -> Array:
-    """Parameters on the faces of a patch half-way between Greville points."""
+    """Parameters on the faces of a patch, halfway between Greville points."""
     uv = middles(u, v)
     return np.asarray(uv[target.covers(uv)])
 
 
 def _window(net: Net, free: Array, width: float) -> Array:
-    """Weights of control points: 0 where they stay, up to 1 at ``width`` (mm) from there."""
+    """Weights of control points: 0 where held, up to 1 at ``width`` (mm) from there."""
     from scipy.spatial import cKDTree
 
     points, flat = np.asarray(net.grid(net.u.greville(), net.v.greville())).reshape(-1, 3), free.ravel()

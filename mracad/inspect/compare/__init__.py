@@ -1,10 +1,10 @@
-"""What differs between two versions of a document: a layer each for geometry, structure and attributes.
+"""Differences between two versions of a document, with layers for geometry, structure and attributes.
 
-A face's *deviation* is measured from points inside it to the whole surface under its partner, and back; how its
-boundary moved is its *outline*.  So a wall that only grew longer with the face above it has moved in its outline alone.
+A face's *deviation* is measured from points inside it to the whole surface under its partner, and back; the motion of
+its boundary is its *outline*.  So a wall that only grew longer with the face above it has only moved in its outline.
 
-What a format cannot hold, and how a shape is written down (the kind of a surface, edges in one piece or several), is
-noted and fails nothing.
+The limits of a format, and the representation of a shape (the kind of a surface, edges in one piece or several), are
+only noted and fail nothing.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ LAYERS = (
 
 
 def compare(ref: Subject, new: Subject, limits: CompareLimits, ignore: Iterable[str] = ()) -> Verdict:
-    """Judge a new version of a document by a reference.
+    """Compare a new version of a document with a reference.
 
     Parameters
     ----------

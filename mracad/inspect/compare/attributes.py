@@ -13,11 +13,11 @@ from mracad.inspect.compare.subject import EQUAL, Match, Subject, layer, paired
 from mracad.inspect.verdict import Figure, Finding, Layer
 from mracad.model.facts import Carrier, Contents, Occurrence
 
-_Key = tuple[tuple[str, Figure], ...]  # the figures of what is counted
+_Key = tuple[tuple[str, Figure], ...]  # the figures of one counted thing
 
 
 def noted(layer: Layer, format: str) -> Layer:
-    """A layer of what a format cannot hold: what differs is one note."""
+    """A layer that a format cannot hold: its differences are one note."""
     if not layer.findings:
         return layer
     figures: dict[str, Figure] = {"format": format, "what": layer.name, "count": len(layer.findings)}
@@ -25,12 +25,12 @@ def noted(layer: Layer, format: str) -> Layer:
 
 
 def units(ref: str, new: str) -> Layer:
-    """The units of the files: lengths are compared in millimetres, whatever they are."""
+    """The units of the files; lengths are compared in millimetres whatever they are."""
     return layer("units", new if ref == new else f"{new}, was {ref}", [], {"ref": ref, "new": new})
 
 
 def assembly(ref: Subject, new: Subject) -> Layer:
-    """What is placed, and where."""
+    """Placed products, and their places."""
     before = {(p.path, p.product, k): p.frame for p, k in _numbered(ref.contents)}
     after = {(p.path, p.product, k): p.frame for p, k in _numbered(new.contents)}
     findings = _differences("assembly", map(_placed, before), map(_placed, after))
@@ -47,7 +47,7 @@ def assembly(ref: Subject, new: Subject) -> Layer:
 
 
 def _numbered(contents: Contents) -> Iterator[tuple[Occurrence, int]]:
-    """Everything placed, and how many of the same path and product came before it."""
+    """Everything placed, and the number of earlier ones with the same path and product."""
     seen: Counter[tuple[tuple[str, ...], str]] = Counter()
     for placed in contents.tree:
         yield placed, seen[placed.path, placed.product]
@@ -74,7 +74,7 @@ def names(ref: Subject, new: Subject, groups: Sequence[Match]) -> Layer:
 
 
 def colours(ref: Subject, new: Subject, groups: Sequence[Match], lacks: Mapping[str, str]) -> Layer:
-    """Colours of products, instances and faces: where a format knows of no products, what each face looks like."""
+    """Colours of products, instances and faces: if a format has no products, the colour of each face."""
     marked = _marked("colours", ref, new, groups) if "assembly" not in lacks else []
     opaque = "transparency" in lacks
     findings, notes = list(marked), []
@@ -130,7 +130,7 @@ def _pairs(groups: Sequence[Match]) -> list[tuple[int, int]]:
 
 
 def _differences(rule: str, ref: Iterable[_Key], new: Iterable[_Key]) -> list[Finding]:
-    """What only one of two lists has."""
+    """Entries that only one of two lists has."""
     old, fresh = Counter(ref), Counter(new)
     return [
         Finding(rule, figures={"change": change, **dict(key)})

@@ -1,4 +1,4 @@
-"""How far matched faces lie from each other, and their outlines."""
+"""Distances between matched faces, and between their outlines."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from mracad.model.region import face_region, supported
 _LINES = 40  # most sample lines across a face
 
 SAME = 1e-6
-"""Distance, mm, within which a face is where it was."""
+"""Distance, mm, within which a face counts as unmoved."""
 
 LAID_ANEW = 1e-4
-"""Most, mm, that an outline may differ in another format: its reader lays curves anew within the edges' tolerances."""
+"""Most, mm, that an outline may differ in another format: readers rebuild curves within the edges' tolerances."""
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class Spread:
 
 @dataclass(frozen=True)
 class FaceDeviation:
-    """How far a face lies from its partner.
+    """Distances between a face and its partner.
 
     Attributes
     ----------
@@ -65,11 +65,11 @@ class FaceDeviation:
 
 
 Measured = list[tuple[tuple[int, int], FaceDeviation]]
-"""Matched faces of the two models, and how far they lie apart."""
+"""Matched faces of the two models, and their distances."""
 
 
 def deviation(ref: Subject, new: Subject, measured: Measured, limits: CompareLimits, exact: bool) -> Layer:
-    """How far faces deviate; unless ``exact``, outlines may differ as far as another format makes them."""
+    """Deviations of faces; unless ``exact``, outlines may differ as much as another format requires."""
     findings, within = [], []
     for (i, j), d in measured:
         if not d.worst.largest <= limits.deviation:
@@ -95,14 +95,14 @@ def _beyond(ref: Subject, new: Subject, i: int, j: int, rule: str, spread: Sprea
 
 
 def _within(found: list[FaceDeviation]) -> Finding:
-    """That outlines were laid anew."""
+    """The note that outlines were rebuilt."""
     worst = max(found, key=lambda d: d.outline.largest)
     figures = {"by": worst.outline.largest, "count": len(found)}
     return Finding("outline-tolerance", (worst.new,), where=worst.outline.where, figures=figures)
 
 
 def deviations(ref: Subject, new: Subject, groups: Sequence[Match]) -> Measured:
-    """How far every matched pair of faces lies apart, in the order of the reference; parts of one face together."""
+    """Distances of every matched pair of faces, in the order of the reference; parts of one face together."""
     edges = _edges(ref.model), _edges(new.model)
     found = []
     for group in groups:
@@ -117,7 +117,7 @@ def deviations(ref: Subject, new: Subject, groups: Sequence[Match]) -> Measured:
 
 
 def unchanged(ref: Subject, measured: Measured) -> frozenset[int]:
-    """The faces of the new model that are where they were, with their outlines."""
+    """The faces of the new model that have not moved, nor have their outlines."""
     near = max(SAME, EQUAL * ref.model.diagonal)
     moved = {j for (_, j), d in measured if not max(d.worst.largest, d.outline.largest) <= near}
     return frozenset(j for (_, j), _ in measured if j not in moved)
@@ -136,7 +136,7 @@ def _apart(ref: Subject, new: Subject, group: Match) -> tuple[Spread, Spread, fl
 
 
 def _one_way(one: Subject, faces: Sequence[int], other: Subject, targets: Sequence[int]) -> Spread:
-    """Distances of points of faces from the nearest of other ones."""
+    """Distances of points of faces from the nearest of other faces."""
     points = np.concatenate([one.gauge.sample(face, _density(one.model, face)) for face in faces])
     off = np.stack([_off(other, target, points) for target in targets])
     return _spread(points, np.fmin.reduce(off, axis=0))
@@ -195,7 +195,7 @@ def _spread(points: Array, off: Array) -> Spread:
 
 
 def _edges(model: Model) -> dict[int, list[int]]:
-    """The edges of each face, as often as it uses them."""
+    """The edges of each face, one entry per use."""
     edges: dict[int, list[int]] = defaultdict(list)
     for edge in model.edges:
         if len(edge.points):
@@ -205,7 +205,7 @@ def _edges(model: Model) -> dict[int, list[int]]:
 
 
 def _rim(edges: dict[int, list[int]], faces: Sequence[int]) -> list[int]:
-    """The edges around some faces: closing ones and those between them left out."""
+    """The edges around some faces, without closing ones and those between them."""
     uses = Counter(edge for face in faces for edge in edges[face])
     return [edge for edge, count in uses.items() if count == 1]
 
@@ -216,7 +216,7 @@ def _loosest(subject: Subject, rim: Sequence[int]) -> float:
 
 
 def _outline(ref: Subject, new: Subject, old: list[int], fresh: list[int]) -> Spread:
-    """How far two boundaries lie from each other."""
+    """Distances between two boundaries."""
     from scipy.spatial import cKDTree
 
     nothing = np.empty((0, 3))

@@ -1,4 +1,4 @@
-"""Which faces of two documents are the same, whatever their numbers and however they are cut."""
+"""Matching faces of two documents, whatever their numbers and however they are cut."""
 
 from __future__ import annotations
 
@@ -10,25 +10,25 @@ import numpy as np
 from mracad.inspect.compare.subject import Array, Match, Subject
 from mracad.model.brep import Face
 
-_STRANGE = 0.3  # farther apart in place and size, as a share of the diagonal, faces are no partners
+_STRANGE = 0.3  # most difference in place and size, as a share of the diagonal, between partners
 _ALIKE = 1e-6  # share of the diagonal within which faces are in the same place and of the same size
-_WHOLE = 0.03  # share of its area by which a face may differ from the sum of its parts: areas are good to a hundredth
+_WHOLE = 0.03  # share of its area by which a face may differ from the sum of its parts: areas are exact to a hundredth
 _PROBES = 5  # points that tell whether a face lies on another
 
 
 def match(ref: Subject, new: Subject, slack: float, by_product: bool) -> list[Match]:
-    """Faces that are the same, in the order of the reference.
+    """Matching faces, in the order of the reference.
 
-    Faces with the same number that are alike in place, size, kind and product are partners; the others find theirs
-    by the least total difference.  A face that is left over may be a part of one that was cut.
+    Faces with the same number that agree in place, size, kind and product are partners; the others are paired by the
+    least total difference.  A face left over may be a part of one that was cut.
 
     Parameters
     ----------
     ref, new : Subject
     slack : float
-        How far a part may lie from the face that it is of, mm.
+        How far a part may lie from its whole face, mm.
     by_product : bool
-        Whether partners are of products of the same name, if there is a choice.
+        Whether partners must be of products of the same name, if there is a choice.
     """
     partners = _partners(ref, new, by_product)
     slack = max(slack, _ALIKE * ref.model.diagonal)
@@ -83,7 +83,7 @@ def _partners(ref: Subject, new: Subject, by_product: bool) -> dict[int, int]:
 
 
 def _assigned(apart: Array, extra: Array) -> list[tuple[int, int]]:
-    """Rows and columns with the least total cost, those too far apart left out."""
+    """Rows and columns with the least total cost, without those too far apart."""
     from scipy.optimize import linear_sum_assignment
 
     rows, columns = linear_sum_assignment(np.minimum(apart, 2 * _STRANGE) + extra)
@@ -91,7 +91,7 @@ def _assigned(apart: Array, extra: Array) -> list[tuple[int, int]]:
 
 
 class _Facing:
-    """Whether two faces look in the same direction; each is looked at once."""
+    """Whether two faces have the same orientation; each is evaluated once."""
 
     def __init__(self, ref: Subject, new: Subject) -> None:
         self._subjects = ref, new
@@ -116,9 +116,9 @@ def _kin(a: Face, b: Face, by_product: bool) -> bool:
 
 
 def _parts(whole: Subject, cut: Subject, partners: Mapping[int, int], slack: float) -> dict[int, list[int]]:
-    """Faces of one document that are cut in several of the other.
+    """Faces of one document that are cut into several of the other.
 
-    Only faces that are left over, and those whose partner is of another size, are looked at.
+    Only faces left over, and those whose partner has another size, are considered.
     """
     taken = {j: i for i, j in partners.items()}
     left = [j for j in range(len(cut.faces)) if j not in taken]
@@ -152,7 +152,7 @@ def _probes(subject: Subject, face: int) -> Array:
 
 
 def _hosts(subject: Subject, points: Array, slack: float) -> Iterable[int]:
-    """The faces on which all of some points lie."""
+    """The faces on which all given points lie."""
     if len(points):
         for face in subject.model.faces:
             within = bool((points >= face.box[0] - slack).all() and (points <= face.box[1] + slack).all())

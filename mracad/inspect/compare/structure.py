@@ -17,17 +17,17 @@ from mracad.model.facts import Mass
 from mracad.model.sampling import length
 
 STEEPER = 0.01
-"""Degrees by which the angle of a smooth seam must have grown to be no longer smooth: a reader lays curves anew."""
+"""Growth of the angle of a smooth seam, degrees, after which it is no longer smooth: readers rebuild curves."""
 
-_ALONG = 0.1  # share of its length by which a seam may lie off one that it is a piece of
-_SAME_LENGTH = 1e-3  # relative: free edges of the same length in all are the same, in however many pieces
+_ALONG = 0.1  # share of its length by which a seam may lie off the seam that it is a piece of
+_SAME_LENGTH = 1e-3  # relative: free edges of the same total length are the same, in however many pieces
 
 
 # Faces -----------------------------------------------------------------------------------------------------------
 
 
 def faces(ref: Subject, new: Subject, groups: Sequence[Match]) -> Layer:
-    """Faces that are gone or new; those of another kind, or in other pieces, are noted."""
+    """Faces that are gone or new; faces of another kind, or in other pieces, are noted."""
     known = {i for group in groups for i in group.ref}
     found = {j for group in groups for j in group.new}
     lost = [f for f in ref.model.faces if f.index not in known]
@@ -82,8 +82,8 @@ def seams(
 ) -> Layer:
     """Seams that are gone, new, wider, steeper, or no longer smooth.
 
-    Between faces of the new model that are ``unchanged`` none can break: where the angle of one is another, its curves
-    lie elsewhere on them, within its tolerance, which is noted.
+    Between faces of the new model that are ``unchanged`` none can break: if its angle differs, its curves lie elsewhere
+    on the faces, within the tolerance, which is noted.
     """
     before, after = (measured(subject.model, every=True) for subject in (ref, new))
     if not (ref.validity.shells and new.validity.shells):
@@ -123,7 +123,7 @@ def seams(
 
 
 def _closes(strand: _Strand) -> bool:
-    """Whether smooth seams close faces on themselves: where such a face is cut open is a matter of writing it down."""
+    """Whether smooth seams close faces on themselves: where such a face is cut open is only representation."""
     return all(m.smooth and m.faces[0] == m.faces[1] for m in (*strand.old, *strand.new))
 
 
@@ -135,7 +135,7 @@ def _alone(ref: Subject, new: Subject, strand: _Strand) -> Finding:
 
 
 def _either_way(measures: list[SeamMeasure]) -> list[SeamMeasure]:
-    """Seams between faces of which each may look either way: nothing says which is the outer side without a shell."""
+    """Seams between faces of either orientation: without a shell nothing tells the outer side."""
     return [replace(m, angle=min(m.angle, 180.0 - m.angle)) for m in measures]
 
 
@@ -147,7 +147,7 @@ def _finding(subject: Subject, seam: SeamMeasure, rule: str, **figures: float) -
 def _strands(
     ref: Model, new: Model, before: list[SeamMeasure], after: list[SeamMeasure], groups: Sequence[Match], slack: float
 ) -> list[_Strand]:
-    """The seams of both documents between matched faces, together where they are the same.
+    """The seams of both documents between matched faces, grouped if they are the same.
 
     Seams between the parts of one face are left out unless that face closes on itself there.
     """
@@ -162,7 +162,7 @@ def _strands(
 
 
 def _by_faces(measures: list[SeamMeasure], names: dict[int, int]) -> dict[tuple[int, int], list[SeamMeasure]]:
-    """Seams by the names of the faces that they join; those of unmatched faces left out."""
+    """Seams by the names of the faces that they join, without those of unmatched faces."""
     found: dict[tuple[int, int], list[SeamMeasure]] = defaultdict(list)
     for measure in measures:
         if all(face in names for face in measure.faces):
@@ -172,7 +172,7 @@ def _by_faces(measures: list[SeamMeasure], names: dict[int, int]) -> dict[tuple[
 
 
 def _together(ref: Model, new: Model, old: list[SeamMeasure], fresh: list[SeamMeasure], slack: float) -> list[_Strand]:
-    """Seams between the same faces, together where the middle of one lies on the other."""
+    """Seams between the same faces, grouped if the middle of one lies on the other."""
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
 
@@ -211,15 +211,15 @@ def _along(piece: Array, line: Array, slack: float) -> bool:
 
 
 def topology(ref: Subject, new: Subject, unsewn: str) -> Layer:
-    """Solids, shells and free edges; how many faces and edges they are made of is noted.
+    """Solids, shells and free edges; their numbers of faces and edges are noted.
 
-    An open shell of one face is as good as that face alone.
+    An open shell of one face counts as that face alone.
 
     Parameters
     ----------
     ref, new : Subject
     unsewn : str
-        The format that need not know of shells and solids; ``""`` where both do.
+        The format that may lack shells and solids; ``""`` if both have them.
     """
     names = ("solids", "shells", "faces", "open_shells", "free_edges")
     counts = {name: (getattr(ref.validity, name), getattr(new.validity, name)) for name in names}
@@ -250,7 +250,7 @@ def _free(model: Model) -> float:
 
 
 def validity(ref: Subject, new: Subject) -> Layer:
-    """What the kernel's check holds against the new document and not against the reference."""
+    """Failures of the kernel's check in the new document that the reference does not have."""
     known = Counter(failure.status for failure in ref.validity.failures)
     fresh = Counter(failure.status for failure in new.validity.failures)
     findings = [
@@ -266,7 +266,7 @@ def validity(ref: Subject, new: Subject) -> Layer:
 
 
 def size(ref: Mass, new: Mass, limits: CompareLimits, unsewn: str) -> Layer:
-    """Volume, area and centre; the volume only where both have solids, if a format (``unsewn``) need not know them."""
+    """Volume, area and centre; the volume only if both have solids, where a format (``unsewn``) may lack them."""
     solids = bool(ref.volume and new.volume) or not unsewn
     change = abs(new.volume - ref.volume) / abs(ref.volume) if ref.volume else float(new.volume != 0)
     shift = float(np.linalg.norm(np.subtract(new.centre, ref.centre)))

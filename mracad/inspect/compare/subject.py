@@ -1,4 +1,4 @@
-"""One of two documents that are compared, measured; what may differ; how findings become layers."""
+"""One of two compared documents, measured; allowed differences; layers from findings."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Array = np.ndarray
 Point = tuple[float, float, float]
 
 EQUAL = 1e-9
-"""Share of the diagonal below which two lengths are the same."""
+"""Share of the diagonal below which two lengths count as equal."""
 
 
 class Gauge(Protocol):
@@ -42,18 +42,18 @@ class Subject:
     model : Model
         Its geometry: the parts, or all instances in their places as one part.
     schema : str
-        What it was read from, see :attr:`mracad.occ.document.Document.schema`.
+        Its source format, see :attr:`mracad.occ.document.Document.schema`.
     contents : Contents
     mass : Mass
     faces : list of Mass
-        Of each face of ``model``.
+        One for each face of ``model``.
     validity : Validity
     lone_faces : int
         Open shells of one face.
     gauge : Gauge
         On the faces of ``model``.
     face_numbers, edge_numbers : sequence of int
-        Which face and edge of the document each one of ``model`` is.
+        The face and edge of the document for each one of ``model``.
     """
 
     model: Model
@@ -68,13 +68,13 @@ class Subject:
     edge_numbers: Sequence[int]
 
     def named(self, faces: Iterable[int]) -> tuple[int, ...]:
-        """The faces of the document that some faces of ``model`` are."""
+        """The faces of the document for some faces of ``model``."""
         return tuple(self.face_numbers[face] for face in faces)
 
 
 @dataclass(frozen=True)
 class CompareLimits:
-    """What may differ; None for no limit.  Lengths are millimetres, angles degrees, the volume a share of itself."""
+    """Allowed differences; None for no limit.  Lengths in millimetres, angles in degrees, volume as a share."""
 
     deviation: float
     gap_growth: float | None = None
@@ -84,7 +84,7 @@ class CompareLimits:
 
 @dataclass(frozen=True)
 class Match:
-    """Faces of the reference and those of the new document that are the same: one each, or one and its parts."""
+    """Matching faces of the reference and of the new document: one each, or one and its parts."""
 
     ref: tuple[int, ...]
     new: tuple[int, ...]
@@ -96,7 +96,7 @@ class Match:
 def layer(
     name: str, text: str, findings: Sequence[Finding], figures: Mapping[str, object], notes: Sequence[Finding] = ()
 ) -> Layer:
-    """A layer that fails where something was found."""
+    """A layer that fails if anything was found."""
     return Layer(name, "fail" if findings else "pass", text, tuple(findings), figures, tuple(notes))
 
 
