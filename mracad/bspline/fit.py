@@ -19,7 +19,7 @@ Sites = Sequence[tuple[Array, Array]]
 """For each direction: parameters, and the spans that contain them."""
 
 SPARE = 1.5
-"""Spans at most so many times as wide as necessary are not divided."""
+"""Spans at most this many times as wide as necessary are not divided."""
 
 ROUNDS, PIECES = 5, 6
 """Times that spans are divided, and the most pieces each time."""

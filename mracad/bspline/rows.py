@@ -18,7 +18,7 @@ LARGE = 200_000
 
 
 class Rows:
-    """A matrix each row of which is one run of columns.
+    """A matrix whose rows are each one run of columns.
 
     Parameters
     ----------

@@ -49,7 +49,7 @@ def scatter(start: Array, values: Array, columns: int, c: Array, axis: int) -> A
 def combine(matrix: Rows, columns: Array, rows: Array, coarse: Array, detail: Array, axis: int, out: Array) -> None:
     """``out[rows] = A x[columns]`` along ``axis``, with ``x`` the coarse values followed by the details.
 
-    ``out`` may be the array of which ``coarse`` and ``detail`` are the two parts.
+    ``out`` may be the array whose two parts are ``coarse`` and ``detail``.
     """
     first, second, place = _lines(coarse, axis), _lines(detail, axis), np.argsort(columns)
     _product(first, second, place, matrix.start, _padded(matrix.values), np.argsort(rows), _target(out, axis))

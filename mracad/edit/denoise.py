@@ -46,7 +46,7 @@ LONGEST = 0.5
 """Longest wavelength over the size of a surface."""
 
 MOST = 600
-"""Control points along an axis that are looked at."""
+"""Most control points along an axis that are used."""
 
 BESIDE = 2.0**-0.5, 1.0, 2.0**0.5
 """Wavelengths that are tried with the filter itself, over the best for control points alone."""
@@ -122,7 +122,7 @@ class _Axis:
     Attributes
     ----------
     points : ndarray (n,) of int
-        Those that are looked at.
+        Those that are used.
     modes : ndarray (n, n)
         Orthonormal, ordered by bending.
     squares : ndarray (n,)

@@ -30,10 +30,10 @@ ROUNDS = 4
 """Most times that a group is solved."""
 
 LEAST = 0.25
-"""A surface of which less may be done is left, so that the others can do more."""
+"""A surface with a smaller allowed amount is left, so that the others can do more."""
 
 FIRST = 2
-"""Surfaces of a group of which each goes through by itself, so that all are tried together before the others are."""
+"""Number of surfaces in a group that succeed alone before all are tried together, ahead of the rest alone."""
 
 PRICE = 0.05
 """Share of the wanted change that doubling the control points of a surface must add to be worth it."""

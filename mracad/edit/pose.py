@@ -61,7 +61,7 @@ class Scene:
     def allowed(self, contact: Contact, joined: Joints, width: float) -> tuple[float, float, float]:
         """By how much the gap (mm), the slope and the curvature (1/mm) of a contact may grow.
 
-        Where both faces of an edge move, each by itself, they share it.
+        Where both faces of an edge move separately, they share it.
         """
         t = self.tolerances
         meeting, edge = joined.meetings.get(contact.edge), self.model.edges[contact.edge]

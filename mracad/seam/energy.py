@@ -123,7 +123,7 @@ def _onwards(knots: KnotVector) -> Array:
 
 
 def _on_lines(quadrature: Quadrature, axis: int, knots: KnotVector, lines: Array) -> tuple[Array, Array]:
-    """Gauss points ``(q, 2)`` on knot lines and their weights: those on both sides of which a face lies."""
+    """Gauss points ``(q, 2)`` on knot lines with a face on both sides, and their weights."""
     across, along = (quadrature.u, quadrature.v)[:: 1 - 2 * axis]
     weight = (quadrature.wv, quadrature.wu)[axis]
     mask = quadrature.mask if axis == 0 else quadrature.mask.T

@@ -48,7 +48,7 @@ class Joints:
     loose : tuple of TrimmedSeam
         Seams kept to a tolerance.
     closing : mapping of int to (Border, Border)
-        Closing edges that a periodic space keeps smooth by itself.
+        Closing edges that a periodic space keeps smooth anyway.
     frozen : mapping of int to Cause
         Edges that stay, and why.
     meetings : mapping of int to Meeting
@@ -292,7 +292,7 @@ def end(net: Net, trim: Trim) -> tuple[int, int] | None:
 
 
 def _corners(net: Net, trims: Iterable[Trim]) -> Array:
-    """The corners of a net of which both sides lie on trims."""
+    """The corners of a net whose two sides both lie on trims."""
     sides = {end(net, trim) for trim in trims}
     held = np.zeros(net.poles.shape[:2], bool)
     for i in (0, -1):

@@ -13,7 +13,7 @@ from mracad.memo import kept
 
 
 class Columns:
-    """A matrix each column of which is one run of rows.
+    """A matrix whose columns are each one run of rows.
 
     Attributes
     ----------

@@ -141,7 +141,7 @@ def reconstruct(pyramid: Pyramid, level: float = 0.0) -> Array:
 
 
 def _move(poles: Array, offset: Array) -> None:
-    """Add ``offset`` to every pole of a contiguous array, whole lines at a time: faster than point by point."""
+    """Add ``offset`` to every control point of a contiguous array, by whole lines: faster than point by point."""
     lines = poles.reshape(len(poles), -1)
     lines += np.tile(offset, lines.shape[1] // len(offset))
 

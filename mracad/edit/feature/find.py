@@ -20,7 +20,7 @@ from mracad.wavelet.project import at_scale
 Array = np.ndarray
 
 USUAL = 8.0
-"""Detail stands out if it is so many times the median."""
+"""Ratio to the median above which detail stands out."""
 
 RIM = 0.1
 """A feature ends where its detail falls below this share of its height."""
@@ -29,10 +29,10 @@ LARGEST = 0.2
 """Share of a face that one feature may cover."""
 
 GROWS = 1.25
-"""A larger scale counts if the feature is so many times as high there."""
+"""Ratio of heights above which a larger scale counts."""
 
 LOBE, FAR = 0.15, 4.0
-"""Detail lower than this share of a feature, within so many times its largest scale, is a side lobe."""
+"""Detail lower than this share of a feature, within this many of its largest scales, is a side lobe."""
 
 LEAST = 1e-4
 """Least height of a feature, mm."""

@@ -126,7 +126,7 @@ def laid(copies: Copies, wishes: Wishes, coupled: bool, clip: bool, removed: Map
     Raises
     ------
     EditError
-        For a copy of which held control points cut off too much.
+        If held control points cut off too much of a copy.
     """
     shifts = shifted(copies)
     task = _task(copies, shifts, wishes, removed)

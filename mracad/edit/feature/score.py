@@ -123,7 +123,7 @@ def _figures(copies: Copies, patch: Patch, wanted: Wanted, done: Array) -> Itera
 
 
 def refuse(copies: Copies, found: Sequence[Copy], clip: bool) -> None:
-    """Raise EditError for a copy that the ground cannot hold, or of which held control points cut off too much.
+    """Raise EditError for a copy that the ground cannot hold, or that loses too much to held control points.
 
     ``clip`` allows the latter.
     """
