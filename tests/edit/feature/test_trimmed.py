@@ -100,7 +100,7 @@ def test_a_feature_is_moved_off_a_trimmed_seam(feature):
 @pytest.mark.parametrize("options", [{"edges": "frozen"}, {"hold": ("edge#2",)}], ids=["frozen", "held"])
 def test_a_seam_that_may_not_move_takes_its_part(feature, options):
     place = word(on_seam(100.0, 10.0))
-    with pytest.raises(EditError, match="do not move take"):
+    with pytest.raises(EditError, match="stay in place cut off"):
         run(document(), repeat, Repeat(feature=feature, at=(place,), **options))
     paper = document()
     line = next(edge for edge in view(paper).edges if len(edge.sides) == 2)
@@ -113,7 +113,7 @@ def test_a_seam_that_may_not_move_takes_its_part(feature, options):
 
 def test_a_trimmed_seam_that_is_not_sewn_takes_its_part_and_says_so(feature):
     place = word(on_seam(100.0, 10.0))
-    with pytest.raises(EditError, match="do not move take"):
+    with pytest.raises(EditError, match="stay in place cut off"):
         run(document(sewn=False), repeat, Repeat(feature=feature, at=(place,)))
     report = run(document(sewn=False), repeat, Repeat(feature=feature, at=(place,), clip=True))
     assert {t.reason for t in report.edit.edges} == {Cause(Still.FREE), Cause(Still.UNSEWN)}
