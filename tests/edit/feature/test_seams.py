@@ -103,5 +103,5 @@ def test_a_copy_on_a_ruled_face_is_smooth(feature, axis):
 def test_a_copy_over_a_sharp_edge_is_refused(feature):
     """What lies beyond it is another side of the body, on which there is nothing of the copy."""
     document = shapes.document(zoo.nurbs(BRepPrimAPI_MakeBox(100.0, 100.0, 100.0).Shape()))
-    with pytest.raises(EditError, match="do not move take"):
+    with pytest.raises(EditError, match="stay in place cut off"):
         repeat(view(document), Repeat(feature=feature, at=("95,50,100",)))
