@@ -125,6 +125,7 @@ def _answer(work: Callable[[], Any], memory: int | None) -> bytes:
         return wire.answer(work)
     import resource
 
+    _take_buffers()
     hard = resource.getrlimit(resource.RLIMIT_DATA)[1]
     resource.setrlimit(resource.RLIMIT_DATA, (memory if hard < 0 else min(memory, hard), hard))
 
@@ -138,6 +139,16 @@ def _answer(work: Callable[[], Any], memory: int | None) -> bytes:
             raise
 
     return wire.answer(starved)
+
+
+def _take_buffers() -> None:
+    """Let the BLAS of numpy and that of scipy take their buffers: refused, they would ask for ever, or abort."""
+    import numpy as np
+    from scipy.linalg.lapack import dpbtrf
+
+    square = np.eye(256)
+    np.matmul(square, square)
+    dpbtrf(square[:128])
 
 
 def _starved(error: BaseException) -> bool:
