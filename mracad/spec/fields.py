@@ -145,7 +145,8 @@ def named(known: Mapping[str, Field], key: str) -> Field | None:
 def fields(struct: type[Struct]) -> dict[str, Field]:
     """The fields of a struct by name, in its order."""
     hints = typing.get_type_hints(struct, include_extras=True)
-    owner = getattr(struct, "function", "").partition(":")[2] or struct.__name__.lower()
+    named = getattr(struct, "command", "") or getattr(struct, "function", "").partition(":")[2]
+    owner = named or struct.__name__.lower()
     return {field.name: _field(owner, field, hints[field.name]) for field in structs.fields(struct)}
 
 

@@ -8,7 +8,7 @@ import pytest
 from mracad.errors import UsageError
 from mracad.spec.fields import fields
 from mracad.spec.quantity import ANGLE, LENGTH, MEMORY, MILLIMETRES, SHARE, TIME, length
-from mracad.spec.steps import STEPS, Check, Compare, Repeat, Smooth
+from mracad.spec.steps import STEPS, Check, Compare, Extract, Repeat, Smooth
 from mracad.spec.text import options
 
 
@@ -78,6 +78,10 @@ def test_bounds_are_those_of_the_declaration_in_python_and_in_recipes(struct, va
     for make in (lambda: struct(**values), lambda: options(struct, values)):
         with pytest.raises(UsageError, match=says):
             make()
+
+
+def test_hints_name_the_command_that_takes_the_option():
+    assert {field.hint for field in fields(Extract).values()} == {"see mracad feature extract --help"}
 
 
 @pytest.mark.parametrize("use", STEPS)

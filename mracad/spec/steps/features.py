@@ -61,6 +61,8 @@ class Featured(Selection, frozen=True, kw_only=True, forbid_unknown_fields=True)
 class Extract(Featured, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Save a feature to a file, for mracad repeat and mracad transfer."""
 
+    command: ClassVar[str] = "feature extract"
+
     feature: _Feature
 
 
