@@ -47,11 +47,12 @@ def edited(
     fit = math.radians(options.fit_g1 or 0.0)
     allowed = tolerances(model, options)
     free = isinstance(options, Fairing) and options.free_edges == "smooth"
+    corners = isinstance(options, Fairing) and options.corners == "move"
     result = faired(
         model,
         movable,
         wish,
-        Wishes(options.keep, fit, options.close_gaps, held, open=not wish.fairs, free=free),
+        Wishes(options.keep, fit, options.close_gaps, held, open=not wish.fairs, free=free, corners=corners),
         allowed if wish.fairs else replace(allowed, growth=RESHAPED, fairer=False),
         refine=options.refine == "auto",
         progress=progress,

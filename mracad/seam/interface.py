@@ -125,7 +125,7 @@ def joints(model: Model, movable: Collection[int], wishes: Wishes) -> Joints:
     jumps = wishes.keep not in CONTINUITY
     joined = Joints(tuple(exact), tuple(loose), known.closing, frozen, known.meetings, jumps)
     if wishes.free:
-        joined = _freed(joined)
+        joined = replace(_freed(joined), cornered=not wishes.corners)
     return _opened(joined) if wishes.open else joined
 
 
@@ -133,7 +133,7 @@ def _freed(joined: Joints) -> Joints:
     """The same joints, with free edges that move with their faces."""
     ends = frozenset(edge for edge, why in joined.frozen.items() if why.still is Still.FREE)
     frozen = {edge: why for edge, why in joined.frozen.items() if edge not in ends}
-    return replace(joined, frozen=frozen, open=ends, cornered=True)
+    return replace(joined, frozen=frozen, open=ends)
 
 
 def _opened(joined: Joints) -> Joints:

@@ -35,7 +35,9 @@ class Wishes:
     open : bool
         Whether free edges and poles move with their faces.
     free : bool
-        Whether free edges do, except for the corners of faces between two of them.
+        Whether free edges do.
+    corners : bool
+        Whether the corners of faces between two free edges that move do, too.
     """
 
     keep: str = "g1"
@@ -45,6 +47,7 @@ class Wishes:
     bend: float = 1e-9
     open: bool = False
     free: bool = False
+    corners: bool = False
 
     def order(self, angles: Array, one: Array, other: Array) -> int:
         """Number of derivatives kept across an edge, given those along it.

@@ -43,8 +43,14 @@ def options(command: click.Command, without: Container[str] = COVERED_ELSEWHERE)
 _LEVEL = [(), ("--band", "0mm:8mm"), ("--base", "level", "--band", "0mm:8mm")]
 _DONE = [("-o", "out.step"), ("-o", "out.brep", "-o", "out.stl"), ("-o", "-"), ("--dry-run",)]
 
+_RIMS = (
+    "free_edges corners",
+    [(), ("--free-edges", "hold"), ("--free-edges", "smooth"), ("--free-edges", "smooth", "--corners", "move")],
+)
+
 TOGETHER: Mapping[str, Sequence[tuple[str, Sequence[Words]]]] = {
-    "smooth": [("scale level", [("--scale", "4mm"), ("--scale", "20%"), ("--level", "1.5")])],
+    "smooth": [("scale level", [("--scale", "4mm"), ("--scale", "20%"), ("--level", "1.5")]), _RIMS],
+    "denoise": [_RIMS],
     "move": [("base band", _LEVEL), ("to", [("--to", "5,7,0"), ("--to", "#1@0.6,0.7")])],
     "repeat": [
         ("base band", _LEVEL),

@@ -68,6 +68,7 @@ WAYS = {
     "at": ("--at 5,8,0",),
     "band": ("--band 0mm:3mm", "--base level --band 0mm:8mm"),
     "base": ("--base level", "--band 0mm:8mm"),
+    "corners": ("--corners move", "--free-edges smooth"),
     "chord": ("--chord 1mm", "-o a.stl"),
     "clip": ("--clip", "--at 0.3,5,0"),
     "depfile": ("--depfile a.d",),

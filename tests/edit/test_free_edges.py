@@ -6,6 +6,7 @@ from msgspec import structs
 
 from mracad.edit.denoise import denoise
 from mracad.edit.smooth import smooth
+from mracad.errors import UsageError
 from mracad.inspect.seams import seams
 from mracad.occ.view import view
 from mracad.spec.steps.smooth import Denoise, Smooth
@@ -46,6 +47,24 @@ def test_a_rim_that_moves_gets_as_fair_as_the_inside(noisy, edit, options, most)
         assert np.array_equal(held.poles[i], noisy.poles[i]) and np.array_equal(held.poles[:, i], noisy.poles[:, i])
         for j in (0, -1):
             assert np.array_equal(free.poles[i, j], noisy.poles[i, j])
+
+
+def test_corners_may_move_along(noisy):
+    model = sheet(noisy)
+    nets = {
+        way: smooth(model, Smooth(scale="25mm", free_edges="smooth", corners=way)).displacement.applied(model)
+        for way in ("hold", "move")
+    }
+    held, free = (errors(nets[way].surfaces[0].net)[0] for way in ("hold", "move"))
+    off = {way: np.abs(_corners(nets[way].surfaces[0].net) - _corners(noisy)).min() for way in nets}
+    print(f"rim {held:.4f} with its corners held, {free:.4f} without")
+    assert off["hold"] == 0 < off["move"] and free < held
+    with pytest.raises(UsageError, match="corners: they stay where free edges do"):
+        Smooth(scale="25mm", corners="move")
+
+
+def _corners(net):
+    return net.poles[np.ix_([0, -1], [0, -1])]
 
 
 def test_seams_end_on_the_rim_where_it_went(noisy):

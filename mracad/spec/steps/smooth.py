@@ -56,6 +56,15 @@ class Fairing(Fitting, frozen=True, kw_only=True, forbid_unknown_fields=True):
             "corners between two of them."
         ),
     ] = "hold"
+    corners: Annotated[
+        Literal["hold", "move"],
+        Meta(description="Corners between two free edges that move: hold, they stay; move, they move along."),
+    ] = "hold"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.corners == "move" and self.free_edges == "hold":
+            raise UsageError("corners: they stay where free edges do", "add --free-edges smooth", "corners")
 
 
 class Smooth(Fairing, frozen=True, kw_only=True, forbid_unknown_fields=True):
