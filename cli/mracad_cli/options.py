@@ -101,6 +101,7 @@ def _option(field: Field) -> Callable[[Command], Command]:
     flag, missing = f"--{dashed(field.name)}", field.default is msgspec.NODEFAULT
     default = None if missing else field.default
     if field.type is bool:
+        flag = f"{flag}/--no-{dashed(field.name)}" if default else flag
         return click.option(field.name, flag, is_flag=True, help=field.help, default=default)
     kind: Any = click.Choice(field.choices) if field.choices else Declared(field)
     metavar = SHORT.get(field.quantity) if field.quantity else METAVARS.get(field.name)

@@ -31,6 +31,7 @@ from mracad.seam.hold import separate
 from mracad.seam.interface import Joints
 from mracad.seam.ladders import Creases
 from mracad.seam.solve import Problem
+from mracad.seam.stretch import EVEN, Stretch
 from mracad.spec.quantity import length
 from mracad.spec.select import Scope
 from mracad.spec.select import scope as scope_of
@@ -65,6 +66,7 @@ class Quiet:
     noise: Mapping[int, float]
     spread: ClassVar[float] = 1.0
     fairs: ClassVar[bool] = True
+    limited: ClassVar[bool] = False
 
     def wavelength(self, net: Net, faces: Sequence[Face], creases: Creases) -> float:
         """The wavelength with the least Cp for a surface alone, mm."""
@@ -80,6 +82,10 @@ class Quiet:
         size = 6 * self.noise[_surface(faces)] ** 2
         taken = [(stiffness(w) * bent) ** 2 / (1 + (stiffness(w) * bent) ** 2) for w in every.tolist()]
         return float(every[np.argmin([float((power * d**2).sum() - size * d.sum()) for d in taken])])
+
+    def stretch(self, faces: Sequence[Face]) -> Stretch:
+        """The same in every direction."""
+        return EVEN
 
     def space(self, net: Net) -> Net:
         """The surface over its own knots."""

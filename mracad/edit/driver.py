@@ -56,7 +56,7 @@ def drive(scene: Scene, wish: Wish, progress: Callable[[int, int], None] | None 
         tell(len(result), len(scene.sheets))
         alone, tried = _alone(scene, wish, group)
         result |= alone
-        able = [i for i in group if i not in alone or alone[i].amount >= LEAST]
+        able = [i for i in group if i not in alone or alone[i].amount >= LEAST or alone[i].hindered]
         for members in groups(able, scene.joints.among(able)):
             for part, joined in _together(scene, wish, members, alone, tried):
                 exact += [seam for seam in joined.exact if seam.a.surface != seam.b.surface]
@@ -222,12 +222,14 @@ def _attempt(
     members = {i: scene.sheets[i] for i in surfaces}
     trial = Trial(scene, members, joined, finer)
     target = wish.target(trial.problem, members, joined)
+    if trial.pose.share is not None:
+        target = trial.pose.share * target
     wished = sum(trial.problem.gains(target, target, [1.0] * len(members)))
     found = [trial.nothing(least * wished)]
     for batch in wish.ways(trial.problem, target, trial.width) if trial.problem.free.any() else ():
         first = len(found)
         for wanted in batch:
-            found.append(trial.judged(wanted, target, found))
+            found.append(trial.judged(trial.pose.faded(wanted), target, found))
         if max(found, key=rank).least <= ENOUGH:
             for each in found[first:]:
                 found.append(trial.eased(each, target, found))
@@ -241,8 +243,16 @@ def _attempt(
         found.append(trial.blended(chosen, target, found))
         if max(found, key=rank) is now:
             break
-    moved = _confirmed(trial, members, found, target)
-    if any(each.amount for each in moved.values()) or not scene.tolerances.fairer:
+    return _explained(trial, _confirmed(trial, members, found, target), target)
+
+
+def _explained(trial: Trial, moved: dict[int, Moved], target: Array) -> dict[int, Moved]:
+    """Results with what stands against more."""
+    if len(moved) == 1 and target.any():
+        moved = {
+            i: replace(each, hindered=each.amount < LEAST and trial.unhindered(target)) for i, each in moved.items()
+        }
+    if any(each.amount for each in moved.values()) or not trial.tolerances.fairer:
         return moved
     fairer = trial.fairer(target)
     return {i: replace(each, rough=fair) for (i, each), fair in zip(moved.items(), fairer, strict=True)}

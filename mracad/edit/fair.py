@@ -12,7 +12,7 @@ the face).  Waves of half the scale keep 0.4 %, those of three scales all but 2e
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
 import numpy as np
@@ -30,6 +30,7 @@ from mracad.model.brep import Face, Model
 from mracad.seam.interface import Joints, joints
 from mracad.seam.ladders import Creases
 from mracad.seam.solve import Problem
+from mracad.seam.stretch import EVEN, Stretch
 from mracad.seam.wishes import Wishes
 
 Array = np.ndarray
@@ -49,15 +50,33 @@ class Filter:
     ----------
     scale : float
         mm.
+    across : float, optional
+        The same across the lines of the parameter that leads, mm.
+    leads : mapping of int to int
+        Which parameter leads, by surface: 0 for u, 1 for v.
+    limited : bool
+        Whether wavelengths follow the radii of curvature where these are too small for them.
     """
 
     scale: float
+    across: float | None = None
+    leads: Mapping[int, int] = field(default_factory=dict)
+    limited: bool = False
     spread: ClassVar[float] = 1.0
     fairs: ClassVar[bool] = True
 
     def wavelength(self, net: Net, faces: Sequence[Face], creases: Creases) -> float:
-        """The scale, for every surface."""
-        return self.scale
+        """The scale, for every surface: the longer one."""
+        return self.scale if self.across is None else max(self.scale, self.across)
+
+    def stretch(self, faces: Sequence[Face]) -> Stretch:
+        """Both scales over the longer one."""
+        surface = faces[0].surface
+        if self.across is None or surface is None:
+            return EVEN
+        longest, lead = max(self.scale, self.across), self.leads[surface]
+        both = self.scale / longest, self.across / longest
+        return Stretch((both[lead], both[1 - lead]), lead)
 
     def space(self, net: Net) -> Net:
         """The surface over its own knots."""
@@ -65,7 +84,8 @@ class Filter:
 
     def target(self, problem: Problem, sheets: Mapping[int, Sheet], joined: Joints) -> Array:
         """What smoothing would do if no rim were held, ``(points, 3)``."""
-        return problem.filtered(stiffness(self.scale), problem.seen)
+        width = max(sheet.wavelength for sheet in sheets.values())
+        return problem.filtered(stiffness(width), problem.seen)
 
     def ways(self, problem: Problem, target: Array, width: float) -> Iterable[Iterable[Array]]:
         """See :func:`ways`."""
@@ -96,7 +116,7 @@ def calm(problem: Problem, target: Array, width: float) -> Array:
         jet = jets(net, us, vs, np.ones(net.poles.shape[:2], bool), np.zeros(3))
         bent = forms(jet).largest.reshape(len(vs), len(us)).T * width / (2 * np.pi)
         share = np.clip((SHARP[1] - bent) / (SHARP[1] - SHARP[0]), 0.0, 1.0)
-        found.append(eased(net, share, width).ravel())
+        found.append(eased(net, share, (width, width)).ravel())
     return np.concatenate(found)[:, None]
 
 

@@ -34,6 +34,7 @@ from mracad.seam.interface import Joints
 from mracad.seam.ladders import Creases, ladders
 from mracad.seam.natural import Seam
 from mracad.seam.solve import Problem
+from mracad.seam.stretch import EVEN, Stretch
 from mracad.wavelet.ladder import arc_lengths
 from mracad.wavelet.project import projection
 
@@ -58,6 +59,7 @@ class Level:
 
     level: float
     fairs: ClassVar[bool] = True
+    limited: ClassVar[bool] = False
     spread: ClassVar[float] = math.inf  # waves beside what goes are part of a projection
 
     def wavelength(self, net: Net, faces: Sequence[Face], creases: Creases) -> float:
@@ -71,6 +73,10 @@ class Level:
             changed = [s for s, each, knots in zip(spacing, coarse, own, strict=True) if each != knots]
             total += weight * math.sqrt(2) * min(changed or spacing)
         return total
+
+    def stretch(self, faces: Sequence[Face]) -> Stretch:
+        """The same in every direction."""
+        return EVEN
 
     def space(self, net: Net) -> Net:
         """The surface over its own knots."""

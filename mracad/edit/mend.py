@@ -133,7 +133,7 @@ def _moved(members: Mapping[int, Sheet], found: Pose, delta: Array) -> dict[int,
 
 def _whole(sheet: Sheet, net: Net, offset: Array, free: int) -> Moved:
     """A displacement made in full."""
-    now = Watch.of([(net, sheet.base, sheet.faces)], sheet.wavelength, sheet.reach).changes(
+    now = Watch.of([(net, sheet.base, sheet.faces)], sheet.wavelength, [sheet.reach]).changes(
         {0: displaced(net, offset)}
     )[0]
     return Moved(sheet, net, offset, 1.0, now, (), free, 0.0, 0.0)

@@ -44,6 +44,8 @@ class Moved:
         How much nearer the surfaces that move with it came to the target, and the whole distance, as squared norms.
     rough : bool
         Whether the wanted change would reduce its roughness at all.
+    hindered : bool
+        Whether nothing but what holds it stands against the wanted change: together with others it may do more.
     """
 
     sheet: Sheet
@@ -56,6 +58,7 @@ class Moved:
     gain: float
     wanted: float
     rough: bool = True
+    hindered: bool = False
 
     @property
     def deviation(self) -> float:
@@ -103,7 +106,7 @@ class Moved:
 
     def _watch(self) -> Watch:
         return Watch.of(
-            [(self.net, self.sheet.base, self.sheet.faces)], self.sheet.wavelength, self.sheet.reach, CLOSER
+            [(self.net, self.sheet.base, self.sheet.faces)], self.sheet.wavelength, [self.sheet.reach], CLOSER
         )
 
     def displacement(self) -> Offset:

@@ -22,6 +22,7 @@ from mracad.seam.interface import Joints
 from mracad.seam.ladders import Creases
 from mracad.seam.solve import Problem
 from mracad.seam.space import MOST_POINTS
+from mracad.seam.stretch import EVEN, Stretch
 from mracad.spec.quantity import length
 from mracad.spec.select import Scope
 from mracad.spec.steps.smooth import OffsetFaces
@@ -51,10 +52,15 @@ class Outward:
     refine: bool = True
     spread: ClassVar[float] = math.inf
     fairs: ClassVar[bool] = False
+    limited: ClassVar[bool] = False
 
     def wavelength(self, net: Net, faces: Sequence[Face], creases: Creases) -> float:
         """The width within which it fades, mm."""
         return FADE * abs(self.distance)
+
+    def stretch(self, faces: Sequence[Face]) -> Stretch:
+        """The same in every direction."""
+        return EVEN
 
     def space(self, net: Net) -> Net:
         """The surface with spans divided until splines can hold d n."""

@@ -19,8 +19,10 @@ from mracad.seam.contact import rows as contact_rows
 from mracad.seam.energy import forms
 from mracad.seam.interface import Joints, away, contact, mended_ends, rims, twists
 from mracad.seam.metric import seen
-from mracad.seam.solve import Problem, Space
+from mracad.seam.solve import Problem, Space, faded
 from mracad.seam.space import refined
+from mracad.seam.stretch import Limit
+from mracad.seam.zones import Zoned
 
 Array = np.ndarray
 
@@ -88,6 +90,8 @@ class Pose:
         Their allowed errors.
     trimmed : ndarray of bool (conditions,)
         Conditions of seams along trim curves that are to be mended.
+    share : ndarray (points, 1), optional
+        0 in regions where nothing moves, 1 farther than a wavelength from there.
     """
 
     problem: Problem
@@ -96,6 +100,11 @@ class Pose:
     opened: Array
     limits: Array
     trimmed: Array
+    share: Array | None = None
+
+    def faded(self, delta: Array) -> Array:
+        """A displacement that fades out within a wavelength of regions where nothing moves."""
+        return delta if self.share is None else self.problem.nearest(self.share * delta)
 
     def open(self, delta: Array) -> bool:
         """Whether a displacement leaves seams along trim curves open that should be mended."""
@@ -135,16 +144,20 @@ def pose(
         nets = {i: _beside_seams(net, members[i], joined, longest) for i, net in nets.items()}
     nets = matched(nets, joined.exact)
     nets = matched(doubled(nets, joined.exact), joined.exact)
+    shares: list[Array] = []
     spaces, contacts = {}, [contact(seam) for seam in joined.loose]
     for i, net in nets.items():
         sheet = members[i]
-        form = forms(net, sheet.metric, quadrature(net, sheet.faces), sheet.creases)
+        form = forms(net, sheet.metric, quadrature(net, sheet.faces), sheet.creases, sheet.stretch)
         points = seen(net, form)
         held, more = rims(scene.model, net, sheet.all_faces, movable, joined)
         held &= ~mended_ends(scene.model, net, i, sheet.all_faces, movable, joined, width / 2)
         held |= twists(held)
         contacts += more
-        far = away(scene.model, net, sheet.faces, joined.moving)
+        zoned = _zoned(sheet, net, joined, width)
+        held |= zoned.held
+        far = np.minimum(away(net, sheet.faces, joined.moving, sheet.stretch), zoned.away)
+        shares.append(faded(zoned.away.ravel(), width))
         spaces[i] = Space(net, form, points & ~held, points, sheet.trend.over(net.u, net.v).poles, far)
     found = contact_rows(nets, contacts)
     f = np.concatenate([net.poles.reshape(-1, 3) for net in nets.values()])
@@ -164,7 +177,17 @@ def pose(
     between = weight * found.form(np.where(smooth, EASY * limits, np.inf)) if smooth.any() else None
     trimmed = mends & np.array([not each.since for each in contacts], bool)[found.owner]
     problem = Problem(spaces, rows, np.where(goal[:, None], -(rows @ f), 0.0), soft, pull, between)
-    return Pose(problem, found, [each.surfaces for each in contacts], opened, limits, trimmed)
+    owners = [each.surfaces for each in contacts]
+    share = np.concatenate(shares)[:, None] if joined.zones else None
+    return Pose(problem, found, owners, opened, limits, trimmed, share)
+
+
+def _zoned(sheet: Sheet, net: Net, joined: Joints, width: float) -> Zoned:
+    """The part of a surface in regions where nothing moves; its curvature is seen without what is to go."""
+    look = sheet.stretch.limit
+    if joined.zones and look is None:
+        look = Limit.of(sheet.net, sheet.stretch.times(width), sheet.creases)
+    return Zoned.of(net, sheet.all_faces, joined.zones, look)
 
 
 def worth(detail: float, width: float) -> float:
@@ -176,10 +199,14 @@ def worth(detail: float, width: float) -> float:
 def beside_rims(sheet: Sheet, joined: Joints) -> Net:
     """A surface with knot spans of at most a quarter of the wavelength beside its rims."""
     trims = [(face, trim) for face in sheet.faces for trim in face.trims if trim.edge not in joined.moving]
-    return refined(sheet.net, trims, sheet.wavelength / 4)
+    return refined(sheet.net, trims, sheet.stretch.times(sheet.wavelength / 4))
 
 
 def _beside_seams(net: Net, sheet: Sheet, joined: Joints, longest: float) -> Net:
     """A surface with knot spans of at most a length (mm) beside seams along trim curves."""
     loose = {edge for seam in joined.loose if not seam.since for edge in (seam.edge, seam.twin)}
-    return refined(net, [(face, trim) for face in sheet.faces for trim in face.trims if trim.edge in loose], longest)
+    return refined(
+        net,
+        [(face, trim) for face in sheet.faces for trim in face.trims if trim.edge in loose],
+        sheet.stretch.times(longest),
+    )

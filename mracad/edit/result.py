@@ -27,6 +27,7 @@ class Reason(Enum):
     AMOUNT = "amount 0"
     NO_COPY = "no copy on it"
     NO_FREE = "no free control points"
+    ASKEW = "its parameter lines run elsewhere"
     RIM = "cannot get fairer with its edges held"
     ROUGHER = "would get rougher"
     SPOILED = "would come out worse"

@@ -17,6 +17,7 @@ from mracad.seam.interface import Joints
 from mracad.seam.ladders import Creases
 from mracad.seam.metric import SMOOTHER, creases, seen, smoothed
 from mracad.seam.solve import Problem, Space
+from mracad.seam.stretch import Limit, Stretch
 from mracad.wavelet.ladder import arc_lengths
 from mracad.wavelet.project import at_scale
 
@@ -38,6 +39,8 @@ class Wish(Protocol):
         Number of wavelengths within which a change at a place spreads; infinite where that is no fault.
     fairs : bool
         Whether it makes faces fairer; otherwise it changes their shape, and free edges and poles move along.
+    limited : bool
+        Whether wavelengths follow the radii of curvature where these are too small for them.
     """
 
     @property
@@ -46,8 +49,15 @@ class Wish(Protocol):
     @property
     def fairs(self) -> bool: ...
 
+    @property
+    def limited(self) -> bool: ...
+
     def wavelength(self, net: Net, faces: Sequence[Face], creases: Creases) -> float:
         """Wavelength below which it removes waves from a surface, mm; beside what is held it fades within this."""
+        ...
+
+    def stretch(self, faces: Sequence[Face]) -> Stretch:
+        """Wavelengths by direction on the surface of faces, over that one: the longest is 1."""
         ...
 
     def space(self, net: Net) -> Net:
@@ -85,8 +95,10 @@ class Sheet:
         Crease lines in u and v.
     wavelength : float
         Wavelength below which the edit removes waves, mm.
-    reach : float
-        Distance within which a change spreads, mm.
+    stretch : Stretch
+        Wavelengths by direction, over that one.
+    reach : (float, float)
+        Distance within which a change spreads along u and v, mm.
     trend, base : Net
         The surface projected on the splines of a few wavelengths, which is shape; and of many, for the judge: a trend
         that oscillates around a mark would hide new waves there.
@@ -102,7 +114,8 @@ class Sheet:
     metric: Net
     creases: Creases
     wavelength: float
-    reach: float
+    stretch: Stretch
+    reach: tuple[float, float]
     trend: Net
     base: Net
     detail: float = 0.0
@@ -134,24 +147,29 @@ def _sheet(index: int, origin: Net, every: tuple[Face, ...], faces: tuple[Face, 
     points = quadrature(net, faces)
     sharp = creases(net, np.ones(net.poles.shape[:2], bool))
     wavelength = wish.wavelength(origin, faces, sharp)
-    metric = smoothed(net, points, SMOOTHER**4 * stiffness(wavelength))
-    form = forms(net, metric, points, sharp)
-    reach = seen(net, form)
-    trend, base = (at_scale(net, waves * wavelength, sharp) for waves in (TREND, BASE))
-    sheet = Sheet(index, origin, net, every, faces, metric, sharp, wavelength, wish.spread * wavelength, trend, base)
-    alone = Problem({index: Space(net, form, reach, reach, sheet.trend.poles)})
+    stretch = wish.stretch(faces)
+    if wish.limited:
+        stretch = replace(stretch, limit=Limit.of(net, stretch.times(wavelength), sharp))
+    metric = smoothed(net, points, SMOOTHER**4 * stiffness(wavelength), stretch)
+    form = forms(net, metric, points, sharp, stretch)
+    depends = seen(net, form)
+    trend, base = (at_scale(net, stretch.times(waves * wavelength), sharp) for waves in (TREND, BASE))
+    reach = stretch.times(wish.spread * wavelength)
+    sheet = Sheet(index, origin, net, every, faces, metric, sharp, wavelength, stretch, reach, trend, base)
+    alone = Problem({index: Space(net, form, depends, depends, sheet.trend.poles)})
     change = wish.target(alone, {index: sheet}, Joints())
     return replace(sheet, detail=float(np.linalg.norm(change[alone.seen], axis=1).max(initial=0.0)))
 
 
-def eased(net: Net, share: Array, width: float) -> Array:
+def eased(net: Net, share: Array, widths: tuple[float, float]) -> Array:
     """Shares ``(nu, nv)`` of control points made smooth, and nowhere larger than before.
 
-    The mean, over a window of the width (mm), of the least over the same window.
+    The mean, over a window of widths along u and v (mm), of the least over the same window.
     """
     from scipy.ndimage import minimum_filter, uniform_filter
 
     spacing = (arc_lengths(net, axis).sum() / net.poles.shape[axis] for axis in (0, 1))
-    window = tuple(2 * int(min(width / 2 / step, count)) + 1 for step, count in zip(spacing, share.shape, strict=True))
+    sizes = zip(widths, spacing, share.shape, strict=True)
+    window = tuple(2 * int(min(width / 2 / step, count)) + 1 for width, step, count in sizes)
     least = minimum_filter(share, window, mode="nearest")
     return np.asarray(np.minimum(share, uniform_filter(least, window, mode="nearest")))

@@ -15,7 +15,7 @@ from mracad.edit.target import Sheet, eased, stiffness
 from mracad.edit.tolerances import Tolerances
 from mracad.edit.watch import BISECTIONS, Tried, Watch, amounts, displaced
 from mracad.inspect.places import Placed
-from mracad.inspect.roughness import Change, Worse, better, places
+from mracad.inspect.roughness import Change, Worse, better, places, worse
 from mracad.seam.interface import Joints
 
 Array = np.ndarray
@@ -92,7 +92,8 @@ class Trial:
         spaces = self.problem.spaces
         surfaces = [(space.net, members[i].base, members[i].faces) for i, space in spaces.items()]
         self.nets = [space.net for space in spaces.values()]
-        self.watch = Watch.of(surfaces, self.width, max(sheet.reach for sheet in members.values()))
+        self.stretches = [members[i].stretch for i in spaces]
+        self.watch = Watch.of(surfaces, self.width, [members[i].reach for i in spaces])
 
     def nothing(self, least: float = 0.0) -> Verdict:
         """The verdict on no change, with a gain that others have to exceed."""
@@ -104,8 +105,8 @@ class Trial:
         """The share of a displacement allowed for each surface; 0 where it could not do better than others."""
         bound = self.tolerances.deviation
         if np.isfinite(bound) and np.linalg.norm(delta, axis=1).max(initial=0.0) > bound:
-            both = zip(self.nets, self._split(delta), strict=True)
-            within = [bounded(net, part, bound, self.width).reshape(-1, 3) for net, part in both]
+            every = zip(self.nets, self._split(delta), self.stretches, strict=True)
+            within = [bounded(net, part, bound, s.times(self.width)).reshape(-1, 3) for net, part, s in every]
             delta = self.problem.nearest(np.concatenate(within))
         tried = Tried(self.watch, self.nets, self._split(delta))
         return self._verdict(tried, target, self._floor(delta, target, others), BISECTIONS[len(self.nets) > 1])
@@ -156,6 +157,11 @@ class Trial:
         found = self.watch.changes({i: displaced(space.net, part) for i, (space, part) in enumerate(both)})
         return [any(better(change, GAIN[0]) for change in faces.values()) for faces in found.values()]
 
+    def unhindered(self, target: Array) -> bool:
+        """Whether the judge would allow a whole target if nothing held it."""
+        every = Tried(self.watch, self.nets, self._split(target)).changes(dict.fromkeys(range(len(self.nets)), 1.0))
+        return not any(worse(change, self.tolerances.growth) for faces in every.values() for change in faces.values())
+
     def _floor(self, delta: Array, target: Array, others: Sequence[Verdict]) -> Array:
         """Amounts below which a displacement is worth less than another; infinite if it always is."""
         best, count = max((worth(each) for each in others), default=0.0), len(self.nets)
@@ -187,8 +193,8 @@ class Trial:
         for (i, _), (placed, share) in found.items():
             at = placed.at(self.nets[i].u.greville(), self.nets[i].v.greville())
             least[i] = np.minimum(least[i], share[np.ix_(*at)])
-        both = zip(self.nets, least, strict=True)
-        return np.concatenate([eased(net, share, self.width / 2).ravel() for net, share in both])[:, None]
+        both = zip(self.nets, least, self.stretches, strict=True)
+        return np.concatenate([eased(net, share, s.times(self.width / 2)).ravel() for net, share, s in both])[:, None]
 
     def _ceilings(self, delta: Array) -> Array:
         """The share of a displacement that contacts allow for each surface."""
@@ -227,8 +233,8 @@ def rank(verdict: Verdict) -> tuple[float, float]:
     return worth(verdict), sum(verdict.gains)
 
 
-def bounded(net: Net, offset: Array, bound: float, width: float) -> Array:
-    """Offsets ``(nu, nv, 3)`` scaled back, smoothly within a width, until none exceeds a bound along the normal.
+def bounded(net: Net, offset: Array, bound: float, widths: tuple[float, float]) -> Array:
+    """Offsets ``(nu, nv, 3)`` scaled back, smoothly within widths, until none exceeds a bound along the normal.
 
     Each gets the share min(1, bound / |δ · n|), eased, for the largest |δ · n| beside its Greville point.
 
@@ -236,8 +242,10 @@ def bounded(net: Net, offset: Array, bound: float, width: float) -> Array:
     ----------
     net : Net
     offset : ndarray (nu, nv, 3)
-    bound, width : float
+    bound : float
         mm.
+    widths : (float, float)
+        Along u and v, mm.
     """
     from scipy.ndimage import maximum_filter
 
@@ -247,7 +255,7 @@ def bounded(net: Net, offset: Array, bound: float, width: float) -> Array:
     far = np.abs((np.asarray(net.with_poles(offset).grid(us, vs)) * normals).sum(axis=-1))
     far = maximum_filter(far, 2 * FINER + 1, mode="nearest")[::FINER, ::FINER]
     share = bound / np.maximum(far, bound)
-    return np.asarray(offset * eased(net, share, width)[..., None])
+    return np.asarray(offset * eased(net, share, widths)[..., None])
 
 
 def _between(places: Array) -> Array:

@@ -38,15 +38,19 @@ class Watch:
 
     @classmethod
     def of(
-        cls, surfaces: Sequence[tuple[Net, Net, Sequence[Face]]], width: float, reach: float, points: int = POINTS
+        cls,
+        surfaces: Sequence[tuple[Net, Net, Sequence[Face]]],
+        width: float,
+        reaches: Sequence[tuple[float, float]],
+        points: int = POINTS,
     ) -> Watch:
         """Watch faces of surfaces, with their bases, before an edit that removes waves up to a width and spreads them
-        within a reach (mm), at so many points a span."""
+        within a reach along u and v (mm, for each surface), at so many points a span."""
         every = [(place, net, base, face) for place, (net, base, faces) in enumerate(surfaces) for face in faces]
         looked = [(net, (face,), net.u, net.v) for _, net, _, face in every]
-        bases = [base for *_, base, _ in every] if np.isfinite(reach) else ()
+        bases = [base for *_, base, _ in every] if np.isfinite(reaches).all() else ()
         return cls(
-            surveys(looked, points, SINGULAR / width, reach, bases),
+            surveys(looked, points, SINGULAR / width, [reaches[place] for place, *_ in every], bases),
             [(place, face.index) for place, *_, face in every],
         )
 

@@ -52,7 +52,9 @@ def edited(
         model,
         movable,
         wish,
-        Wishes(options.keep, fit, options.close_gaps, held, open=not wish.fairs, free=free, corners=corners),
+        Wishes(
+            options.keep, fit, options.close_gaps, held, scope.zones, open=not wish.fairs, free=free, corners=corners
+        ),
         allowed if wish.fairs else replace(allowed, growth=RESHAPED, fairer=False),
         refine=options.refine == "auto",
         progress=progress,

@@ -106,10 +106,12 @@ class Places:
     around: Array
 
     @classmethod
-    def of(cls, rule: Quadrature, form: Forms, base: Forms | None, areas: Array, wavelength: float) -> Places:
+    def of(
+        cls, rule: Quadrature, form: Forms, base: Forms | None, areas: Array, wavelengths: tuple[float, float]
+    ) -> Places:
         """Places of the faces of a quadrature rule, with the forms of the surface and of its base, and areas (mm²), at
-        its points."""
-        (rows, u), (columns, v) = (_divided(rule, form, axis, wavelength / SIDES) for axis in (0, 1))
+        its points; wavelengths (mm) along u and v."""
+        (rows, u), (columns, v) = (_divided(rule, form, axis, wavelengths[axis] / SIDES) for axis in (0, 1))
         shape = len(u), len(v)
         cell = rows * shape[1] + columns
         order = np.argsort(cell, kind="stable")
@@ -119,7 +121,7 @@ class Places:
         area = places._gathered(np.add, areas)
         area = np.where(area > SMALL * area.max(initial=0.0), area, 0.0)
         before, beyond = places._means(form, areas), places._beyond(form, areas)
-        k = 2 * np.pi / wavelength
+        k = 2 * np.pi / min(wavelengths)
         flat = np.array([SLOPE**2 * k**2 / 2, SLOPE**2 * k**4 / 8])
         return replace(places, area=area, before=before, most=_around(before, flat), around=_around(beyond, flat))
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import chain
+from itertools import chain, zip_longest
 
 import numpy as np
 
@@ -87,7 +87,7 @@ def surveys(
     surfaces: Iterable[tuple[Net, Sequence[Face], KnotVector, KnotVector]],
     points: int = POINTS,
     singular: float = np.inf,
-    reach: float = 0.0,
+    reaches: Sequence[tuple[float, float]] = (),
     bases: Sequence[Net] = (),
 ) -> list[Survey]:
     """Measure surfaces before an edit.
@@ -100,8 +100,9 @@ def surveys(
         Points a span of those knots, in either direction.
     singular : float
         Curvature, 1/mm, above which a point is singular: there, figures on a grid depend on where its points lie.
-    reach : float
-        Distance within which the edit spreads a change, mm: faces are then also measured place by place.
+    reaches : sequence of (float, float)
+        Distances along u and v within which the edit spreads a change, mm, for each surface: faces are then also
+        measured place by place.
     bases : sequence of Net
         Smooth copies of the surfaces, beside which waves show; planes by default.
     """
@@ -112,7 +113,7 @@ def surveys(
     found = []
     seen = _seen([(net, rule, centre) for net, _, rule, _, centre in ready])
     shapes = _seen([(net, rule, centre) for net, (_, _, rule, _, centre) in zip(bases, ready, strict=False)])
-    for (net, faces, rule, knots, centre), (at, form) in zip(ready, seen, strict=True):
+    for (net, faces, rule, knots, centre), (at, form), reach in zip_longest(ready, seen, reaches):
         _, base = next(shapes, (None, None))
         sides = form.speeds * _spans(rule, knots)
         least = max(CLUSTER[0], CLUSTER[1] * float(np.linalg.norm(np.ptp(net.poles, axis=(0, 1)))))

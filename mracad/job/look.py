@@ -28,7 +28,8 @@ def looked_at(document: Document, options: Selection) -> tuple[Model, Scope]:
         faces, held, named = (
             frozenset(own.faces[i] for i in each & own.faces.keys()) for each in (scope.faces, scope.held, scope.named)
         )
-        scope = Scope(faces, held, frozenset(own.edges.get(i, i) for i in scope.edges), named)
+        edges = frozenset(own.edges.get(i, i) for i in scope.edges)
+        scope = Scope(faces, held, edges, named, scope.zones)
         if options.faces and not faces:
             raise UsageError(f"no selected face is in '{options.instance}'", "leave out --faces, or select others")
     convertible = {i for i in scope.chosen if model.faces[i].surface is None}

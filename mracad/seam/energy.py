@@ -23,6 +23,7 @@ from mracad.bspline.knots import KnotVector, Side
 from mracad.bspline.surface import Net
 from mracad.model.cells import Quadrature
 from mracad.seam.integrals import Order, Sites, integrals, sites
+from mracad.seam.stretch import EVEN, Stretch, stretched
 
 Array = np.ndarray
 
@@ -52,7 +53,13 @@ class Forms:
     creases: Any
 
 
-def forms(net: Net, metric: Net, quadrature: Quadrature, creases: Sequence[Collection[float]] = ((), ())) -> Forms:
+def forms(
+    net: Net,
+    metric: Net,
+    quadrature: Quadrature,
+    creases: Sequence[Collection[float]] = ((), ()),
+    stretch: Stretch = EVEN,
+) -> Forms:
     """Mass and bending of displacements of ``net``.
 
     Parameters
@@ -65,9 +72,11 @@ def forms(net: Net, metric: Net, quadrature: Quadrature, creases: Sequence[Colle
         Gauss points over the faces on it.
     creases : pair of collections of float
         Knots in u and v on which the surface has a crease: there only a displacement's own kink counts.
+    stretch : Stretch
+        What waves count for in the bending, by direction.
     """
     along = sites(net.u, quadrature.u, quadrature.wu), sites(net.v, quadrature.v, quadrature.wv)
-    frame, area = _frames(metric, along)
+    frame, area = _frames(metric, along, stretch)
     area = np.where(quadrature.mask, area, 0.0)
     orders: tuple[Order, ...] = ORDERS[1:]
     mass = area
@@ -77,13 +86,15 @@ def forms(net: Net, metric: Net, quadrature: Quadrature, creases: Sequence[Colle
     frame = frame * np.sqrt(area)
     bend = {(a, b): _dot(frame[i], frame[j]) for i, a in enumerate(orders) for j, b in enumerate(orders[: i + 1])}
     periodic, scale = (net.u.periodic, net.v.periodic), net.weights
-    smooth, sharp = _kinks(net, metric, quadrature, creases)
+    smooth, sharp = _kinks(net, metric, quadrature, creases, stretch)
     area = _sparse(integrals(along, {(ORDERS[0], ORDERS[0]): mass}), periodic, scale)
     bending = _sparse(integrals(along, bend), periodic, scale)
     return Forms(area, bending + smooth if smooth.nnz else _on_pattern(bending, area), sharp)
 
 
-def _kinks(net: Net, metric: Net, quadrature: Quadrature, creases: Sequence[Collection[float]]) -> tuple[Any, Any]:
+def _kinks(
+    net: Net, metric: Net, quadrature: Quadrature, creases: Sequence[Collection[float]], stretch: Stretch
+) -> tuple[Any, Any]:
     """Energies of kinks on knot lines of full multiplicity; those of creases separately."""
     from scipy.sparse import csr_array
 
@@ -94,7 +105,8 @@ def _kinks(net: Net, metric: Net, quadrature: Quadrature, creases: Sequence[Coll
         for sharp in (False, True):
             lines = [t for t in full if (t in creases[axis]) == sharp]
             if lines:
-                found[sharp] = found[sharp] + _kink(net, metric, quadrature, axis, np.array(lines))
+                kink = _kink(net, metric, quadrature, axis, np.array(lines))
+                found[sharp] = found[sharp] + stretch.lengths[axis] ** 4 * kink
     return found[0], found[1]
 
 
@@ -160,7 +172,7 @@ def _sloped(net: Net, metric: Net, uv: Array, axis: int, side: Side) -> tuple[Ar
     return index, _Side((dn - (f / g)[:, None] * dt) / height[:, None], height, np.sqrt(g))
 
 
-def _frames(metric: Net, along: tuple[Sites, Sites]) -> tuple[Array, Array]:
+def _frames(metric: Net, along: tuple[Sites, Sites], stretch: Stretch) -> tuple[Array, Array]:
     """Coefficients in H̃_11, √2 H̃_12, H̃_22 of ∂_u, ∂_v, ∂_uu, ∂_uv, ∂_vv, ``(5, 3, qu, qv)``, and areas ``(qu, qv)``."""
     xu, xv, xuu, xuv, xvv = _jets(metric, along)[1:]
     e, f, g = _dot(xu, xu), _dot(xu, xv), _dot(xv, xv)
@@ -185,6 +197,8 @@ def _frames(metric: Net, along: tuple[Sites, Sites]) -> tuple[Array, Array]:
             frame[2 + k, i] = value
             for d in (0, 1):
                 frame[d, i] -= value * christoffel[k][d]
+    if not stretch.plain:
+        frame = stretched(frame, stretch.root(along[0].at, along[1].at, (e, f, g), (p, q, r)))
     return frame, root * (along[0].weight.reshape(-1, 1) * along[1].weight.ravel())
 
 

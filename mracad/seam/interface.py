@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from mracad.bspline.surface import Net
+from mracad.bspline.surface import Net, pairs
 from mracad.model.brep import Face, Model, Trim
 from mracad.seam.border import Border
 from mracad.seam.cause import Cause, Still
@@ -19,9 +19,12 @@ from mracad.seam.contact import Contact
 from mracad.seam.hold import CONTINUITY, meeting, reached
 from mracad.seam.natural import Meeting, Seam, seams
 from mracad.seam.space import line
+from mracad.seam.stretch import EVEN, Stretch
 from mracad.seam.trace import trace_of
 from mracad.seam.trimmed import TrimmedSeam, beside, trimmed
 from mracad.seam.wishes import CREASE, Wishes
+from mracad.spec.places import Zone
+from mracad.wavelet.ladder import arc_lengths
 
 Array = np.ndarray
 
@@ -59,6 +62,8 @@ class Joints:
         Free edges and poles that move with their faces.
     cornered : bool
         Whether the corners of faces between two of them stay.
+    zones : tuple of Zone
+        Regions in which nothing moves.
     """
 
     exact: tuple[Seam, ...] = ()
@@ -69,6 +74,7 @@ class Joints:
     jumps: bool = False
     open: frozenset[int] = frozenset()
     cornered: bool = False
+    zones: tuple[Zone, ...] = ()
 
     @property
     def moving(self) -> frozenset[int]:
@@ -123,7 +129,7 @@ def joints(model: Model, movable: Collection[int], wishes: Wishes) -> Joints:
             exact.remove(seam)
             frozen |= dict.fromkeys((seam.edge, seam.twin), rest)
     jumps = wishes.keep not in CONTINUITY
-    joined = Joints(tuple(exact), tuple(loose), known.closing, frozen, known.meetings, jumps)
+    joined = Joints(tuple(exact), tuple(loose), known.closing, frozen, known.meetings, jumps, zones=wishes.zones)
     if wishes.free:
         joined = replace(_freed(joined), cornered=not wishes.corners)
     return _opened(joined) if wishes.open else joined
@@ -257,8 +263,8 @@ def mended_ends(
     return np.asarray(~firm & near.reshape(firm.shape))
 
 
-def away(model: Model, net: Net, faces: Iterable[Face], moving: Collection[int]) -> Array:
-    """Distance of a surface from the edges of faces on it that do not move.
+def away(net: Net, faces: Iterable[Face], moving: Collection[int], stretch: Stretch = EVEN) -> Array:
+    """Distance of a surface from the edges of faces on it that do not move; where waves are shorter it counts for more.
 
     Returns
     -------
@@ -271,9 +277,18 @@ def away(model: Model, net: Net, faces: Iterable[Face], moving: Collection[int])
     if not trims:
         return np.full(net.poles.shape[:2], np.inf)
     curves = [trim.curve.evaluate(np.linspace(*trim.curve.knots.domain, RIM_POINTS))[0] for trim in trims]
-    points = np.asarray(net.grid(net.u.greville(), net.v.greville())).reshape(-1, 3)
-    rim = np.asarray(net.evaluate(np.concatenate(curves)))
+    uv = pairs(net.u.greville(), net.v.greville())
+    rim, points = (_laid(net, each, stretch) for each in (np.concatenate(curves), uv))
     return np.asarray(KDTree(rim).query(points)[0]).reshape(net.poles.shape[:2])
+
+
+def _laid(net: Net, uv: Array, stretch: Stretch) -> Array:
+    """Points of a surface; where directions differ, on a plane in which waves of one length are as long in each."""
+    if stretch.even:
+        return np.asarray(net.evaluate(uv))
+    lengths = [np.concatenate([[0.0], np.cumsum(arc_lengths(net, axis))]) for axis in (0, 1)]
+    both = zip((net.u, net.v), uv.T, lengths, stretch.lengths, strict=True)
+    return np.stack([np.interp(at, knots.breaks, along) / short for knots, at, along, short in both], axis=1)
 
 
 def end(net: Net, trim: Trim) -> tuple[int, int] | None:

@@ -16,6 +16,7 @@ from mracad.bspline.vectors import cross
 from mracad.model.cells import Quadrature
 from mracad.seam.energy import Forms, forms
 from mracad.seam.solve import Problem, Space
+from mracad.seam.stretch import EVEN, Stretch
 
 Array = np.ndarray
 
@@ -57,7 +58,7 @@ def creases(net: Net, points: Array) -> tuple[frozenset[float], frozenset[float]
     return crease_lines(net, 0, points), crease_lines(net, 1, points)
 
 
-def smoothed(net: Net, rule: Quadrature, stiffness: float) -> Net:
+def smoothed(net: Net, rule: Quadrature, stiffness: float, stretch: Stretch = EVEN) -> Net:
     """The surface smoothed alone, in the metric of its mean chord lengths.
 
     Parameters
@@ -67,9 +68,11 @@ def smoothed(net: Net, rule: Quadrature, stiffness: float) -> Net:
         Gauss points over its faces.
     stiffness : float
         ℓ⁴, mm⁴, of the filter of gain 1 / (1 + (ℓ ω)⁴).
+    stretch : Stretch
+        Lengths by direction over ℓ.
     """
     flat = planar(net)
-    form = forms(net, flat, rule)
+    form = forms(net, flat, rule, stretch=stretch)
     points = seen(net, form)
     problem = Problem({0: Space(net, form, points, points)})
     moved = net.poles + problem.faired(stiffness).reshape(net.poles.shape)

@@ -266,8 +266,7 @@ class Problem:
         """0 where held, 1 farther than ``width`` (mm) from there, smooth between, ``(points, 1)``."""
         every = [np.full(s.free.shape, np.inf) if s.away is None else s.away for s in self.spaces.values()]
         away = np.concatenate([each.ravel() for each in every])
-        share = np.minimum(away / width, 1.0)[:, None]
-        return np.asarray(share**3 * (10 - 15 * share + 6 * share**2))
+        return faded(away, width)[:, None]
 
     def gains(self, delta: Array, target: Array, amounts: Sequence[float]) -> list[float]:
         """How much nearer amounts of a displacement bring each surface to a target, as a squared norm."""
@@ -280,6 +279,12 @@ class Problem:
         sizes = [space.free.size for space in self.spaces.values()]
         parts = np.split(values, np.cumsum(sizes)[:-1])
         return {i: part.reshape(s.net.poles.shape) for (i, s), part in zip(self.spaces.items(), parts, strict=True)}
+
+
+def faded(away: Array, width: float) -> Array:
+    """0 at no distance (mm), 1 beyond ``width``, smooth between."""
+    share = np.minimum(away / width, 1.0)
+    return np.asarray(share**3 * (10 - 15 * share + 6 * share**2))
 
 
 def _sum(forms: Forms, stiffness: float) -> Any:

@@ -20,8 +20,9 @@ MOST_POINTS = 10_000
 HALVINGS = 12
 
 
-def refined(net: Net, held: Sequence[tuple[Face, Trim]], longest: float) -> Net:
-    """A surface with its knot spans halved beside held boundary curves until they are at most ``longest`` (mm) there.
+def refined(net: Net, held: Sequence[tuple[Face, Trim]], longest: tuple[float, float]) -> Net:
+    """A surface with its knot spans halved beside held boundary curves until they are at most ``longest`` (mm) there,
+    along u and v.
 
     Across a curve that is a parameter line, spans get shorter towards it step by step; along it they stay.
     """
@@ -36,7 +37,7 @@ def refined(net: Net, held: Sequence[tuple[Face, Trim]], longest: float) -> Net:
     return net
 
 
-def _halves(net: Net, held: Sequence[tuple[Face, Trim]], longest: float) -> tuple[Array, Array]:
+def _halves(net: Net, held: Sequence[tuple[Face, Trim]], longest: tuple[float, float]) -> tuple[Array, Array]:
     """Middles of the spans that are too long."""
     wanted = np.zeros(net.u.spans, bool), np.zeros(net.v.spans, bool)
     for face, trim in held:
@@ -47,7 +48,7 @@ def _halves(net: Net, held: Sequence[tuple[Face, Trim]], longest: float) -> tupl
                 wanted[axis][:] |= crossed.any(axis=1 - axis)
     found = []
     for axis, (knots, mask) in enumerate(zip((net.u, net.v), wanted, strict=True)):
-        long = mask & (arc_lengths(net, axis) > longest * (1 + 1e-9))
+        long = mask & (arc_lengths(net, axis) > longest[axis] * (1 + 1e-9))
         found.append(((knots.breaks[:-1] + knots.breaks[1:]) / 2)[long])
     return found[0], found[1]
 

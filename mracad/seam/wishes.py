@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mracad.seam.hold import CONTINUITY
+from mracad.spec.places import Zone
 
 Array = np.ndarray
 
@@ -30,6 +31,8 @@ class Wishes:
     close_gaps : bool
     hold : frozenset of int
         Edges that must not move.
+    zones : tuple of Zone
+        Regions in which nothing must move.
     bend : float
         Jump of the curvature, 1/mm, that is allowed besides :data:`BENT` of the curvature itself.
     open : bool
@@ -44,6 +47,7 @@ class Wishes:
     fit: float = 0.0
     close_gaps: bool = False
     hold: frozenset[int] = frozenset()
+    zones: tuple[Zone, ...] = ()
     bend: float = 1e-9
     open: bool = False
     free: bool = False

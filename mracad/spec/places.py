@@ -9,12 +9,14 @@ from typing import Annotated
 
 from mracad.errors import FileError, UsageError
 from mracad.spec.files import Naming
-from mracad.spec.quantity import NUMBER
+from mracad.spec.quantity import NUMBER, length
 
 PLACE = "write a place as X,Y,Z in millimetres or #FACE@u,v"
 FEATURE = "write a feature as near:X,Y,Z,radius:R (mm), #FACE@u0:u1,v0:v1 or the name of a .feature file"
+ZONE = "write a region as near:X,Y,Z,radius:R or box:X,Y,Z,X,Y,Z (mm), or radius<25mm"
 GRID = "write it as NxM,DX,DY: 4x3,25,25"
 POLAR = "write it as N,x|y|z or N,X,Y,Z,DX,DY,DZ: 6,z"
+HEADING = "write it as X, Y, Z, u, v or edge#4"
 ALONG = "write it as EDGE,N or EDGE,N,OFFSET: edge#4,10,15"
 
 FAR = 1e12
@@ -54,6 +56,25 @@ class Disc:
 
     middle: Point | OnFace
     radius: float
+
+
+@dataclass(frozen=True)
+class Box:
+    """What lies between two corners, mm."""
+
+    low: tuple[float, ...]
+    high: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Tight:
+    """Where a face bends with a smaller radius, mm."""
+
+    radius: float
+
+
+Zone = Disc | Box | Tight
+"""A region in space: a disc is a ball here."""
 
 
 @dataclass(frozen=True)
@@ -128,11 +149,8 @@ def feature(text: str, name: str) -> Disc | Rectangle | Stored:
     """A feature from ``near:X,Y,Z,radius:R``, ``#3@u0:u1,v0:v1`` or ``FILE.feature``; raises UsageError."""
     if text.endswith(".feature"):
         return Stored(text)
-    if disc := re.fullmatch(rf"near:(.*),\s*radius:\s*({NUMBER})\s*(?:mm)?", text):
-        radius = float(disc[2])
-        if not 0 < radius < FAR:
-            raise UsageError(f"{name}: radius {radius:g} is not greater than zero", FEATURE)
-        return Disc(spot(disc[1], name), radius)
+    if disc := _disc(text, name, FEATURE):
+        return disc
     box = re.fullmatch(rf"(.+)@({NUMBER}):({NUMBER}),({NUMBER}):({NUMBER})", text.replace(" ", ""))
     if not box:
         raise _wrong(name, text, "a feature", FEATURE)
@@ -140,6 +158,42 @@ def feature(text: str, name: str) -> Disc | Rectangle | Stored:
     if not (u0 < u1 and v0 < v1):
         raise UsageError(f"{name}: the window {text} is empty", FEATURE)
     return Rectangle(box[1], (u0, v0), (u1, v1))
+
+
+def _disc(text: str, name: str, hint: str) -> Disc | None:
+    """A disc from ``near:X,Y,Z,radius:R``; None for another text."""
+    disc = re.fullmatch(rf"near:(.*),\s*radius:\s*({NUMBER})\s*(?:mm)?", text)
+    if disc is None:
+        return None
+    radius = float(disc[2])
+    if not 0 < radius < FAR:
+        raise UsageError(f"{name}: radius {radius:g} is not greater than zero", hint)
+    return Disc(spot(disc[1], name), radius)
+
+
+def is_zone(text: str) -> bool:
+    """Whether a text means a region, and not a face."""
+    return text.startswith("box:") or re.match(r"radius\s*[<>=]|near:.*radius", text) is not None
+
+
+def zone(text: str, name: str, diagonal: float) -> Zone:
+    """A region from ``near:X,Y,Z,radius:R``, ``box:X,Y,Z,X,Y,Z`` or ``radius<25mm``; raises UsageError.
+
+    ``diagonal`` is that of the model, mm, of which a radius may be a share.
+    """
+    if text.startswith("box:"):
+        corners = numbers(text.removeprefix("box:"), (6,))
+        if corners is None:
+            raise _wrong(name, text, "a box", ZONE)
+        low, high = zip(*(sorted(pair) for pair in zip(corners[:3], corners[3:], strict=True)), strict=True)
+        return Box(low, high)
+    if disc := _disc(text, name, ZONE):
+        if isinstance(disc.middle, OnFace):
+            raise _wrong(name, text, "a region", ZONE)
+        return disc
+    if limit := re.fullmatch(r"radius\s*<\s*(.*)", text):
+        return Tight(length(limit[1], diagonal, name))
+    raise _wrong(name, text, "a region", ZONE)
 
 
 def is_feature(text: str) -> bool:
@@ -206,6 +260,14 @@ def polar(text: str, name: str) -> Polar:
     if not any(six[3:]):
         raise UsageError(f"{name}: {text!r} has no direction", POLAR)
     return Polar(count, six[:3], six[3:])
+
+
+def heading(text: str, name: str) -> str:
+    """A direction from ``X``, ``Y``, ``Z``, ``u``, ``v`` or ``edge#4``, in small letters; raises UsageError."""
+    found = text.strip().lower()
+    if found in (*AXES, "u", "v") or (found.startswith("edge#") and whole(found.removeprefix("edge#"))):
+        return found
+    raise _wrong(name, text, "a direction", HEADING)
 
 
 def along(text: str, name: str) -> Along:

@@ -9,6 +9,7 @@ import numpy as np
 
 from mracad.errors import UsageError
 from mracad.model.brep import Face, Model
+from mracad.spec.places import Zone, is_zone, zone
 from mracad.spec.steps import Selection
 
 HINT = "select by #3, a product or face name, type:bspline, colour:#ff0000, near:X,Y,Z or cq:'>Z'; see mracad info"
@@ -39,12 +40,15 @@ class Scope:
         Edges that must not move.
     named : frozenset of int
         Faces that were asked for one by one, by number or place.
+    zones : tuple of Zone
+        Regions in which nothing must move.
     """
 
     faces: frozenset[int]
     held: frozenset[int] = frozenset()
     edges: frozenset[int] = frozenset()
     named: frozenset[int] = frozenset()
+    zones: tuple[Zone, ...] = ()
 
     @property
     def chosen(self) -> frozenset[int]:
@@ -81,10 +85,12 @@ def scope(
     faces = select(model, options.faces, default, cadquery)
     if faces.edges:
         raise UsageError(f"faces: edge#{min(faces.edges) + 1} is not a face", "only --hold takes edges")
-    held = select(model, options.hold, default, cadquery)
+    regions = [word for word in options.hold if is_zone(word)]
+    held = select(model, (word for word in options.hold if word not in regions), default, cadquery)
     named = select(model, (word for word in options.faces if word.startswith(("#", "near:"))), (), cadquery)
     chosen = faces.faces if options.faces else frozenset(default)
-    return Scope(chosen, held.faces, held.edges, named.faces & chosen)
+    zones = tuple(zone(word, "hold", model.diagonal) for word in regions)
+    return Scope(chosen, held.faces, held.edges, named.faces & chosen, zones)
 
 
 def every_nurbs(model: Model) -> list[int]:

@@ -169,11 +169,17 @@ def projection(coarse: KnotVector, fine: KnotVector, weights: Array | None = Non
     return _cached(coarse, fine, key)
 
 
-def at_scale(net: Net, scale: float, keep: tuple[AbstractSet[float], AbstractSet[float]] = (frozenset(),) * 2) -> Net:
-    """A net over its own knots without detail finer than a scale (mm); breaks in u and v to keep stay as they are."""
+def at_scale(
+    net: Net,
+    scale: float | tuple[float, float],
+    keep: tuple[AbstractSet[float], AbstractSet[float]] = (frozenset(),) * 2,
+) -> Net:
+    """A net over its own knots without detail finer than a scale, or one along u and one along v (mm); breaks in u and
+    v to keep stay as they are."""
     poles = net.poles
+    scales = scale if isinstance(scale, tuple) else (scale, scale)
     for axis, knots in enumerate((net.u, net.v)):
-        coarse = ladder_for_scale(knots, arc_lengths(net, axis), scale, keep=keep[axis])
+        coarse = ladder_for_scale(knots, arc_lengths(net, axis), scales[axis], keep=keep[axis])
         if coarse != knots:
             poles = projection(coarse, knots).apply(poles, axis=axis)
     return net.with_poles(poles)

@@ -49,7 +49,19 @@ _RIMS = (
 )
 
 TOGETHER: Mapping[str, Sequence[tuple[str, Sequence[Words]]]] = {
-    "smooth": [("scale level", [("--scale", "4mm"), ("--scale", "20%"), ("--level", "1.5")]), _RIMS],
+    "smooth": [
+        (
+            "scale across along level limit_by_curvature",
+            [
+                ("--scale", "4mm"),
+                ("--scale", "20%", "--no-limit-by-curvature"),
+                ("--scale", "4mm", "--across", "2mm"),
+                ("--scale", "4mm", "--across", "10%", "--along", "Y"),
+                ("--level", "1.5"),
+            ],
+        ),
+        _RIMS,
+    ],
     "denoise": [_RIMS],
     "move": [("base band", _LEVEL), ("to", [("--to", "5,7,0"), ("--to", "#1@0.6,0.7")])],
     "repeat": [
@@ -95,7 +107,7 @@ VALUES: Mapping[str, Sequence[Any]] = {
     "folder": ["out"],
     "gap_tolerance": ["0.01mm"],
     "height": ["0.5"],
-    "hold": ["#2", "edge#1"],
+    "hold": ["#2", "edge#1", "near:5,5,0,radius:2", "radius<0.5mm"],
     "input_unit": ["mm"],
     "instance": ["part"],
     "jitter": ["0.1mm"],

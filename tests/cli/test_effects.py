@@ -60,6 +60,7 @@ BASE = {
 """What each command is called with."""
 
 WAYS = {
+    "across": ("--across 9mm",),
     "amount": ("--amount 0.5",),
     "angle": ("--angle 2", "-o a.stl --chord 5mm"),
     "as_json": (None, ""),
@@ -99,6 +100,7 @@ WAYS = {
     "keep": ("--keep g2",),
     "kink": ("--kink 45", "--max-angle 0"),
     "layer_limit": ("--layer-limit 1e-4",),
+    "limit_by_curvature": ("--no-limit-by-curvature", "IN tube.step --scale 9mm"),
     "level": ("--level 2", "LESS --scale"),
     "max_angle": ("--max-angle 0", "--kink 45"),
     "max_angle_growth": ("--max-angle-growth 0",),
@@ -145,6 +147,7 @@ OWN = {
     "compare overwrite": ("--overwrite", "OLD a.xml --junit a.xml"),
     "feature extract overwrite": ("--overwrite", "OLD a.feature"),
     "compare max_deviation": ("--max-deviation 1mm",),
+    "smooth along": ("--along Y", "--across 9mm"),
     "denoise keep": ("--keep g2", "IN tangent.step --noise 0.2mm"),
     "denoise gap_tolerance": ("--gap-tolerance 1mm", "IN halves.step --noise 0.1mm"),
     "denoise refine": ("--refine never", "IN strips.step --noise 0.2mm --faces #2"),
@@ -191,6 +194,9 @@ def folder(small, tmp_path_factory):
     two[0], two[1] = one[-1], 2 * one[-1] - one[-2]
     sewn = shapes.sewn(*(shapes.face_on(shapes.bspline(poles)) for poles in (one, two)))
     mracad.write(shapes.document(sewn), place / "tangent.step")
+    angle, along = np.meshgrid(np.linspace(0, 3, 60), np.linspace(0, 20, 24), indexing="ij")
+    bent = np.stack([2 * np.cos(angle), 2 * np.sin(angle), along + 0.02 * np.sin(9 * angle) * np.sin(along)], axis=-1)
+    mracad.write(shapes.document(shapes.face_on(shapes.bspline(bent))), place / "tube.step")
     text = (place / "sheet.step").read_bytes()
     (place / "latin.step").write_bytes(text.replace(b"'part'", b"'t\xe9t\xe9'"))
     for name in ("sheet", "slab"):

@@ -22,7 +22,7 @@ def strip(height, length=100.0, breadth=20.0):
 
 
 def change(before, after, width=WIDTH):
-    seen = surveys([(before, [face()], after.u, after.v)], reach=width)
+    seen = surveys([(before, [face()], after.u, after.v)], reaches=[(width, width)])
     return changes(seen, [after])[0]
 
 

@@ -168,12 +168,12 @@ def test_closing_edges_of_periodic_surfaces_move():
 def test_distances_from_what_holds():
     net = plane(9)
     model = sheet(net)
-    far = away(model, net, model.faces, ())
+    far = away(net, model.faces, ())
     x, y = net.poles[..., 0], net.poles[..., 1]
     assert np.abs(far - np.minimum(np.minimum(x, y), np.minimum(1 - x, 1 - y))).max() < 1 / 128  # 65 points a side
-    far = away(model, net, model.faces, {0, 1, 2})
+    far = away(net, model.faces, {0, 1, 2})
     assert np.abs(far - x).max() < 1 / 128
-    assert np.isinf(away(model, net, model.faces, {0, 1, 2, 3})).all()
+    assert np.isinf(away(net, model.faces, {0, 1, 2, 3})).all()
 
 
 def test_ends_are_told_from_lines_inside():
@@ -195,14 +195,14 @@ def test_refinement_goes_across_rims_only():
     net = graph(lambda x, y: 0.2 * np.sin(4 * x) * y, 4, 3)
     model = sheet(net)
     own = model.faces[0]
-    fine = refined(net, [(own, own.trims[3])], 0.05)  # x = 0
+    fine = refined(net, [(own, own.trims[3])], (0.05, 0.05))  # x = 0
     assert fine.v == net.v and fine.u.count > net.u.count
     assert arc_lengths(fine, 0)[0] <= 0.05 * (1 + 1e-9)
     assert set(net.u.breaks[1:]) <= set(fine.u.breaks) and (fine.u.breaks[1:-1] < 0.25 + 1e-9).sum() > 3
     assert np.array_equal(fine.u.breaks[fine.u.breaks >= 0.25], net.u.breaks[1:])
     uv = np.random.default_rng(0).uniform(0, 1, (200, 2))
     assert np.abs(fine.evaluate(uv) - net.evaluate(uv)).max() < 1e-13
-    assert refined(net, [], 0.05) is net and refined(net, [(own, own.trims[3])], 1.0) is net
+    assert refined(net, [], (0.05, 0.05)) is net and refined(net, [(own, own.trims[3])], (1.0, 1.0)) is net
 
 
 def test_refinement_meets_slanted_rims_in_both_directions_and_is_bounded():
@@ -210,9 +210,9 @@ def test_refinement_meets_slanted_rims_in_both_directions_and_is_bounded():
     curves = [segment((0.1, 0.1), (0.9, 0.2)), segment((0.9, 0.2), (0.5, 0.9)), segment((0.5, 0.9), (0.1, 0.1))]
     model = trimmed(net, curves)
     own = model.faces[0]
-    fine = refined(net, [(own, own.trims[0])], 0.1)
+    fine = refined(net, [(own, own.trims[0])], (0.1, 0.1))
     assert fine.u.count > net.u.count and fine.v.count > net.v.count
-    most = refined(net, [(own, trim) for trim in own.trims], 1e-4)
+    most = refined(net, [(own, trim) for trim in own.trims], (1e-4, 1e-4))
     assert most.u.count * most.v.count <= MOST_POINTS
 
 

@@ -27,6 +27,7 @@ from mracad.model.brep import Face, Model
 from mracad.model.displacement import Displacement
 from mracad.seam.natural import Treatment
 from mracad.seam.wishes import Wishes
+from mracad.seam.zones import zoned
 from mracad.spec.places import is_feature, spot
 from mracad.spec.quantity import band_of, length
 from mracad.spec.select import Scope
@@ -56,6 +57,7 @@ def move(
     chosen = _movable(model, scope)
     feature = feature_of(model, options, chosen, options.feature)
     assert feature.origin is not None
+    _refuse_held(model, feature.origin.offsets, scope)
     ground = Ground.of(model, chosen).without(feature.origin.offsets)
     removed = {i: -offset for i, offset in feature.origin.offsets.items()}
     return _edit(model, scope, _laid(ground, feature, [_target(ground, options.to, options)], options, scope, removed))
@@ -101,7 +103,17 @@ def transfer(
     one = patch_of(Ground.of(source, every), face_number(source, text, "from", FACE), "from")
     two = patch_of(ground, face_number(model, options.to, "to", FACE), "to")
     width = None if options.taper is None else length(options.taper, model.diagonal, "taper")
-    return _edit(model, scope, laid_on(model, two, one, band_of(options.band or "", source.diagonal), options, width))
+    band = band_of(options.band or "", source.diagonal)
+    return _edit(model, scope, laid_on(model, two, one, band, options, width, scope.zones))
+
+
+def _refuse_held(model: Model, offsets: Mapping[int, Array], scope: Scope) -> None:
+    """Raise EditError if a region holds part of what is to be taken away, by surface."""
+    for i, offset in offsets.items():
+        surface = model.surfaces[i]
+        held = zoned(surface.net, [model.faces[face] for face in surface.faces], scope.zones)
+        if np.any(offset[held]):
+            raise EditError("feature: a region of --hold keeps part of it", "move another, or hold less")
 
 
 def _movable(model: Model, scope: Scope) -> set[int]:
@@ -131,7 +143,7 @@ def _laid(
         )
     overlap = options.overlap if isinstance(options, Repeat) else "add"
     every = copies(ground, feature, found, standing(ground, found, feature.reach), overlap, options.mirror)
-    wishes = Wishes(options.keep, hold=scope.edges)
+    wishes = Wishes(options.keep, hold=scope.edges, zones=scope.zones)
     return laid(every, wishes, options.edges == "coupled", options.clip, removed)
 
 

@@ -30,6 +30,7 @@ from mracad.seam.natural import Seam
 from mracad.seam.trace import Trace
 from mracad.seam.trimmed import TrimmedSeam
 from mracad.seam.wishes import Wishes
+from mracad.seam.zones import zoned
 
 Array = np.ndarray
 
@@ -234,6 +235,7 @@ def _attempt(task: _Task, found: Sequence[Crossing]) -> _Attempt:
         on_it = [task.model.faces[f] for f in task.model.surfaces[i].faces]
         faces = task.copies.ground.patches[i].faces
         free = separate(net, on_it, [face.index for face in faces], task.joints.orders, moving).free
+        free &= ~zoned(net, on_it, task.joints.zones)
         wanted[i] = Wanted(net, *_wanted(task, i, net), free, faces[0])
     done = held(wanted, found, task.size)
     offsets = {i: Offset.of(task.model.surfaces[i].net, wanted[i].net, each) for i, each in done.items() if each.any()}

@@ -27,6 +27,8 @@ from mracad.model.displacement import Offset, lifted
 from mracad.seam.hold import separate
 from mracad.seam.natural import seams
 from mracad.seam.wishes import Wishes
+from mracad.seam.zones import zoned
+from mracad.spec.places import Zone
 from mracad.spec.steps import Transfer
 from mracad.wavelet.ladder import arc_lengths
 from mracad.wavelet.project import band as band_of
@@ -118,7 +120,13 @@ class Carried:
 
 
 def laid_on(
-    model: Model, target: Patch, source: Patch, band: tuple[float, float], options: Transfer, width: float | None
+    model: Model,
+    target: Patch,
+    source: Patch,
+    band: tuple[float, float],
+    options: Transfer,
+    width: float | None,
+    zones: Sequence[Zone] = (),
 ) -> Laid:
     """The detail of one patch on another, as offsets.
 
@@ -132,6 +140,8 @@ def laid_on(
     options : Transfer
     width : float or None
         Width over which the detail fades towards held control points, mm; half the largest wavelength by default.
+    zones : sequence of Zone
+        Regions in which nothing moves.
     """
     own, other = Character.of(target, band), Character.of(source, band)
     stays, comes = options.share()
@@ -154,6 +164,7 @@ def laid_on(
     fine = net.over(*knots)
     faces, movable = [model.faces[i] for i in model.surfaces[target.index].faces], {face.index for face in target.faces}
     free = separate(fine, faces, movable, seams(model, movable, Wishes(options.keep)).orders).free
+    free &= ~zoned(fine, faces, zones)
     if not free.any():
         raise EditError(f"to: {options.to} has no free control point", "use --keep g0")
     window = _window(fine, free, band[1] / 2 if width is None else width)

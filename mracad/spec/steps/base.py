@@ -70,7 +70,10 @@ class Selection(Options, frozen=True, kw_only=True, forbid_unknown_fields=True):
     ] = None
     hold: Annotated[
         tuple[str, ...],
-        Meta(description="Faces and edges (edge#4) that must not move; same selectors as --faces."),
+        Meta(
+            description="Faces and edges (edge#4) that must not move, same selectors as --faces; or regions: "
+            "near:X,Y,Z,radius:R, box:X,Y,Z,X,Y,Z, or 'radius<25mm', where faces bend more tightly."
+        ),
     ] = ()
     keep: Annotated[
         Literal["as-is", "g0", "g1", "g2"],

@@ -7,6 +7,7 @@ from typing import Annotated, ClassVar, Literal
 from msgspec import Meta
 
 from mracad.errors import UsageError
+from mracad.spec import places
 from mracad.spec.quantity import Angle, Length
 from mracad.spec.steps.base import Selection
 
@@ -79,6 +80,27 @@ class Smooth(Fairing, frozen=True, kw_only=True, forbid_unknown_fields=True):
             "removed, ripples three times as long stay."
         ),
     ] = None
+    across: Annotated[
+        Length | None,
+        Meta(
+            description="Scale across the direction of --along: --scale then counts along it. Waves along a blade go, "
+            "its profile stays."
+        ),
+    ] = None
+    along: Annotated[
+        Annotated[str, places.heading] | None,
+        Meta(
+            description="Direction in which --scale counts, with --across: X, Y, Z, edge#4, or the face's u or v. "
+            "Default: the one in which each face is longer."
+        ),
+    ] = None
+    limit_by_curvature: Annotated[
+        bool,
+        Meta(
+            description="Where a face bends with a radius too small for the scale (noses, fillets), the wavelength "
+            "follows the radius, and the round stays."
+        ),
+    ] = True
     level: Annotated[
         Annotated[float, Meta(gt=0.0)] | None,
         Meta(
@@ -97,12 +119,21 @@ class Smooth(Fairing, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
     @property
     def _place(self) -> str:
-        return self.scale if self.scale is not None else f"level {self.level:g}"
+        if self.scale is None:
+            return f"level {self.level:g}"
+        return f"{self.scale} and {self.across} across" if self.across else self.scale
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if (self.scale is None) == (self.level is None):
             raise UsageError("smooth needs either a scale or a level", "give --scale 5mm, --scale 2% or --level 2.5")
+        if self.across is not None and self.scale is None:
+            raise UsageError("across: it needs a scale", "add --scale, for waves along the direction", "across")
+        if self.along is not None and self.across is None:
+            raise UsageError("along: it needs a scale across it", "add --across", "along")
+        if self.scale is None and not self.limit_by_curvature:
+            message = "limit-by-curvature: levels are not limited by it"
+            raise UsageError(message, "leave it out, or give --scale", "limit_by_curvature")
 
 
 class Denoise(Fairing, frozen=True, kw_only=True, forbid_unknown_fields=True):

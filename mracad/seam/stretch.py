@@ -1,0 +1,176 @@
+"""Lengths that differ by direction and place: what an energy counts waves for.
+
+With ℓ the length of an energy of second derivatives H (:mod:`mracad.seam.energy`), its part at a point becomes
+|R H R|², R symmetric: for a wave of wavevector k, |R k|⁴ instead of |k|⁴.
+
+- R = r_t t tᵀ + r_n n nᵀ, t the direction of the lines along which one parameter grows, n normal to them: other lengths
+  r_t ℓ along these lines and r_n ℓ across them.
+- R⁻⁴ + (ℓ |S| / θ)⁴ instead of R⁻⁴ (powers of matrices), S the shape operator: where the surface bends with a radius
+  r, no length is more than about θ r in that direction, so that rounds keep their shape.
+
+S must not be that of the waves that are to go.  The surface is looked at without waves shorter than w, w / 2, w / 4 …;
+the first of these that does not bend by more than θ within w / 2π shows the shape at a point.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from collections.abc import Set as AbstractSet
+from dataclasses import dataclass
+
+import numpy as np
+
+from mracad.bspline.jets import jets
+from mracad.bspline.surface import Net
+from mracad.bspline.vectors import cross
+from mracad.wavelet.project import at_scale
+
+Array = np.ndarray
+Form = tuple[Array, Array, Array]
+"""Components 11, 12 and 22 of a symmetric form at points."""
+
+THETA = 0.3
+"""Turn of the normal within a length, radians, up to which a surface carries it."""
+
+HALVINGS = 6
+"""Most times that the wavelength is halved to see the shape."""
+
+_TWO = 2.0**0.5
+
+
+@dataclass(frozen=True, eq=False)
+class Limit:
+    """The shape of a surface, which limits lengths.
+
+    Attributes
+    ----------
+    length : float
+        ℓ, mm.
+    looks : tuple of (float, Net)
+        The surface without waves shorter than 2π times a length (mm), ever shorter.
+    """
+
+    length: float
+    looks: tuple[tuple[float, Net], ...]
+
+    @classmethod
+    def of(
+        cls, net: Net, wavelengths: tuple[float, float], creases: tuple[AbstractSet[float], AbstractSet[float]]
+    ) -> Limit:
+        """The limit for a surface, from which waves shorter than wavelengths along u and v (mm) are to go."""
+        looks = []
+        shortest = min(wavelengths)
+        for halving in range(HALVINGS + 1):
+            now = tuple(w / 2**halving if w == shortest else w for w in wavelengths)
+            seen = at_scale(net, (now[0], now[1]), creases)
+            looks.append((shortest / 2**halving / (2 * np.pi), seen))
+            if seen.poles is net.poles:
+                break
+        return cls(max(wavelengths) / (2 * np.pi), tuple(looks))
+
+    def shape(self, u: Array, v: Array, frame: Form) -> Form:
+        """The shape operator in the frame (p, q, r: p ∂_u and q ∂_u + r ∂_v are orthonormal), ``(qu, qv)`` each."""
+        p, q, r = frame
+        found = np.zeros((3, *p.shape))
+        left = np.ones(p.shape, bool)
+        for length, net in self.looks:
+            every = jets(net, u, v, np.ones((u.size, v.size), bool), net.poles.mean(axis=(0, 1)), 2)
+            xu, xv, *second = np.moveaxis(every.reshape(6, 3, v.size, u.size).swapaxes(2, 3), 1, -1)[1:]
+            normal = cross(xu, xv)
+            normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-300)
+            a, b, c = ((normal * each).sum(axis=-1) for each in second)
+            now = p * p * a, p * (q * a + r * b), q * q * a + 2 * q * r * b + r * r * c
+            found = np.where(left, now, found)
+            mean, half = _halves(now)
+            left &= (np.abs(mean) + half) * length > THETA
+            if not left.any():
+                break
+        return found[0], found[1], found[2]
+
+
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """Lengths by direction and place, over those of the energy alone.
+
+    Attributes
+    ----------
+    lengths : (float, float)
+        Along u and along v.
+    lead : int
+        The axis along whose lines its length counts; the other length counts across them.
+    limit : Limit, optional
+        What limits them besides.
+    """
+
+    lengths: tuple[float, float] = (1.0, 1.0)
+    lead: int = 0
+    limit: Limit | None = None
+
+    @property
+    def even(self) -> bool:
+        """Whether directions do not differ."""
+        return self.lengths == (1.0, 1.0)
+
+    @property
+    def plain(self) -> bool:
+        """Whether neither directions nor places differ."""
+        return self.even and self.limit is None
+
+    def times(self, length: float) -> tuple[float, float]:
+        """A length along u and along v."""
+        return self.lengths[0] * length, self.lengths[1] * length
+
+    def root(self, u: Array, v: Array, first: Form, frame: Form) -> Form:
+        """R at pairs of parameters, in the frame, ``(qu, qv)`` each.
+
+        Parameters
+        ----------
+        u, v : ndarray (pieces, points)
+            Parameters; each piece lies in one knot span.
+        first : tuple of ndarray (qu, qv)
+            The first fundamental form.
+        frame : tuple of ndarray (qu, qv)
+            p, q and r: p ∂_u and q ∂_u + r ∂_v are orthonormal.
+        """
+        e, f, g = first
+        along, across = self.lengths[:: 1 - 2 * self.lead]
+        cos = f / np.sqrt(e * g) if self.lead else np.ones_like(e)
+        square, both = cos * cos, cos * np.sqrt(1.0 - cos * cos)
+        root = across + (along - across) * square, (along - across) * both, along + (across - along) * square
+        if self.limit is None:
+            return root
+        bent = self.limit.shape(u, v, frame)
+        scale = self.limit.length / THETA
+        inverse, limit = _power(root, lambda x: x**-4.0), _power(bent, lambda x: (scale * x) ** 4)
+        a, b, c = (one + other for one, other in zip(inverse, limit, strict=True))
+        return _power((a, b, c), lambda x: np.maximum(x, 1e-300) ** -0.25)
+
+
+EVEN = Stretch()
+
+
+def stretched(frame: Array, root: Form) -> Array:
+    """Coefficients ``(5, 3, …)`` in H_11, √2 H_12 and H_22, as they are in R H R."""
+    a, b, c = root
+    rows = (
+        (a * a, _TWO * a * b, b * b),
+        (_TWO * a * b, a * c + b * b, _TWO * b * c),
+        (b * b, _TWO * b * c, c * c),
+    )
+    return np.stack([sum(x * frame[:, k] for k, x in enumerate(row)) for row in rows], axis=1)
+
+
+def _halves(form: Form) -> tuple[Array, Array]:
+    """Half the sum and half the difference of the eigenvalues of a form."""
+    a, b, c = form
+    return (a + c) / 2, np.sqrt(((a - c) / 2) ** 2 + b * b)
+
+
+def _power(form: Form, of: Callable[[Array], Array]) -> Form:
+    """A function of a form: of its eigenvalues."""
+    a, b, c = form
+    mean, half = _halves(form)
+    high, low = of(mean + half), of(mean - half)
+    middle = (high + low) / 2
+    slope = np.where(half > 0, (high - low) / np.maximum(2 * half, 1e-300), 0.0)
+    return middle + slope * (a - mean), slope * b, middle + slope * (c - mean)

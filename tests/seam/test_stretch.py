@@ -1,0 +1,84 @@
+"""Lengths by direction and place: what waves count for, against closed forms."""
+
+import numpy as np
+import pytest
+
+from mracad.bspline.fit import interpolated
+from mracad.bspline.knots import KnotVector
+from mracad.bspline.surface import Net
+from mracad.model.cells import quadrature
+from mracad.seam.energy import forms
+from mracad.seam.stretch import THETA, Limit, Stretch
+from tests.model.shapes import face
+
+RADIUS = 10.0
+
+
+def surface(points, spans=(12, 12), size=(1.0, 1.0)):
+    """A surface through ``points(u, v)``, of degree 5, over uneven knots."""
+    u, v = (
+        KnotVector.clamped(length * (0.8 * t + 0.2 * t * t), 5)
+        for length, t in zip(size, (np.linspace(0, 1, n + 1) for n in spans), strict=True)
+    )
+    us, vs = np.meshgrid(u.greville(), v.greville(), indexing="ij")
+    return Net(u, v, interpolated(u, v, np.stack(points(us, vs), axis=-1)))
+
+
+def bent(net, heights, stretch):
+    """The bending of a function ``heights(points)`` on a surface, over its area."""
+    form = forms(net, net, quadrature(net, [face()]), stretch=stretch)
+    at = net.grid(net.u.greville(), net.v.greville())
+    x = interpolated(net.u, net.v, heights(at)[..., None]).ravel()
+    return float(x @ (form.bending @ x) / form.mass.sum())
+
+
+@pytest.mark.parametrize("lead", [0, 1])
+@pytest.mark.parametrize("skew", [0.0, 0.7])
+@pytest.mark.parametrize("way", [0.0, 0.5, 1.2, 2.5])
+def test_a_wave_counts_by_its_length_along_and_across(lead, skew, way):
+    """(k · x)² / 2 has the second derivatives of a wave of wavevector k where that is highest."""
+    net = surface(lambda u, v: [3 * u + 2 * skew * v * v + v, 2 * v, 0 * u])
+    tangent = np.array([1.0, 0.0])
+    if lead:  # lines of v are parabolas: take those that are straight
+        net = surface(lambda u, v: [3 * u + skew * v, 2 * v, 0 * u])
+        tangent = np.array([skew, 2.0]) / np.hypot(skew, 2.0)
+    k = np.array([np.cos(way), np.sin(way)])
+    lengths = 0.7, 0.2
+    found = bent(net, lambda p: (p[..., :2] @ k) ** 2 / 2, Stretch(lengths, lead))
+    along, across = lengths[:: 1 - 2 * lead]
+    both = k @ tangent, k @ [-tangent[1], tangent[0]]
+    assert found == pytest.approx(((along * both[0]) ** 2 + (across * both[1]) ** 2) ** 2, rel=1e-9)
+
+
+def tube(ripple=0.0, waves=1):
+    """Half a cylinder, with ripples along it."""
+
+    def points(u, v):
+        r = RADIUS + ripple * np.sin(2 * np.pi * waves * v / 40)
+        return [r * np.cos(u), r * np.sin(u), v]
+
+    return surface(points, (16, 60), (np.pi, 40.0))
+
+
+@pytest.mark.parametrize("length", [0.5, 30.0])
+def test_a_round_limits_lengths_around_it_and_none_along_it(length):
+    net = tube()
+    stretch = Stretch(limit=Limit(length, ((0.0, net),)))
+    around = (1 + (length / (THETA * RADIUS)) ** 4) ** -0.25
+    arc, height = (lambda p: RADIUS * np.arctan2(p[..., 1], p[..., 0])), lambda p: p[..., 2]
+    assert bent(net, lambda p: arc(p) ** 2 / 2, stretch) == pytest.approx(around**4, rel=1e-3)
+    assert bent(net, lambda p: arc(p) * height(p), stretch) == pytest.approx(2 * around**2, rel=1e-3)
+    assert bent(net, lambda p: height(p) ** 2 / 2, stretch) == pytest.approx(1.0, rel=1e-3)
+
+
+@pytest.mark.parametrize("wavelength", [10.0, 40.0])
+def test_the_shape_is_seen_without_the_ripples_on_it(wavelength):
+    """Ripples that bend three times as much as the tube."""
+    waves = 10
+    height = 3 / RADIUS / (2 * np.pi * waves / 40) ** 2
+    limit = Limit.of(tube(height, waves), (wavelength, wavelength), (frozenset(), frozenset()))
+    u, v = np.linspace(0.3, 2.8, 40)[:, None], np.linspace(10.0, 30.0, 50)[:, None]
+    one = np.ones((40, 50))
+    around, both, along = limit.shape(u, v, (one / RADIUS, 0 * one, one))
+    assert np.abs(np.abs(around) * RADIUS - 1).max() < 0.1
+    assert np.abs(both).max() < 0.01 and np.abs(along).max() < 0.25 * 3 / RADIUS
