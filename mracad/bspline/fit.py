@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from mracad.bspline.basis import basis
+from mracad.bspline.curve import Curve
 from mracad.bspline.knots import Array, KnotVector
 from mracad.bspline.solve import BandSolver, folded
 from mracad.bspline.surface import Net, pairs
@@ -28,6 +29,11 @@ ROUNDS, PIECES = 5, 6
 def interpolated(u: KnotVector, v: KnotVector, values: Array) -> Array:
     """Control points ``(nu, nv, k)`` of the polynomial surface with ``values`` at the Greville points of both."""
     return np.asarray(_solver(v).solve(_solver(u).solve(values, 0), 1))
+
+
+def curve_through(knots: KnotVector, values: Array) -> Curve:
+    """The curve with values ``(n, k)`` at the Greville points of its knots."""
+    return Curve(knots, np.asarray(_solver(knots).solve(values, 0)))
 
 
 def through(net: Net, values: Array) -> Array:

@@ -88,6 +88,10 @@ class Moved:
         now = self._watch().changes({0: displaced(self.net, offset)})[0]
         return replace(self, offset=offset, amount=amount, changes=now)
 
+    def shifted(self, offset: Array) -> Moved:
+        """A slightly different change."""
+        return replace(self, offset=offset, changes=self._watch().changes({0: displaced(self.net, offset)})[0])
+
     def undone(self) -> Moved:
         """No change instead."""
         still = {face: change.undone() for face, change in self.changes.items()}
@@ -126,4 +130,5 @@ class Result:
 
     def displacement(self) -> Displacement:
         """The displacement of all surfaces that move."""
-        return Displacement({i: each.displacement() for i, each in self.moved.items() if np.any(each.offset)})
+        offsets = {i: each.displacement() for i, each in self.moved.items() if np.any(each.offset)}
+        return Displacement(offsets, {s.edge: s.trace.face for s in self.joints.slides if s.trace.surface in offsets})

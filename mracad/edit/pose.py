@@ -17,9 +17,10 @@ from mracad.seam.conditions import rows as seam_rows
 from mracad.seam.contact import Contact, Rows
 from mracad.seam.contact import rows as contact_rows
 from mracad.seam.energy import forms
+from mracad.seam.guide import Led, led
 from mracad.seam.interface import Joints, away, contact, mended_ends, rims, twists
 from mracad.seam.metric import seen
-from mracad.seam.solve import Problem, Space, faded
+from mracad.seam.solve import Problem, Soft, Space, faded
 from mracad.seam.space import refined
 from mracad.seam.stretch import Limit
 from mracad.seam.zones import Zoned
@@ -92,6 +93,8 @@ class Pose:
         Conditions of seams along trim curves that are to be mended.
     share : ndarray (points, 1), optional
         0 in regions where nothing moves, 1 farther than a wavelength from there.
+    led : Led or None
+        Where edges that slide have conditions.
     """
 
     problem: Problem
@@ -101,6 +104,7 @@ class Pose:
     limits: Array
     trimmed: Array
     share: Array | None = None
+    led: Led | None = None
 
     def faded(self, delta: Array) -> Array:
         """A displacement that fades out within a wavelength of regions where nothing moves."""
@@ -172,14 +176,17 @@ def pose(
     limits = np.where(mends, tolerances, limits)
     weight = worth(detail, width)
     shut = np.where(mends[:, None], opened, 0.0) if joined.mended else opened
-    soft, pull = (weight * found.form(limits), -weight * found.pull(shut, limits)) if contacts else (None, None)
     smooth = pairs & np.array([each.order > 0 for each in contacts], bool)[found.owner]
     between = weight * found.form(np.where(smooth, EASY * limits, np.inf)) if smooth.any() else None
+    soft = Soft(weight * found.form(limits), -weight * found.pull(shut, limits), between) if contacts else None
     trimmed = mends & np.array([not each.since for each in contacts], bool)[found.owner]
-    problem = Problem(spaces, rows, np.where(goal[:, None], -(rows @ f), 0.0), soft, pull, between)
+    sliding = [each for each in joined.slides if each.trace.surface in nets]
+    slid = led(nets, sliding, WITHIN * scene.tolerances.gap, weight)
+    guides = slid.guides(scene.model, nets) if slid else None
+    problem = Problem(spaces, rows, np.where(goal[:, None], -(rows @ f), 0.0), soft, guides=guides)
     owners = [each.surfaces for each in contacts]
     share = np.concatenate(shares)[:, None] if joined.zones else None
-    return Pose(problem, found, owners, opened, limits, trimmed, share)
+    return Pose(problem, found, owners, opened, limits, trimmed, share, slid)
 
 
 def _zoned(sheet: Sheet, net: Net, joined: Joints, width: float) -> Zoned:

@@ -62,5 +62,5 @@ def _widest(
     ways: Mapping[int, str] = {each.edge: each.how for each in edit.edges}
     for seam in before:
         how = ways.get(seam.edge)
-        wider = allowed.gap if how == "to tolerance" else allowed.wider(model.edges[seam.edge], seam.gap)
+        wider = allowed.gap if how in ("to tolerance", "slid") else allowed.wider(model.edges[seam.edge], seam.gap)
         yield seam, None if how == "mended" else seam.gap + wider

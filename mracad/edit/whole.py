@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import replace
 
 from mracad.edit.fair import faired
 from mracad.edit.moved import Moved, Result
+from mracad.edit.pose import Scene
 from mracad.edit.result import Edit, FaceOutcome, Reason, Status, spared
+from mracad.edit.slid import settled, unslid
 from mracad.edit.target import Wish
 from mracad.edit.tolerances import RESHAPED, tolerances
 from mracad.inspect.roughness import Worse
@@ -19,6 +21,9 @@ from mracad.seam.wishes import Wishes
 from mracad.spec.select import Scope
 from mracad.spec.select import scope as scope_of
 from mracad.spec.steps import Fairing, Fitting
+
+ROUNDS = 3
+"""Most times that an edit is done with edges that slide; those that cannot stay the next time, and in the end all."""
 
 
 def edited(
@@ -43,31 +48,52 @@ def edited(
     """
     scope = scope or scope_of(model, options)
     movable = {i for i in scope.chosen if model.faces[i].surface is not None}
-    held = scope.edges if options.edges == "coupled" else frozenset(edge.index for edge in model.edges)
+    every = frozenset(edge.index for edge in model.edges)
+    held = every if options.edges == "frozen" else scope.edges
     fit = math.radians(options.fit_g1 or 0.0)
     allowed = tolerances(model, options)
     free = isinstance(options, Fairing) and options.free_edges == "smooth"
     corners = isinstance(options, Fairing) and options.corners == "move"
-    result = faired(
-        model,
-        movable,
-        wish,
-        Wishes(
-            options.keep, fit, options.close_gaps, held, scope.zones, open=not wish.fairs, free=free, corners=corners
-        ),
-        allowed if wish.fairs else replace(allowed, growth=RESHAPED, fairer=False),
-        refine=options.refine == "auto",
-        progress=progress,
+    wishes = Wishes(
+        options.keep, fit, options.close_gaps, held, scope.zones, open=not wish.fairs, free=free, corners=corners
     )
-    amounts = {i: moved.scaled(options.amount * moved.amount) for i, moved in result.moved.items()}
-    if not wish.fairs:  # less of it is not what was asked for
-        amounts = {
-            i: now if result.moved[i].amount == 1.0 else replace(now.undone(), limits=now.limits)
-            for i, now in amounts.items()
-        }
-    result = replace(result, moved=amounts)
+    able = every - held - scope.firm - _beside(model, scope) if options.edges == "slide" else frozenset[int]()
+    lost = {edge: unslid(model, edge) for edge in scope.firm}
+    for left in range(ROUNDS, -1, -1):
+        result = faired(
+            model,
+            movable,
+            wish,
+            replace(wishes, slide=able - lost.keys()),
+            allowed if wish.fairs else replace(allowed, growth=RESHAPED, fairer=False),
+            refine=options.refine == "auto",
+            progress=progress,
+        )
+        result = replace(result, moved=_amounts(result, wish, options))
+        scene = Scene(model, result.sheets, result.joints, allowed, options.refine == "auto")
+        result, failed = settled(scene, result)
+        if not failed:
+            break
+        every_one = (slide.edge for slide in result.joints.slides)
+        lost |= {edge: unslid(model, edge) for edge in (failed if left > 1 else every_one)}
     outcomes = tuple(_outcome(face, result, movable, scope, options) for face in model.faces)
-    return Edit(result.displacement(), outcomes, edges=treatments(model, movable, result, options))
+    return Edit(result.displacement(), outcomes, edges=treatments(model, movable, result, options, lost))
+
+
+def _amounts(result: Result, wish: Wish, options: Fitting) -> dict[int, Moved]:
+    """The amount that was asked for of every change."""
+    amounts = {i: moved.scaled(options.amount * moved.amount) for i, moved in result.moved.items()}
+    if wish.fairs:
+        return amounts
+    return {  # less of it is not what was asked for
+        i: now if result.moved[i].amount == 1.0 else replace(now.undone(), limits=now.limits)
+        for i, now in amounts.items()
+    }
+
+
+def _beside(model: Model, scope: Scope) -> frozenset[int]:
+    """The edges of faces that are held."""
+    return frozenset(edge.index for edge in model.edges if any(side.face in scope.held for side in edge.sides))
 
 
 def _outcome(face: Face, result: Result, movable: Collection[int], scope: Scope, options: Fitting) -> FaceOutcome:
@@ -123,18 +149,23 @@ def _figures(limits: Collection[Worse]) -> str:
     return ", ".join(dict.fromkeys(limit.what.value for limit in limits))
 
 
-def treatments(model: Model, movable: set[int], result: Result, options: Fitting) -> tuple[Treatment, ...]:
-    """The treatment of each edge of a face that could move, in edge order."""
+def treatments(
+    model: Model, movable: set[int], result: Result, options: Fitting, lost: Mapping[int, Cause]
+) -> tuple[Treatment, ...]:
+    """The treatment of each edge of a face that could move, in edge order; ``lost`` could not slide."""
     joints, frozen = result.joints, dict(result.joints.frozen)
+    frozen |= {edge: lost[edge] for edge in frozen.keys() & lost.keys()}
     if options.edges == "frozen":
         frozen = {e: Cause(Still.FROZEN) if why.still is Still.HELD else why for e, why in frozen.items()}
     how = dict.fromkeys(joints.moving, "coupled")
     how |= {edge: "to tolerance" for seam in joints.loose for edge in (seam.edge, seam.twin)}
     how |= dict.fromkeys(result.mended, "mended")
+    how |= {slide.edge: "slid" for slide in joints.slides}
     moved = {i for i, each in result.moved.items() if each.amount}
     still = {e for e in how if moved.isdisjoint(model.faces[side.face].surface for side in model.edges[e].sides)}
     how = {edge: way for edge, way in how.items() if edge not in still}
     frozen |= dict.fromkeys(still, Cause(Still.STAYS))
+    frozen |= {slide.edge: slide.cause for slide in joints.slides if slide.edge in still}
     found = []
     for edge in model.edges:
         faces = tuple(side.face for side in edge.sides)

@@ -1,7 +1,7 @@
 """How far an edit moved each surface: the length of the displacement, measured on a grid of the surface.
 
 δ(u, v) = Σ R_ij(u, v) δ_ij with the kept weights, so max ‖δ_ij‖ bounds it.  It is evaluated at the Greville
-points of the (refined) net that some face depends on.
+points of the (refined) net inside each face and along its edges: beyond them, a surface may move farther.
 """
 
 from __future__ import annotations
@@ -10,9 +10,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mracad.bspline.surface import pairs
 from mracad.model.brep import Model
+from mracad.model.cells import inside_grid
 from mracad.model.displacement import Displacement
 from mracad.model.region import face_region, supported
+
+RIM = 33
+"""Points along each edge."""
 
 
 @dataclass(frozen=True)
@@ -49,11 +54,13 @@ def deviations(model: Model, displacement: Displacement) -> list[Deviation]:
         for number in surface.faces:
             face = model.faces[number]
             reach = supported(net, face_region(net, face).inside)
-            seen = np.where(reach, sizes, 0.0)
-            i, j = np.unravel_index(seen.argmax(), seen.shape)
-            point = net.evaluate(np.array([[us[i], vs[j]]]))[0]
-            where = face.placed(point)
+            inner = inside_grid(face, net, us, vs)
+            rim = [trim.curve.evaluate(np.linspace(*trim.curve.knots.domain, RIM))[0] for trim in face.trims]
+            uv = np.concatenate([pairs(us, vs)[inner.ravel()], *rim])
+            size = np.concatenate([sizes[inner], np.linalg.norm(motion.evaluate(uv[inner.sum() :]), axis=1)])
+            largest = int(size.argmax())
+            where = face.placed(net.evaluate(uv[largest : largest + 1])[0])
             bound = float(np.linalg.norm(offset.poles, axis=-1)[reach].max(initial=0.0))
-            mean = float(sizes[reach].mean()) if reach.any() else 0.0
-            found.append(Deviation(number, float(seen.max()), mean, bound, tuple(float(x) for x in where)))  # type: ignore[arg-type]
+            mean = float(sizes[inner].mean()) if inner.any() else float(size.mean())
+            found.append(Deviation(number, float(size[largest]), mean, bound, tuple(float(x) for x in where)))  # type: ignore[arg-type]
     return sorted(found, key=lambda d: d.face)

@@ -7,7 +7,6 @@ import time
 from collections import Counter
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from enum import Enum
 from functools import partial
 from types import MappingProxyType
 from typing import TYPE_CHECKING
@@ -21,6 +20,7 @@ from mracad.inspect.deviation import Deviation, deviations
 from mracad.inspect.mended import Mending, unmended
 from mracad.inspect.seams import SeamMeasure, key, remeasured, seams
 from mracad.job.judge import Judged, Original
+from mracad.job.left import Left, Spoilt
 from mracad.job.words import numbers
 from mracad.model.brep import Model
 from mracad.spec.steps import Fitting, Selection
@@ -29,19 +29,6 @@ if TYPE_CHECKING:
     from mracad.model.facts import Validity
     from mracad.occ.document import Document
     from mracad.spec.recipe import Step
-
-ROUNDS = 8
-"""How often an edit is done again, each time without the faces that came out worse; then all are left that seams join
-to those, and if that does not help it is refused."""
-
-
-class Spoilt(Enum):
-    """Why an edit may not touch a face, of which something would come out worse."""
-
-    SEAMS = "its seams would not hold"
-    INVALID = "its result would not be valid"
-    FILE = "the file would be worse there"
-
 
 Progress = Callable[[str, int, int], None]
 """Called with the name of a stage, the steps done and the steps in all."""
@@ -104,6 +91,7 @@ def play(
     progress: Progress | None = None,
     apply: bool = True,
     spoiled: Mapping[int, Spoilt] = MappingProxyType({}),
+    firm: Collection[int] = (),
 ) -> list[Report | Judged]:
     """Take a document through steps, in memory, up to the first check that fails.
 
@@ -118,6 +106,8 @@ def play(
         False for a dry run, after which the document must not be written: the last step is not put into it.
     spoiled : mapping
         Faces that no edit may touch, and why.
+    firm : collection of int
+        Edges that must not slide.
 
     Returns
     -------
@@ -136,7 +126,7 @@ def play(
         result: Report | Judged
         if isinstance(step.options, Selection):
             put = apply or step is not steps[-1]
-            result = run(document, function, step.options, progress=progress, apply=put, spoiled=spoiled)
+            result = run(document, function, step.options, progress=progress, apply=put, spoiled=spoiled, firm=firm)
         else:
             tell(progress, step.use)
             result = function(document, step.options, original)
@@ -154,6 +144,7 @@ def run(
     progress: Progress | None = None,
     apply: bool = True,
     spoiled: Mapping[int, Spoilt] = MappingProxyType({}),
+    firm: Collection[int] = (),
 ) -> Report:
     """Edit a document in memory.
 
@@ -169,6 +160,8 @@ def run(
         False for a dry run.
     spoiled : mapping
         Faces that the edit may not touch, and why.
+    firm : collection of int
+        Edges that must not slide.
 
     Raises
     ------
@@ -188,11 +181,12 @@ def run(
     others = [view(read(file)) for file in options.models()]
     before: list[SeamMeasure] = []
     valid_before: Validity | None = None
-    left, allowed = _Left(model.name, dict(spoiled)), tolerances(model, options)
+    left, allowed = Left(model.name, dict(spoiled), set(firm)), tolerances(model, options)
     while True:
         stage("editing")
         try:
-            result = edit(model, options, *others, scope=scope.holding(left.faces), progress=partial(stage, "editing"))
+            narrowed = scope.holding(left.faces, left.firm)
+            result = edit(model, options, *others, scope=narrowed, progress=partial(stage, "editing"))
         except EditError as error:
             raise left.explained(error) from error
         result = _named(result, {face: left.faces[face] for face in left.faces.keys() & scope.chosen})
@@ -207,6 +201,8 @@ def run(
         offsets = result.displacement.offsets
         after = remeasured(result.displacement.applied(model), before, offsets) if offsets else before
         found = torn(model, before, after, result, allowed, options.keep)
+        if found and left.stopped(result.displacement.slid_at(model, found)):
+            continue
         found = {i for i in found if model.faces[i].surface is not None} - left.faces.keys()
         if found:
             left.leave(found, Spoilt.SEAMS, before, result)
@@ -216,7 +212,8 @@ def run(
         worse, valid_after = _put(document, model, result, left, valid_before, stage)
         if not worse:
             break
-        left.leave(worse, Spoilt.INVALID, before, result)
+        if not left.stopped(result.displacement.slid_at(model, worse)):
+            left.leave(worse, Spoilt.INVALID, before, result)
     mended: tuple[Mending, ...] = ()
     if isinstance(options, Fitting):
         mended = unmended(options, model.diagonal, scope.chosen - left.faces.keys(), before, after)
@@ -234,68 +231,23 @@ def tell(progress: Progress | None, name: str, done: int = 0, total: int = 1) ->
         progress(name, done, total)
 
 
-@dataclass
-class _Left:
-    """The faces that an edit may not touch, and why; they become more with every round.
-
-    Attributes
-    ----------
-    name : str
-        Of the model.
-    """
-
-    name: str
-    faces: dict[int, Spoilt]
-    rounds: int = 0
-
-    def leave(self, faces: set[int], reason: Spoilt, seams: Sequence[SeamMeasure], edit: Edit) -> None:
-        """Leave some more, for a reason; after enough rounds all edited ones that seams join to any of them."""
-        self.rounds += 1
-        if self.rounds > ROUNDS + 1:
-            names = numbers(sorted(faces))
-            raise EditError(
-                f"{self.name}: {names} would come out worse even with {len(self.faces)} other faces left as they are",
-                "leave them out with --faces '!#N', or use --amount 0.5",
-            )
-        if self.rounds > ROUNDS:
-            faces = _joined(faces | self.faces.keys(), seams, {outcome.face for outcome in edit.faces("edited")})
-        self.faces |= dict.fromkeys(faces - self.faces.keys(), reason)
-
-    def explained(self, error: EditError) -> EditError:
-        """An error of an edit, which cannot know of the faces that were left."""
-        if not self.faces:
-            return error
-        face, reason = next(iter(self.faces.items()))
-        return EditError(
-            f"{self.name}: #{face + 1} cannot be edited: {reason.value}", "choose other faces or another place"
-        )
-
-
-def _joined(faces: set[int], seams: Sequence[SeamMeasure], edited: set[int]) -> set[int]:
-    """Faces, and the edited ones that seams join to them, directly or through each other."""
-    found, fresh = set(faces), set(faces)
-    while fresh:
-        fresh = {face for seam in seams if fresh.intersection(seam.faces) for face in seam.faces} & edited - found
-        found |= fresh
-    return found
-
-
 def _put(
-    document: Document, model: Model, edit: Edit, left: _Left, before: Validity, stage: Callable[[str], None]
+    document: Document, model: Model, edit: Edit, left: Left, before: Validity, stage: Callable[[str], None]
 ) -> tuple[set[int], Validity]:
     """Put an edit into a document: faces that would be less valid, for which it is taken out again, and the verdict."""
     from mracad.occ.apply import apply, restore
     from mracad.occ.check import check
 
     stage("changing the model")
-    apply(document, model, edit.displacement)
+    sliding = apply(document, model, edit.displacement)
     stage("checking the result")
     touched = {f for i in edit.displacement.offsets for f in model.surfaces[i].faces}
+    touched |= edit.displacement.around(model)
     moved = check(document, faces=touched)
     worse = _worse(before, moved)
     if worse:
-        restore(document, model, edit.displacement)
-    if not worse <= touched - left.faces.keys():
+        restore(document, model, edit.displacement, sliding)
+    if not worse <= touched - left.faces.keys() and not edit.displacement.slid_at(model, worse):
         raise EditError(
             f"{model.name}: the result would be less valid", "leave faces out with --faces '!#N', or use --amount 0.5"
         )

@@ -8,6 +8,7 @@ from mracad.errors import UsageError
 from mracad.model.brep import Model
 from mracad.occ.document import Document
 from mracad.occ.instance import isolate
+from mracad.occ.rails import railed
 from mracad.occ.select import select_cq
 from mracad.occ.view import view
 from mracad.spec.select import Scope, every_nurbs
@@ -33,4 +34,5 @@ def looked_at(document: Document, options: Selection) -> tuple[Model, Scope]:
         if options.faces and not faces:
             raise UsageError(f"no selected face is in '{options.instance}'", "leave out --faces, or select others")
     convertible = {i for i in scope.chosen if model.faces[i].surface is None}
-    return (view(document, convert=convertible) if convertible else model), scope
+    model = view(document, convert=convertible) if convertible else model
+    return railed(document, model) if options.edges == "slide" else model, scope

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import os
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, BinaryIO
@@ -14,8 +14,9 @@ from mracad.formats import FORMATS, by_content
 from mracad.inspect import accept
 from mracad.inspect.accept import Slack
 from mracad.inspect.faults import Fault, FaultKind, ReadBack
-from mracad.job.document import Progress, Report, Spoilt, play, tell
+from mracad.job.document import Progress, Report, play, tell
 from mracad.job.judge import Judged, Original
+from mracad.job.left import Spoilt
 from mracad.job.words import of_fault
 from mracad.model.facts import Facts
 from mracad.spec.quantity import length
@@ -106,13 +107,15 @@ def produce(
         When a step cannot be done, or a file would be worse whatever is left.
     """
     spoiled: dict[int, Spoilt] = {}
+    firm: set[int] = set()
     faults: tuple[tuple[Target, Fault], ...] = ()
     copies = _Copies(original)
     for number in range(ROUNDS):
         if number:
             document = original()
         try:
-            results = play(document, steps, original=original, progress=progress, apply=bool(targets), spoiled=spoiled)
+            put = bool(targets)
+            results = play(document, steps, original=original, progress=progress, apply=put, spoiled=spoiled, firm=firm)
         except EditError as error:
             if faults:
                 raise _refused(document.name, faults) from error
@@ -129,6 +132,10 @@ def produce(
         faults = tuple((each.target, fault) for each in made if each.read_back for fault in each.read_back.faults)
         if not faults:
             return replace(done, made=made)
+        slid = memory.slid({face for _, fault in faults for face in fault.faces})
+        if slid:
+            firm |= slid
+            continue
         edited = memory.edited - spoiled.keys()
         if not edited:
             break
@@ -184,6 +191,10 @@ class _Memory:
         from mracad.occ.facts import facts
 
         return facts(self.document)
+
+    def slid(self, faces: Collection[int]) -> set[int]:
+        """The edges that slid beside some faces; all for no faces."""
+        return {e for report in self.reports for e in report.edit.displacement.slid_at(report.model, faces)}
 
     @property
     def slack(self) -> Slack:

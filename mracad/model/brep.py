@@ -6,13 +6,14 @@ Lengths are millimetres.  Every array is float64 and must be treated as read-onl
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 
 from mracad.bspline.curve import Curve
 from mracad.bspline.surface import Net
+from mracad.model.rails import Rails
 
 Array = np.ndarray
 
@@ -201,6 +202,8 @@ class Model:
         By part.
     places : tuple of tuple of ndarray (4, 4)
         By part, the frames in which its instances stand; empty for a model of one part where it stands.
+    rails : Rails
+        What edges can slide along; empty where nobody asked for it.
     """
 
     name: str
@@ -212,6 +215,7 @@ class Model:
     schema: str = ""
     products: tuple[str, ...] = ()
     places: tuple[tuple[Array, ...], ...] = ()
+    rails: Rails = field(default_factory=Rails)
 
     @cached_property
     def spaces(self) -> tuple[int, ...]:

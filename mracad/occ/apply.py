@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 from OCP.BRep import BRep_Builder, BRep_Tool
 from OCP.BRepTools import BRepTools
@@ -20,13 +22,14 @@ from mracad.occ.follow import following
 from mracad.occ.geometry import basis, nets, set_poles, spline
 from mracad.occ.labels import label_key
 from mracad.occ.settings import quiet
+from mracad.occ.slide import Sliding
 from mracad.occ.topology import edge_uses
 
 Array = np.ndarray
 _STILL = 1e-9, 0.01  # mm, or of its tolerance: an edge that moves by less keeps its curve
 
 
-def apply(document: Document, model: Model, displacement: Displacement) -> None:
+def apply(document: Document, model: Model, displacement: Displacement) -> Sliding | None:
     """Displace the surfaces of a document, in place.
 
     Degrees are raised and knots inserted exactly; then only those control points move whose offset is not zero, all
@@ -40,30 +43,39 @@ def apply(document: Document, model: Model, displacement: Displacement) -> None:
         The view of the document that the displacement was made for.
     displacement : Displacement
 
+    Returns
+    -------
+    Sliding or None
+        Edges that slid, as they were, for :func:`restore`.
+
     Raises
     ------
     UsageError
         For a degree above the kernel's highest.
     """
     if not displacement.offsets:
-        return
+        return None
     highest, most = max(max(o.degrees) for o in displacement.offsets.values()), Geom_BSplineSurface.MaxDegree_s()
     if highest > most:
         raise UsageError(f"a surface of degree {highest} is beyond the kernel", f"ask for {most} at most")
-    with quiet(), following(document, _moved_edges(model, displacement), _moved_faces(model, displacement)):
+    edges = _moved_edges(model, displacement)
+    sliding = _sliding(document, model, displacement, edges) if displacement.slid else None
+    with quiet(), following(document, edges, _moved_faces(model, displacement), sliding):
         for index, offset in sorted(displacement.offsets.items()):
             surface = model.surfaces[index]
             _move(_handle(document, surface, offset), offset)
         _forget(document)
         document.moved |= {label_key(document.part_of(face).label) for face in _moved_faces(model, displacement)}
+    return sliding
 
 
-def restore(document: Document, model: Model, displacement: Displacement) -> None:
+def restore(document: Document, model: Model, displacement: Displacement, sliding: Sliding | None = None) -> None:
     """Undo :func:`apply`: every control point gets its old bits, refined surfaces give way to the old ones.
 
-    Faces that were converted stay on their (undisplaced) NURBS surfaces.
+    Faces that were converted stay on their (undisplaced) NURBS surfaces.  ``sliding`` is what it returned.
     """
-    with quiet(), following(document, _moved_edges(model, displacement), _moved_faces(model, displacement)):
+    edges = {e: face for e, face in _moved_edges(model, displacement).items() if e not in displacement.slid}
+    with quiet(), following(document, edges, _moved_faces(model, displacement)):
         for index in sorted(displacement.offsets):
             surface = model.surfaces[index]
             handle = basis(BRep_Tool.Surface_s(document.faces[surface.faces[0]], TopLoc_Location()))
@@ -72,6 +84,8 @@ def restore(document: Document, model: Model, displacement: Displacement) -> Non
                 set_poles(handle, surface.net.poles)
             else:
                 _lay_all(document, surface, spline(surface.net))
+        if sliding:
+            sliding.restore()
         _forget(document)
 
 
@@ -151,6 +165,17 @@ def _moved_edges(model: Model, displacement: Displacement) -> dict[int, int]:
             beyond = far > np.maximum(_STILL[0], _STILL[1] * loose)
             moved |= {edge: face for (edge, face, _), off in zip(sides[index], beyond, strict=True) if off}
     return dict(sorted(moved.items()))
+
+
+def _sliding(document: Document, model: Model, displacement: Displacement, moved: Mapping[int, int]) -> Sliding:
+    """The edges that slide, and those that stay and end on them."""
+    sliding = [edge for edge in displacement.slid if edge in moved]
+    vertices = {vertex for edge in sliding for vertex in model.rails.ends[edge]}
+    ending = [e for e in model.rails.paths if e not in moved and not vertices.isdisjoint(model.rails.ends[e])]
+    edges = {i: TopoDS.Edge_s(document.edges[i].Oriented(TopAbs_FORWARD)) for i in (*sliding, *ending)}
+    beside = {i: sorted({side.face for side in model.edges[i].sides} - {displacement.slid.get(i)}) for i in edges}
+    faces = {i: [TopoDS.Face_s(document.faces[f].Oriented(TopAbs_FORWARD)) for f in beside[i]] for i in edges}
+    return Sliding([(edges[i], faces[i][0]) for i in sliding], [(edges[i], faces[i]) for i in ending])
 
 
 def _forget(document: Document) -> None:

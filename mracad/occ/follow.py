@@ -15,6 +15,7 @@ from OCP.TopoDS import TopoDS, TopoDS_Edge, TopoDS_Face
 from OCP.TopTools import TopTools_MapOfShape
 
 from mracad.occ.document import Document
+from mracad.occ.slide import Sliding
 from mracad.occ.topology import edge_uses, validated
 
 _TOLERANCE = 1e-7  # memory units
@@ -22,12 +23,15 @@ _ABOVE = 1 + 1e-6  # so much more than the kernel finds is a tolerance that it t
 
 
 @contextmanager
-def following(document: Document, edges: Mapping[int, int], faces: Collection[int]) -> Iterator[None]:
+def following(
+    document: Document, edges: Mapping[int, int], faces: Collection[int], sliding: Sliding | None = None
+) -> Iterator[None]:
     """Let edges follow faces that are moved inside the block: new 3D curves on the faces, and vertices that move as the
     ends of the edges' curves on the faces do.
 
     A stale curve must never be left to the kernel, which would hide it in a large tolerance.  The faces of an edge
-    must move together: its curves on them stay.  A vertex stays as far from the ends of its edges as it was: those that
+    must move together: its curves on them stay; one that slid gets a new curve on its face that stays, and edges on
+    which its vertices moved end there.  A vertex stays as far from the ends of its edges as it was: those that
     do not move get no gap there that a reader would close.  Nor does an edge get a smaller tolerance than it had: files
     state the mean of all, and by that a reader heals edges that nothing touched.  One that stays may get a larger one:
     kernels state it as close as can be, and evaluate surfaces of high degree that moved a little otherwise.
@@ -39,6 +43,8 @@ def following(document: Document, edges: Mapping[int, int], faces: Collection[in
         Indices of edges, none of them degenerate, each with a face that it bounds.
     faces : collection of int
         The faces that move.
+    sliding : Sliding, optional
+        Those of the edges that slide, and the edges that end on them.
     """
     builder = BRep_Builder()
     chosen = [
@@ -53,6 +59,7 @@ def following(document: Document, edges: Mapping[int, int], faces: Collection[in
         if validated(edge, face, BRep_Tool.SameParameter_s(edge)).CheckTolerance(_own(edge))
     ]
     yield
+    beside = sliding.bare() if sliding else []
     for (edge, _), tolerance in zip(chosen, tolerances, strict=True):
         builder.UpdateEdge(edge, None, _TOLERANCE)
         BRepLib.BuildCurve3d_s(edge, _TOLERANCE)
@@ -67,6 +74,7 @@ def following(document: Document, edges: Mapping[int, int], faces: Collection[in
             if moved.Add(vertex):
                 place = BRep_Tool.Pnt_s(vertex).Translated(gp_Vec(before, now))
                 builder.UpdateVertex(vertex, place, BRep_Tool.Tolerance_s(vertex))
+    near += sliding.again(beside) if sliding else []
     for edge, face in near:
         found = validated(edge, face, BRep_Tool.SameParameter_s(edge))
         if not found.CheckTolerance(_own(edge)):

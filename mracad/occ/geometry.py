@@ -14,8 +14,8 @@ from OCP.BinTools import BinTools_Curve2dSet, BinTools_CurveSet, BinTools_Surfac
 from OCP.Geom import Geom_BezierSurface, Geom_BSplineSurface, Geom_RectangularTrimmedSurface, Geom_Surface
 from OCP.Geom2d import Geom2d_BSplineCurve, Geom2d_Curve, Geom2d_Line, Geom2d_TrimmedCurve
 from OCP.Geom2dConvert import Geom2dConvert
-from OCP.gp import gp_Pnt
-from OCP.TColgp import TColgp_Array2OfPnt
+from OCP.gp import gp_Pnt, gp_Pnt2d
+from OCP.TColgp import TColgp_Array1OfPnt2d, TColgp_Array2OfPnt
 from OCP.TColStd import TColStd_Array1OfInteger, TColStd_Array1OfReal, TColStd_Array2OfReal
 
 from mracad.bspline.curve import Curve
@@ -119,6 +119,14 @@ def curves(pieces: Sequence[tuple[Geom2d_Curve, float, float]]) -> list[Curve]:
     stream = _Stream(collection)
     read = [_curve(stream) for _ in range(max(places, default=0))]
     return [read[place - 1] if place else _segment(*piece) for piece, place in zip(pieces, places, strict=True)]
+
+
+def plane_spline(curve: Curve) -> Geom2d_BSplineCurve:
+    """The kernel's curve of a polynomial plane curve that is not periodic."""
+    poles = TColgp_Array1OfPnt2d(1, len(curve.poles))
+    for i, (x, y) in enumerate(curve.poles.tolist(), 1):
+        poles.SetValue(i, gp_Pnt2d(x, y))
+    return Geom2d_BSplineCurve(poles, *_multiplicities(curve.knots), curve.knots.degree)
 
 
 class _Stream:

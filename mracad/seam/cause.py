@@ -28,6 +28,7 @@ class Still(Enum):
     FLAT = "curvature undefined along the seam"
     APART = "its faces are edited separately"
     STAYS = "one of its faces stays"
+    UNSLID = "cannot slide along its {} neighbour within the tolerance"
     BARE = "no copy on the other side"
     UNSEWN = "trimmed and not sewn"
     OPEN = "trimmed: cannot be kept within the tolerance"
@@ -42,7 +43,7 @@ class Cause:
     ----------
     still : Still
     kind : str
-        Kind of the neighbour, for ``ANALYTIC``.
+        Kind of the neighbour, for ``ANALYTIC`` and ``UNSLID``.
     """
 
     still: Still

@@ -16,9 +16,11 @@ from mracad.model.brep import Face, Model, Trim
 from mracad.seam.border import Border
 from mracad.seam.cause import Cause, Still
 from mracad.seam.contact import Contact
+from mracad.seam.guide import Slide
 from mracad.seam.hold import CONTINUITY, meeting, reached
 from mracad.seam.natural import Meeting, Seam, seams
-from mracad.seam.space import line
+from mracad.seam.slide import slides
+from mracad.seam.space import end
 from mracad.seam.stretch import EVEN, Stretch
 from mracad.seam.trace import trace_of
 from mracad.seam.trimmed import TrimmedSeam, beside, trimmed
@@ -36,9 +38,6 @@ POLE = 2
 
 LOOSE = Still.TRIMMED, Still.UNEVEN
 """Why seams may only move to a tolerance: not a parameter line of both sides, or a joint without a law."""
-
-END = 1e-9
-"""Fraction of the domain within which a parameter line is its end."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,6 +63,8 @@ class Joints:
         Whether the corners of faces between two of them stay.
     zones : tuple of Zone
         Regions in which nothing moves.
+    slides : tuple of Slide
+        Edges that slide along a neighbour that stays.
     """
 
     exact: tuple[Seam, ...] = ()
@@ -75,13 +76,14 @@ class Joints:
     open: frozenset[int] = frozenset()
     cornered: bool = False
     zones: tuple[Zone, ...] = ()
+    slides: tuple[Slide, ...] = ()
 
     @property
     def moving(self) -> frozenset[int]:
         """Edges that move."""
         exact = (edge for seam in self.exact for edge in (seam.edge, seam.twin))
         loose = (edge for seam in self.loose for edge in (seam.edge, seam.twin))
-        return self.open.union(self.closing, exact, loose)
+        return self.open.union(self.closing, exact, loose, (slide.edge for slide in self.slides))
 
     @property
     def orders(self) -> dict[int, int]:
@@ -132,7 +134,22 @@ def joints(model: Model, movable: Collection[int], wishes: Wishes) -> Joints:
     joined = Joints(tuple(exact), tuple(loose), known.closing, frozen, known.meetings, jumps, zones=wishes.zones)
     if wishes.free:
         joined = replace(_freed(joined), cornered=not wishes.corners)
-    return _opened(joined) if wishes.open else joined
+    return _opened(joined) if wishes.open else _sliding(model, joined, wishes.slide)
+
+
+def _sliding(model: Model, joined: Joints, able: Collection[int]) -> Joints:
+    """The same joints, with edges that slide along neighbours that stay."""
+    if not able:
+        return joined
+    seams: list[Seam | TrimmedSeam] = [*joined.exact, *joined.loose]
+    pairs = [(edge, each.a.surface, each.b.surface) for each in seams for edge in {each.edge, each.twin}]
+    pairs += [(edge, a.surface, b.surface) for edge, (a, b) in joined.closing.items()]
+    for edge in joined.open:
+        surface = next((model.faces[side.face].surface for side in model.edges[edge].sides), None)
+        pairs += [] if surface is None else [(edge, surface, surface)]
+    found = slides(model, joined.frozen, pairs, able)
+    gone = {slide.edge for slide in found}
+    return replace(joined, slides=found, frozen={e: why for e, why in joined.frozen.items() if e not in gone})
 
 
 def _freed(joined: Joints) -> Joints:
@@ -289,21 +306,6 @@ def _laid(net: Net, uv: Array, stretch: Stretch) -> Array:
     lengths = [np.concatenate([[0.0], np.cumsum(arc_lengths(net, axis))]) for axis in (0, 1)]
     both = zip((net.u, net.v), uv.T, lengths, stretch.lengths, strict=True)
     return np.stack([np.interp(at, knots.breaks, along) / short for knots, at, along, short in both], axis=1)
-
-
-def end(net: Net, trim: Trim) -> tuple[int, int] | None:
-    """The axis across a boundary curve and the end (0, −1) of a clamped net on which it lies, if it does."""
-    axis = line(net, trim)
-    if axis is None:
-        return None
-    knots = (net.u, net.v)[axis]
-    if knots.periodic:
-        return None
-    at, (low, high) = float(trim.curve.poles[:, axis].mean()), knots.domain
-    for place, limit, multiplicity in ((0, low, knots.multiplicities[0]), (-1, high, knots.multiplicities[-1])):
-        if abs(at - limit) <= END * (high - low) and multiplicity == knots.degree + 1:
-            return axis, place
-    return None
 
 
 def _corners(net: Net, trims: Iterable[Trim]) -> Array:

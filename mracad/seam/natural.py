@@ -62,8 +62,8 @@ class Treatment:
         Index in ``Model.edges``.
     faces : tuple of int
         Faces that meet there.
-    how : {"coupled", "to tolerance", "mended", "frozen"}
-        ``mended``: it moves like a coupled one, and its gap or angle is closed.
+    how : {"coupled", "to tolerance", "mended", "slid", "frozen"}
+        ``mended``: it moves like a coupled one, and its gap or angle is closed; ``slid``: along a face that stays.
     reason : Cause or None
         Why it is frozen.
     """

@@ -17,7 +17,7 @@ noise gives half the displacement.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -27,9 +27,11 @@ from mracad.bspline.surface import Net
 from mracad.seam.constrained import Constrained
 from mracad.seam.divided import LEFT, Divided
 from mracad.seam.energy import Forms
+from mracad.seam.guided import Guided, Guides
 from mracad.seam.strips import Division, Layout, joints, strips
 
 Array = np.ndarray
+Solver = Constrained | Divided | Guided
 
 TERMS = 8
 """Degree of the Chebyshev expansion of p: an error of the gain of 1e-4."""
@@ -100,6 +102,25 @@ class Effort:
     left: float = LEFT
 
 
+@dataclass(frozen=True, eq=False)
+class Soft:
+    """Conditions that are met as closely as their weights ask.
+
+    Attributes
+    ----------
+    form : scipy.sparse matrix (points, points)
+        Cᵀ W C.
+    pull : ndarray (points, 3), optional
+        Cᵀ W c, where contacts are to be mended.
+    between : scipy.sparse matrix (points, points), optional
+        The part of the form that joins the surfaces to each other; the rest holds them.
+    """
+
+    form: Any
+    pull: Array | None = None
+    between: Any = None
+
+
 class Blocks:
     """A matrix with blocks on its diagonal, one a surface, ``scipy.sparse.csr_array`` each."""
 
@@ -135,13 +156,10 @@ class Problem:
         L, on the control points of the spaces laid out one after another.
     goal : ndarray (conditions, 3), optional
         r; zero by default: every joint stays as it is.
-    soft : scipy.sparse matrix (points, points), optional
-        Cᵀ W C.
-    pull : ndarray (points, 3), optional
-        Cᵀ W c, where contacts are to be mended.
-    between : scipy.sparse matrix (points, points), optional
-        The part of ``soft`` that joins the surfaces to each other; the rest holds them.
+    soft : Soft, optional
     effort : Effort
+    guides : Guides, optional
+        Conditions of edges that slide; edges that do are not rims.
     """
 
     def __init__(
@@ -149,14 +167,15 @@ class Problem:
         spaces: Mapping[int, Space],
         rows: Any = None,
         goal: Array | None = None,
-        soft: Any = None,
-        pull: Array | None = None,
-        between: Any = None,
+        soft: Soft | None = None,
         effort: Effort = Effort(),
+        guides: Guides | None = None,
     ) -> None:
         from scipy.sparse import csr_array
 
-        self.spaces, self.soft, self.between, self.effort = spaces, soft, between, effort
+        self.spaces, self.effort, self.guides = spaces, effort, guides
+        soft = soft or Soft(None)
+        self.soft, self.between, pull = soft.form, soft.between, soft.pull
         self.rows = csr_array((0, sum(s.free.size for s in spaces.values()))) if rows is None else rows
         self.goal = goal if goal is not None and goal.any() else None
         self.pull = pull if pull is not None and pull.any() else None
@@ -168,7 +187,7 @@ class Problem:
         )
         f = np.concatenate([space.net.poles.reshape(-1, 3) for space in spaces.values()])
         self.f = f - f[self.seen].mean(axis=0)
-        self._solvers: dict[tuple[float, bytes, bool], Constrained | Divided] = {}
+        self._solvers: dict[tuple[float, bytes, bool], Solver] = {}
         trends = (np.zeros_like(s.net.poles) if s.trend is None else s.trend for s in spaces.values())
         above = f - np.concatenate([each.reshape(-1, 3) for each in trends])
         self.above = above - above[self.seen].mean(axis=0)
@@ -224,14 +243,31 @@ class Problem:
         """A displacement ``(points, 3)`` corrected as smoothly as possible to meet the conditions."""
         return np.asarray(delta + self._solver(stiffness, self.free)(np.zeros_like(delta), start=delta, goal=self.goal))
 
-    def _solver(self, stiffness: float, free: Array) -> Constrained | Divided:
-        """The solver of the form M + stiffness · K and the contacts."""
+    def aimed(self, delta: Array, stiffness: float, ways: Array, off: Array) -> Array:
+        """A displacement ``(points, 3)`` corrected as smoothly as possible for edges off what they slide along.
+
+        Parameters
+        ----------
+        delta : ndarray (points, 3)
+        stiffness : float
+            mm⁴.
+        ways, off : ndarray (conditions, 3), (conditions,)
+            Directions of the conditions of edges that slide, and how far off they are in them, mm.
+        """
+        solve = self._solver(stiffness, self.free)
+        assert isinstance(solve, Guided)
+        goal = replace(solve.guides, ways=ways).of(delta) - off
+        return np.asarray(delta + solve.aimed(ways, goal)(np.zeros_like(delta), start=delta, goal=self.goal))
+
+    def _solver(self, stiffness: float, free: Array) -> Solver:
+        """The solver of the form M + stiffness · K and the contacts, with what slides unless all rims are free."""
         held = free is self.free
         key = stiffness, free.tobytes(), held
         if key not in self._solvers:
             while self._solvers and (len(self._solvers) + 1) * len(free) > KEPT:
                 del self._solvers[next(iter(self._solvers))]
-            self._solvers[key] = self._factored(stiffness, free, self.soft if held else self.between)
+            base = self._factored(stiffness, free, self.soft if held else self.between)
+            self._solvers[key] = Guided(base, self.guides) if held and self.guides is not None else base
         return self._solvers[key]
 
     def _factored(self, stiffness: float, free: Array, soft: Any) -> Constrained | Divided:
@@ -259,8 +295,9 @@ class Problem:
 
     @property
     def rimmed(self) -> bool:
-        """Whether the surfaces are held anywhere."""
-        return self.soft is not None or bool((self.seen & ~self.free).any())
+        """Whether the surfaces are held or led anywhere."""
+        led = self.soft is not None or self.guides is not None
+        return led or bool((self.seen & ~self.free).any())
 
     def fading(self, width: float) -> Array:
         """0 where held, 1 farther than ``width`` (mm) from there, smooth between, ``(points, 1)``."""

@@ -19,6 +19,9 @@ MOST_POINTS = 10_000
 
 HALVINGS = 12
 
+END = 1e-9
+"""Fraction of the domain within which a parameter line is its end."""
+
 
 def refined(net: Net, held: Sequence[tuple[Face, Trim]], longest: tuple[float, float]) -> Net:
     """A surface with its knot spans halved beside held boundary curves until they are at most ``longest`` (mm) there,
@@ -59,4 +62,19 @@ def line(net: Net, trim: Trim) -> int | None:
         at = trim.curve.poles[:, axis]
         if np.ptp(at) <= 2 * ISO * local_span(knots, float(at.mean())):
             return axis
+    return None
+
+
+def end(net: Net, trim: Trim) -> tuple[int, int] | None:
+    """The axis across a boundary curve and the end (0, −1) of a clamped net on which it lies, if it does."""
+    axis = line(net, trim)
+    if axis is None:
+        return None
+    knots = (net.u, net.v)[axis]
+    if knots.periodic:
+        return None
+    at, (low, high) = float(trim.curve.poles[:, axis].mean()), knots.domain
+    for place, limit, multiplicity in ((0, low, knots.multiplicities[0]), (-1, high, knots.multiplicities[-1])):
+        if abs(at - limit) <= END * (high - low) and multiplicity == knots.degree + 1:
+            return axis, place
     return None

@@ -41,6 +41,8 @@ class Wishes:
         Whether free edges do.
     corners : bool
         Whether the corners of faces between two free edges that move do, too.
+    slide : frozenset of int
+        Edges that may slide along a neighbour that stays.
     """
 
     keep: str = "g1"
@@ -52,6 +54,7 @@ class Wishes:
     open: bool = False
     free: bool = False
     corners: bool = False
+    slide: frozenset[int] = frozenset()
 
     def order(self, angles: Array, one: Array, other: Array) -> int:
         """Number of derivatives kept across an edge, given those along it.

@@ -42,6 +42,8 @@ class Scope:
         Faces that were asked for one by one, by number or place.
     zones : tuple of Zone
         Regions in which nothing must move.
+    firm : frozenset of int
+        Edges that must not slide.
     """
 
     faces: frozenset[int]
@@ -49,15 +51,16 @@ class Scope:
     edges: frozenset[int] = frozenset()
     named: frozenset[int] = frozenset()
     zones: tuple[Zone, ...] = ()
+    firm: frozenset[int] = frozenset()
 
     @property
     def chosen(self) -> frozenset[int]:
         """Faces that it may move."""
         return self.faces - self.held
 
-    def holding(self, faces: Iterable[int]) -> Scope:
-        """The same with more faces held."""
-        return replace(self, held=self.held | frozenset(faces))
+    def holding(self, faces: Iterable[int], firm: Iterable[int] = ()) -> Scope:
+        """The same with more faces held, and more edges that do not slide."""
+        return replace(self, held=self.held | frozenset(faces), firm=self.firm | frozenset(firm))
 
 
 def scope(

@@ -15,7 +15,7 @@ from OCP.gp import gp_Ax3, gp_Vec
 from OCP.TopLoc import TopLoc_Location
 
 import mracad as library
-from mracad.job.document import Spoilt
+from mracad.job.left import Spoilt
 from mracad.occ import step as writer
 from tests import zoo
 from tests.job.batch.runs import recipe

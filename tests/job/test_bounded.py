@@ -15,6 +15,7 @@ from mracad.inspect import accept
 from mracad.inspect.faults import Fault, FaultKind, ReadBack
 from mracad.job import document as job
 from mracad.job import produce
+from mracad.job.left import ROUNDS
 from mracad.model.displacement import Displacement
 from mracad.occ.view import view
 from mracad.spec.recipe import Step
@@ -112,11 +113,11 @@ def first_edited(faces):
 
 def test_an_edit_is_done_again_a_bounded_number_of_times(monkeypatch):
     """Then all that seams join to what came out worse is left, and the rest is edited."""
-    stub, document = Stub(), chains(job.ROUNDS + 6, 3)
-    row = range(job.ROUNDS + 6)
+    stub, document = Stub(), chains(ROUNDS + 6, 3)
+    row = range(ROUNDS + 6)
     monkeypatch.setattr(job, "torn", first_edited(row))
     report = job.run(document, stub, Smooth(level=1))
-    assert stub.rounds == job.ROUNDS + 2
+    assert stub.rounds == ROUNDS + 2
     left = report.edit.faces("left")
     assert [outcome.face for outcome in left] == list(row)
     assert {outcome.said for outcome in left} == {"its seams would not hold"}
@@ -124,11 +125,11 @@ def test_an_edit_is_done_again_a_bounded_number_of_times(monkeypatch):
 
 
 def test_an_edit_that_never_comes_out_is_refused_after_these_rounds(monkeypatch):
-    stub, document = Stub(), chains(*[1] * (job.ROUNDS + 4))
-    monkeypatch.setattr(job, "torn", first_edited(range(job.ROUNDS + 4)))
-    with pytest.raises(EditError, match=f"#{job.ROUNDS + 2} would come out worse") as caught:
+    stub, document = Stub(), chains(*[1] * (ROUNDS + 4))
+    monkeypatch.setattr(job, "torn", first_edited(range(ROUNDS + 4)))
+    with pytest.raises(EditError, match=f"#{ROUNDS + 2} would come out worse") as caught:
         job.run(document, stub, Smooth(level=1))
-    assert caught.value.code == Code.CANNOT_EDIT and stub.rounds == job.ROUNDS + 2
+    assert caught.value.code == Code.CANNOT_EDIT and stub.rounds == ROUNDS + 2
 
 
 def test_an_edit_that_fails_for_a_face_that_had_to_stay_says_so(monkeypatch):

@@ -11,7 +11,7 @@ from mracad.bspline.surface import Net
 from mracad.model.cells import quadrature
 from mracad.seam.divided import LEFT
 from mracad.seam.energy import forms
-from mracad.seam.solve import Effort, Problem, Space
+from mracad.seam.solve import Effort, Problem, Soft, Space
 from tests.edit.models import rotation
 from tests.model.shapes import face
 
@@ -120,7 +120,7 @@ def test_contacts_pull_surfaces_that_they_join():
     for row, (a, b) in enumerate(ends):
         springs[row, [a, b]] = 1.0, -1.0
     soft, pull = csr_array(springs.T @ springs), springs.T @ rng.standard_normal((len(ends), 3))
-    _, found, direct = both(lambda p: p.filtered(STIFFNESS), soft=soft, pull=pull)
+    _, found, direct = both(lambda p: p.filtered(STIFFNESS), soft=Soft(soft, pull))
     assert size(found - direct) < 1e-5 * size(direct)
     assert size(found - both(lambda p: p.filtered(STIFFNESS))[1]) > 0.1 * size(found)
 

@@ -9,7 +9,7 @@ from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
 from mracad.model.cells import quadrature
 from mracad.seam.energy import forms
-from mracad.seam.solve import Constrained, Problem, Space
+from mracad.seam.solve import Constrained, Problem, Soft, Space
 from tests.edit.models import rotation
 from tests.model.shapes import face, plane
 
@@ -148,7 +148,7 @@ def test_contacts_pull_by_their_weight():
     n = len(plain.free)
     pulled = 0.1 * rng.standard_normal((4, n))
     soft, pull = csr_array(pulled.T @ pulled), pulled.T @ rng.standard_normal((4, 3))
-    p = problem(rough(), soft=soft, pull=pull)
+    p = problem(rough(), soft=Soft(soft, pull))
     z, wanted = admissible(p), rng.standard_normal((n, 3))
     dense = z @ np.linalg.solve(z.T @ (p.mass.tocsr() + soft).toarray() @ z, z.T @ (p.mass @ wanted + pull))
     assert np.abs(p.nearest(wanted) - dense).max() < 1e-6 * np.abs(dense).max()

@@ -164,13 +164,15 @@ def copies_line(report: Report) -> str:
 
 def edge_words(edges: tuple[Treatment, ...]) -> str:
     """What was done about the edges of the edited faces."""
-    moved = sum(e.how != "frozen" for e in edges)
+    slid = sum(e.how == "slid" for e in edges)
+    moved = sum(e.how != "frozen" for e in edges) - slid
     loose = sum(e.how == "to tolerance" for e in edges)
     why = Counter(str(e.reason) for e in edges if e.reason)
     reasons = ", ".join(f"{count} × {reason}" for reason, count in why.most_common(REASONS))
     reasons += ", …" if len(why) > REASONS else ""
     words = f"{moved} of {plural(len(edges), 'edge')} moved with both faces"
-    return words + (f", {loose} to tolerance" if loose else "") + (f" (stayed: {reasons})" if why else "")
+    words += (f", {loose} to tolerance" if loose else "") + (f", {slid} slid along one that stays" if slid else "")
+    return words + (f" (stayed: {reasons})" if why else "")
 
 
 def seam_line(new: SeamSummary, old: SeamSummary | None = None) -> str:

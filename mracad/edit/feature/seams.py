@@ -26,7 +26,7 @@ from mracad.seam.contact import Contact
 from mracad.seam.contact import rows as contact_rows
 from mracad.seam.energy import forms
 from mracad.seam.natural import Seam
-from mracad.seam.solve import Problem, Space
+from mracad.seam.solve import Problem, Soft, Space
 from mracad.seam.trace import Trace, along, crossings
 from mracad.seam.trimmed import TrimmedSeam
 
@@ -225,7 +225,7 @@ def _problem(
     soft = contact_rows(nets, contacts)
     weight, limits = worth(*size), WITHIN * np.array(ALLOWED.contact(size[1]))[soft.order]
     pull = weight * soft.pull(-(soft.matrix @ laid), limits)
-    return Problem(spaces, rows, -(rows @ laid), weight * soft.form(limits), pull)
+    return Problem(spaces, rows, -(rows @ laid), Soft(weight * soft.form(limits), pull))
 
 
 def _near(net: Net, surface: int, found: Sequence[Crossing]) -> tuple[Array, Array]:

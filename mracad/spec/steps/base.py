@@ -83,7 +83,7 @@ class Selection(Options, frozen=True, kw_only=True, forbid_unknown_fields=True):
         ),
     ] = "as-is"
     edges: Annotated[
-        Literal["coupled", "frozen"],
+        Literal["coupled", "slide", "frozen"],
         Meta(
             description="Edges between two edited faces: coupled lets them move, as smooth as before where possible; "
             "frozen keeps them in place."

@@ -50,6 +50,15 @@ class Fitting(Selection, frozen=True, kw_only=True, forbid_unknown_fields=True):
 class Fairing(Fitting, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """How an edit that makes faces fairer goes about it."""
 
+    edges: Annotated[
+        Literal["coupled", "slide", "frozen"],
+        Meta(
+            description="Edges between two edited faces: coupled lets them move, as smooth as before where possible; "
+            "frozen keeps them in place; slide also lets sharp edges move along a plane, cylinder, cone, sphere, torus "
+            "or NURBS face that stays."
+        ),
+    ] = "coupled"
+
     free_edges: Annotated[
         Literal["hold", "smooth"],
         Meta(
@@ -168,6 +177,13 @@ class OffsetFaces(Fitting, frozen=True, kw_only=True, forbid_unknown_fields=True
     function: ClassVar[str] = "mracad.edit.offset:offset"
 
     distance: Annotated[Length, Meta(description="How far outward (a length).")]
+    edges: Annotated[
+        Literal["coupled", "frozen"],
+        Meta(
+            description="Edges between two edited faces: coupled lets them move, as smooth as before where possible; "
+            "frozen keeps them in place."
+        ),
+    ] = "coupled"
     inward: Annotated[bool, Meta(description="Move them inward instead.")] = False
 
     @property
