@@ -15,13 +15,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from typing import ClassVar
 
 import numpy as np
 
 from mracad.bspline.surface import Net
 from mracad.edit.fair import ways
+from mracad.edit.modes import inside, modes
 from mracad.edit.result import Edit, FaceOutcome, Reason
 from mracad.edit.target import Sheet, stiffness
 from mracad.edit.whole import edited
@@ -36,7 +36,6 @@ from mracad.spec.quantity import length
 from mracad.spec.select import Scope
 from mracad.spec.select import scope as scope_of
 from mracad.spec.steps.smooth import Denoise
-from mracad.wavelet.ladder import arc_lengths
 
 Array = np.ndarray
 
@@ -45,9 +44,6 @@ STEPS = 4
 
 LONGEST = 0.5
 """Longest wavelength over the size of a surface."""
-
-MOST = 600
-"""Most control points along an axis that are used."""
 
 BESIDE = 2.0**-0.5, 1.0, 2.0**0.5
 """Wavelengths that are tried with the filter itself, over the best for control points alone."""
@@ -70,11 +66,8 @@ class Quiet:
 
     def wavelength(self, net: Net, faces: Sequence[Face], creases: Creases) -> float:
         """The wavelength with the least Cp for a surface alone, mm."""
-        axes = [_axis(net, axis) for axis in (0, 1)]
-        within = net.poles
-        for axis, each in enumerate(axes):
-            within = np.moveaxis(np.tensordot(each.modes, within.take(each.points, axis), (0, axis)), 0, axis)
-        power = (within**2).sum(axis=2)
+        axes = [modes(net, axis) for axis in (0, 1)]
+        power = (inside(axes, net.poles) ** 2).sum(axis=2)
         bent = np.add.outer(axes[0].squares, axes[1].squares) ** 2
         shortest, longest = min(a.step for a in axes), LONGEST * max(a.step * len(a.squares) for a in axes)
         count = 1 + int(STEPS * max(np.log2(longest / (2 * shortest)), 0.0))
@@ -119,43 +112,6 @@ def _risk(problem: Problem, stiff: float, delta: Array, noise: Array) -> float:
     removed = -signs * problem.filtered(stiff, problem.seen, of=noise * signs)
     noisy = noise[:, 0] > 0
     return float(((delta[noisy] / noise[noisy]) ** 2 - 2 * removed[noisy] / noise[noisy]).sum())
-
-
-@dataclass(frozen=True, eq=False)
-class _Axis:
-    """Control points along an axis.
-
-    Attributes
-    ----------
-    points : ndarray (n,) of int
-        Those that are used.
-    modes : ndarray (n, n)
-        Orthonormal, ordered by bending.
-    squares : ndarray (n,)
-        Their squared wavenumbers, 1/mm².
-    step : float
-        Mean spacing, mm.
-    """
-
-    points: Array
-    modes: Array
-    squares: Array
-    step: float
-
-
-def _axis(net: Net, axis: int) -> _Axis:
-    """The control points of a surface along an axis, with free ends; of many, those in the middle."""
-    knots = (net.u, net.v)[axis]
-    along = np.concatenate([[0.0], np.cumsum(arc_lengths(net, axis))])
-    at = np.interp(knots.greville(), knots.breaks, along)
-    step = float(along[-1]) / max(len(at) - 1, 1)
-    points = np.arange(len(at))[max((len(at) - MOST) // 2, 0) :][:MOST]
-    gaps = np.diff(at[points] + step * 1e-6 * points)
-    second = np.zeros((max(len(points) - 2, 0), len(points)))
-    for k, (a, b) in enumerate(pairwise(gaps)):
-        second[k, k : k + 3] = 2 / (a * (a + b)), -2 / (a * b), 2 / (b * (a + b))
-    values, modes = np.linalg.eigh(second.T @ second)
-    return _Axis(points, modes, np.sqrt(np.maximum(values, 0.0)), step)
 
 
 def denoise(

@@ -90,13 +90,14 @@ class FaceOutcome:
 
 @dataclass(frozen=True, eq=False)
 class Edit:
-    """A displacement, the outcome for each face of the model in face order, the treatment of each edge, and the result
-    for each copy of a feature."""
+    """A displacement, the outcome for each face of the model in face order, the treatment of each edge, the result for
+    each copy of a feature, and the scale (mm) where the edit found it."""
 
     displacement: Displacement
     outcomes: tuple[FaceOutcome, ...]
     edges: tuple[Treatment, ...] = field(default=())
     copies: tuple[Copy, ...] = field(default=())
+    scale: float | None = None
 
     def faces(self, *status: Status) -> list[FaceOutcome]:
         """Outcomes with one of the given statuses."""

@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
+from mracad.edit.bound import widest
 from mracad.edit.fair import Filter
 from mracad.edit.heading import lead
 from mracad.edit.level import Level
 from mracad.edit.result import Edit, Reason
-from mracad.edit.whole import edited
+from mracad.edit.tolerances import tolerances
+from mracad.edit.whole import edited, wished
 from mracad.model.brep import Model
 from mracad.spec.places import heading
 from mracad.spec.quantity import length
@@ -29,7 +31,8 @@ def smooth(
     scope = scope or scope_of(model, options)
     if options.level is not None:
         return edited(model, options, Level(options.level), scope, progress)
-    assert options.scale is not None
+    if options.scale is None:
+        return _within(model, options, scope, progress)
     scale = length(options.scale, model.diagonal, "scale")
     limited = options.limit_by_curvature
     if options.across is None:
@@ -46,6 +49,17 @@ def smooth(
         for each in edit.outcomes
     )
     return replace(edit, outcomes=tuple(outcomes))
+
+
+def _within(model: Model, options: Smooth, scope: Scope, progress: Callable[[int, int], None] | None) -> Edit:
+    """Smoothing at the largest scale that stays within the bound."""
+    allowed, limited = tolerances(model, options), options.limit_by_curvature
+    movable = {i for i in scope.chosen if model.faces[i].surface is not None}
+
+    def edit(scale: float) -> Edit:
+        return edited(model, options, Filter(scale, limited=limited), scope, progress)
+
+    return widest(model, movable, limited, wished(model, options, scope), allowed, edit)
 
 
 def _leads(model: Model, options: Smooth, scope: Scope) -> dict[int, int | None]:

@@ -247,17 +247,24 @@ def bounded(net: Net, offset: Array, bound: float, widths: tuple[float, float]) 
     widths : (float, float)
         Along u and v, mm.
     """
-    from scipy.ndimage import maximum_filter
-
-    us, vs = (_between(knots.greville()) for knots in (net.u, net.v))
-    normals = cross(net.tangents(us, vs, 0), net.tangents(us, vs, 1))
-    normals /= np.maximum(np.linalg.norm(normals, axis=-1, keepdims=True), 1e-300)
-    far = np.abs((np.asarray(net.with_poles(offset).grid(us, vs)) * normals).sum(axis=-1))
-    far = maximum_filter(far, 2 * FINER + 1, mode="nearest")[::FINER, ::FINER]
-    share = bound / np.maximum(far, bound)
+    share = bound / np.maximum(heights(net, offset), bound)
     return np.asarray(offset * eased(net, share, widths)[..., None])
 
 
-def _between(places: Array) -> Array:
+def heights(net: Net, offset: Array, steps: int = FINER) -> Array:
+    """The largest |δ · n| beside the Greville point of each control point, mm, for offsets ``(nu, nv, 3)``.
+
+    It is looked at in so many steps from one Greville point to the next.
+    """
+    from scipy.ndimage import maximum_filter
+
+    us, vs = (_between(knots.greville(), steps) for knots in (net.u, net.v))
+    normals = cross(net.tangents(us, vs, 0), net.tangents(us, vs, 1))
+    normals /= np.maximum(np.linalg.norm(normals, axis=-1, keepdims=True), 1e-300)
+    far = np.abs((np.asarray(net.with_poles(offset).grid(us, vs)) * normals).sum(axis=-1))
+    return np.asarray(maximum_filter(far, 2 * steps + 1, mode="nearest")[::steps, ::steps])
+
+
+def _between(places: Array, steps: int) -> Array:
     """Parameters with more of them between each and the next."""
-    return np.asarray(np.interp(np.arange(FINER * (len(places) - 1) + 1) / FINER, np.arange(len(places)), places))
+    return np.asarray(np.interp(np.arange(steps * (len(places) - 1) + 1) / steps, np.arange(len(places)), places))

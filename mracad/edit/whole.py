@@ -48,23 +48,15 @@ def edited(
     """
     scope = scope or scope_of(model, options)
     movable = {i for i in scope.chosen if model.faces[i].surface is not None}
-    every = frozenset(edge.index for edge in model.edges)
-    held = every if options.edges == "frozen" else scope.edges
-    fit = math.radians(options.fit_g1 or 0.0)
     allowed = tolerances(model, options)
-    free = isinstance(options, Fairing) and options.free_edges == "smooth"
-    corners = isinstance(options, Fairing) and options.corners == "move"
-    wishes = Wishes(
-        options.keep, fit, options.close_gaps, held, scope.zones, open=not wish.fairs, free=free, corners=corners
-    )
-    able = every - held - scope.firm - _beside(model, scope) if options.edges == "slide" else frozenset[int]()
+    wishes = replace(wished(model, options, scope), open=not wish.fairs)
     lost = {edge: unslid(model, edge) for edge in scope.firm}
     for left in range(ROUNDS, -1, -1):
         result = faired(
             model,
             movable,
             wish,
-            replace(wishes, slide=able - lost.keys()),
+            replace(wishes, slide=wishes.slide - lost.keys()),
             allowed if wish.fairs else replace(allowed, growth=RESHAPED, fairer=False),
             refine=options.refine == "auto",
             progress=progress,
@@ -94,6 +86,18 @@ def _amounts(result: Result, wish: Wish, options: Fitting) -> dict[int, Moved]:
 def _beside(model: Model, scope: Scope) -> frozenset[int]:
     """The edges of faces that are held."""
     return frozenset(edge.index for edge in model.edges if any(side.face in scope.held for side in edge.sides))
+
+
+def wished(model: Model, options: Fitting, scope: Scope) -> Wishes:
+    """What options ask of seams and rims."""
+    every = frozenset(edge.index for edge in model.edges)
+    held = every if options.edges == "frozen" else scope.edges
+    able = every - held - scope.firm - _beside(model, scope) if options.edges == "slide" else frozenset[int]()
+    fit = math.radians(options.fit_g1 or 0.0)
+    free = isinstance(options, Fairing) and options.free_edges == "smooth"
+    corners = isinstance(options, Fairing) and options.corners == "move"
+    wishes = Wishes(options.keep, fit, options.close_gaps, held, scope.zones, free=free, corners=corners)
+    return replace(wishes, slide=able)
 
 
 def _outcome(face: Face, result: Result, movable: Collection[int], scope: Scope, options: Fitting) -> FaceOutcome:

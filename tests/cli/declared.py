@@ -51,13 +51,15 @@ _RIMS = (
 TOGETHER: Mapping[str, Sequence[tuple[str, Sequence[Words]]]] = {
     "smooth": [
         (
-            "scale across along level limit_by_curvature",
+            "scale across along level limit_by_curvature max_deviation",
             [
                 ("--scale", "4mm"),
+                ("--scale", "4mm", "--max-deviation", "0.01mm"),
                 ("--scale", "20%", "--no-limit-by-curvature"),
                 ("--scale", "4mm", "--across", "2mm"),
                 ("--scale", "4mm", "--across", "10%", "--along", "Y"),
                 ("--level", "1.5"),
+                ("--max-deviation", "0.02mm"),
             ],
         ),
         _RIMS,

@@ -93,7 +93,7 @@ def test_a_face_whose_parameters_run_elsewhere_stays():
     ("options", "said"),
     [
         ({"across": "2mm", "level": 2.0}, "across: it needs a scale"),
-        ({"across": "2mm"}, "smooth needs either a scale or a level"),
+        ({"across": "2mm"}, "across: it needs a scale"),
         ({"scale": "5mm", "along": "X"}, "along: it needs a scale across it"),
         ({"scale": "5mm", "across": "2mm", "along": "W"}, "along: 'W' is not a direction"),
         ({"scale": "5mm", "across": "2mm", "along": "edge#0"}, "along: 'edge#0' is not a direction"),

@@ -69,6 +69,7 @@ def report(value: Report) -> dict[str, Any]:
         "faces": [outcome(o) for o in value.edit.outcomes],
         "edges": [treatment(e) for e in value.edit.edges],
         "copies": [{**plain(c), "faces": [i + 1 for i in c.faces]} for c in value.edit.copies],
+        "scale": value.edit.scale,
         "control_points": dict(zip(("before", "after"), value.control_points, strict=True)),
         "notes": notes(value),
         "deviation": [{**plain(d), "face": d.face + 1} for d in value.deviations],

@@ -88,6 +88,8 @@ def edit_lines(report: Report, options: Selection, end: str, found: Found | None
     edit, model = report.edit, report.model
     nurbs = [o for o in edit.outcomes if o.status != "analytic"]
     parts = [f"{len(edit.faces('edited'))} {options.done}"]
+    if edit.scale is not None:
+        parts[0] += f", {mm(edit.scale)}"
     if edit.faces("unchanged"):
         parts.append(f"{len(edit.faces('unchanged'))} {options.quiet}")
     parts += left_words(edit.faces("left"))

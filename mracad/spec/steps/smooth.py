@@ -86,7 +86,7 @@ class Smooth(Fairing, frozen=True, kw_only=True, forbid_unknown_fields=True):
         Length | None,
         Meta(
             description="Wavelength (5mm, 0.2in, or 2% of the model's diagonal): ripples up to half as long are "
-            "removed, ripples three times as long stay."
+            "removed, ripples three times as long stay. Default: the largest within --max-deviation."
         ),
     ] = None
     across: Annotated[
@@ -128,21 +128,33 @@ class Smooth(Fairing, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
     @property
     def _place(self) -> str:
-        if self.scale is None:
+        if self.level is not None:
             return f"level {self.level:g}"
+        if self.scale is None:
+            return f"the largest scale within {self.max_deviation}"
         return f"{self.scale} and {self.across} across" if self.across else self.scale
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if (self.scale is None) == (self.level is None):
-            raise UsageError("smooth needs either a scale or a level", "give --scale 5mm, --scale 2% or --level 2.5")
+        if self.scale is not None and self.level is not None:
+            raise UsageError("smooth needs either a scale or a level, not both", "leave one of them out")
         if self.across is not None and self.scale is None:
             raise UsageError("across: it needs a scale", "add --scale, for waves along the direction", "across")
         if self.along is not None and self.across is None:
             raise UsageError("along: it needs a scale across it", "add --across", "along")
-        if self.scale is None and not self.limit_by_curvature:
+        if self.scale is None and self.level is None:
+            self._check_bound()
+        if self.level is not None and not self.limit_by_curvature:
             message = "limit-by-curvature: levels are not limited by it"
             raise UsageError(message, "leave it out, or give --scale", "limit_by_curvature")
+
+    def _check_bound(self) -> None:
+        """Raise UsageError where the options leave no scale to be found."""
+        if self.max_deviation is None:
+            hint = "give --scale 5mm, --scale 2%, --level 2.5 or --max-deviation 0.2mm"
+            raise UsageError("smooth needs a scale, a level or a bound of the deviation", hint)
+        if self.amount < 1.0:
+            raise UsageError("amount: a bound alone is reached by the scale", "leave it out, or give --scale", "amount")
 
 
 class Denoise(Fairing, frozen=True, kw_only=True, forbid_unknown_fields=True):
