@@ -137,7 +137,7 @@ class Smooth(Fairing, frozen=True, kw_only=True, forbid_unknown_fields=True):
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.scale is not None and self.level is not None:
-            raise UsageError("smooth needs either a scale or a level, not both", "leave one of them out")
+            raise UsageError("smooth takes a scale or a level, not both", "leave out --scale or --level")
         if self.across is not None and self.scale is None:
             raise UsageError("across: it needs a scale", "add --scale, for waves along the direction", "across")
         if self.along is not None and self.across is None:
