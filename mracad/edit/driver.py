@@ -18,7 +18,7 @@ from mracad.edit.moved import Moved, Result
 from mracad.edit.pose import Scene, beside_rims
 from mracad.edit.target import Sheet, Wish
 from mracad.edit.tolerances import Tolerances
-from mracad.edit.trial import ENOUGH, Trial, Verdict, rank
+from mracad.edit.trial import ENOUGH, WHOLE, Trial, Verdict, rank
 from mracad.seam.cause import Cause, Still
 from mracad.seam.interface import Joints
 from mracad.seam.natural import Seam
@@ -67,8 +67,9 @@ def drive(scene: Scene, wish: Wish, progress: Callable[[int, int], None] | None 
     moving = {i for i, moved in result.items() if moved.amount > 0}
     exact += [seam for seam in scene.joints.exact if seam.a.surface == seam.b.surface and seam.a.surface in moving]
     closing = {edge: pair for edge, pair in scene.joints.closing.items() if pair[0].surface in moving}
-    used = replace(scene.joints, exact=tuple(exact), loose=tuple(loose), closing=closing)
-    return Result(result, replace(used, frozen={**scene.joints.frozen, **_dropped(scene.joints, used, result)}))
+    sliding = {i for i, moved in result.items() if moved.sliding and moved.amount > 0}
+    used = replace(scene.joints.firm(sliding), exact=tuple(exact), loose=tuple(loose), closing=closing)
+    return Result(result, replace(used, frozen={**used.frozen, **_dropped(scene.joints, used, result)}))
 
 
 def _dropped(wanted: Joints, used: Joints, result: Mapping[int, Moved]) -> dict[int, Cause]:
@@ -217,8 +218,26 @@ def _attempt(
 ) -> dict[int, Moved]:
     """The best result for surfaces that move together, some with more control points; amounts may differ.
 
-    They stay if that is less than a given share of the wanted change.
+    They stay if that is less than a given share of the wanted change.  Where edges that slide keep them from moving in
+    full, these are held if that is better.
     """
+    group = list(surfaces)
+    found = _tried(scene, wish, group, joined, finer, least)
+    if _through(found) or not any(slide.trace.surface in group for slide in joined.slides):
+        return found
+    return max(found, _tried(scene, wish, group, joined.firm(), finer, least), key=_done)
+
+
+def _done(found: Mapping[int, Moved]) -> tuple[float, float]:
+    """How much of the wanted change is made, to compare it with another way to make it."""
+    share = next(iter(found.values())).share
+    return share * (WHOLE if _through(found) else 1.0), sum(each.amount for each in found.values())
+
+
+def _tried(
+    scene: Scene, wish: Wish, surfaces: Sequence[int], joined: Joints, finer: Collection[int], least: float
+) -> dict[int, Moved]:
+    """The best result with edges as they are joined."""
     members = {i: scene.sheets[i] for i in surfaces}
     trial = Trial(scene, members, joined, finer)
     target = wish.target(trial.problem, members, joined)
@@ -277,7 +296,19 @@ def _confirmed(trial: Trial, members: Mapping[int, Sheet], found: Sequence[Verdi
 def _moved(trial: Trial, members: Mapping[int, Sheet], verdict: Verdict) -> list[Moved]:
     """The displacement that a verdict allows, by surface."""
     figures = zip(verdict.parts, verdict.amounts, verdict.changes, verdict.limits, strict=True)
+    slides = trial.pose.led is not None
     return [
-        Moved(members[i], space.net, amount * part, amount, changes, limits, int(space.free.sum()), 0.0, 0.0)
+        Moved(
+            members[i],
+            space.net,
+            amount * part,
+            amount,
+            changes,
+            limits,
+            int(space.free.sum()),
+            0.0,
+            0.0,
+            sliding=slides,
+        )
         for (i, space), (part, amount, changes, limits) in zip(trial.problem.spaces.items(), figures, strict=True)
     ]

@@ -44,6 +44,8 @@ class Moved:
         How much nearer the surfaces that move with it came to the target, and the whole distance, as squared norms.
     rough : bool
         Whether the wanted change would reduce its roughness at all.
+    sliding : bool
+        Whether its edges slide.
     hindered : bool
         Whether nothing but what holds it stands against the wanted change: together with others it may do more.
     """
@@ -58,6 +60,7 @@ class Moved:
     gain: float
     wanted: float
     rough: bool = True
+    sliding: bool = False
     hindered: bool = False
 
     @property

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from mracad.bspline.surface import Net
+from mracad.bspline.vectors import between
 from mracad.edit.driver import groups
 from mracad.edit.moved import Moved, Result
 from mracad.edit.pose import Scene, pose
@@ -74,11 +75,16 @@ def _displaced(nets: Mapping[int, Net], parts: Mapping[int, Array]) -> dict[int,
 
 
 def _holds(scene: Scene, slide: Slide, moved: Moved) -> bool:
-    """Whether an edge lies on its neighbour as closely as is allowed, and its ends do not run off theirs."""
+    """Whether an edge lies on its neighbour as closely as is allowed, the face did not fold there, and its ends do not
+    run off theirs."""
     now = displaced(moved.net, moved.offset)
     share = np.unique(np.concatenate([LOOKS, *_between(crossings(slide.trace, (now.u, now.v))), [0.0, 1.0]]))
     before, after = (slide.off(scene.model, net, share).max() for net in (moved.net, now))
     if not after <= max(scene.tolerances.gap, before * (1 + MORE)):
+        return False
+    places = slide.trace.places(share)
+    one, other = (net.normals(places, slide.trace.limits) for net in (moved.net, now))
+    if not np.degrees(between(one, other)).max() <= scene.tolerances.growth.fold:
         return False
     motion = moved.net.with_poles(moved.offset)
     for pin in slide.pins:

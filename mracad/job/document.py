@@ -209,7 +209,7 @@ def run(
             continue
         if not (apply and offsets):
             break
-        worse, valid_after = _put(document, model, result, left, valid_before, stage)
+        worse, valid_after = _put(document, (model, result, allowed), left, valid_before, stage)
         if not worse:
             break
         if not left.stopped(result.displacement.slid_at(model, worse)):
@@ -232,12 +232,20 @@ def tell(progress: Progress | None, name: str, done: int = 0, total: int = 1) ->
 
 
 def _put(
-    document: Document, model: Model, edit: Edit, left: Left, before: Validity, stage: Callable[[str], None]
+    document: Document,
+    seen: tuple[Model, Edit, Tolerances],
+    left: Left,
+    before: Validity,
+    stage: Callable[[str], None],
 ) -> tuple[set[int], Validity]:
-    """Put an edit into a document: faces that would be less valid, for which it is taken out again, and the verdict."""
+    """Put an edit into a document: faces that would be less valid, for which it is taken out again, and the verdict.
+
+    ``seen`` are the model, the edit and what this may be worse in.
+    """
     from mracad.occ.apply import apply, restore
     from mracad.occ.check import check
 
+    model, edit, allowed = seen
     stage("changing the model")
     sliding = apply(document, model, edit.displacement)
     stage("checking the result")
@@ -245,6 +253,8 @@ def _put(
     touched |= edit.displacement.around(model)
     moved = check(document, faces=touched)
     worse = _worse(before, moved)
+    for edge in sliding.loose(allowed.gap) if sliding else ():
+        worse |= {side.face for side in model.edges[edge].sides}
     if worse:
         restore(document, model, edit.displacement, sliding)
     if not worse <= touched - left.faces.keys() and not edit.displacement.slid_at(model, worse):

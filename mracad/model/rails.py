@@ -69,6 +69,10 @@ class Elementary:
                 distance, normal = length - self.minor, way / np.maximum(length, 1e-300)[:, None]
         return distance, normal @ self.frame[:3, :3].T
 
+    def far(self, points: Array) -> Array:
+        """Distances of points ``(q, 3)``, mm."""
+        return np.asarray(np.abs(self.off(points)[0]))
+
     def feet(self, points: Array) -> tuple[Array, Array]:
         """The nearest points of the surface and the outward normals of the face there, both ``(q, 3)``."""
         distance, normal = self.off(points)

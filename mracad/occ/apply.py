@@ -175,7 +175,7 @@ def _sliding(document: Document, model: Model, displacement: Displacement, moved
     edges = {i: TopoDS.Edge_s(document.edges[i].Oriented(TopAbs_FORWARD)) for i in (*sliding, *ending)}
     beside = {i: sorted({side.face for side in model.edges[i].sides} - {displacement.slid.get(i)}) for i in edges}
     faces = {i: [TopoDS.Face_s(document.faces[f].Oriented(TopAbs_FORWARD)) for f in beside[i]] for i in edges}
-    return Sliding([(edges[i], faces[i][0]) for i in sliding], [(edges[i], faces[i]) for i in ending])
+    return Sliding({i: (edges[i], faces[i][0]) for i in sliding}, {i: (edges[i], faces[i]) for i in ending})
 
 
 def _forget(document: Document) -> None:

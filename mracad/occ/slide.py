@@ -108,10 +108,10 @@ class Sliding:
 
     Attributes
     ----------
-    slid : list of (TopoDS_Edge, TopoDS_Face)
-        Each with the face that stays, both forward.
-    ending : list of (TopoDS_Edge, list of TopoDS_Face)
-        Edges on lines and circles, with their faces, all forward.
+    slid : dict of int to (TopoDS_Edge, TopoDS_Face)
+        By number, each with the face that stays, both forward.
+    ending : dict of int to (TopoDS_Edge, list of TopoDS_Face)
+        Edges on lines and circles, by number, with their faces, all forward.
     curves : list of (TopoDS_Edge, list of BRep_CurveRepresentation, float)
         The curves and tolerances of all of them, without curves on faces that move.
     grounds : list of Geom_Surface
@@ -120,14 +120,14 @@ class Sliding:
         Places, in their own frames, and tolerances of the vertices at their ends.
     """
 
-    slid: list[tuple[TopoDS_Edge, TopoDS_Face]]
-    ending: list[tuple[TopoDS_Edge, list[TopoDS_Face]]]
+    slid: dict[int, tuple[TopoDS_Edge, TopoDS_Face]]
+    ending: dict[int, tuple[TopoDS_Edge, list[TopoDS_Face]]]
     curves: list[tuple[TopoDS_Edge, list[BRep_CurveRepresentation], float]] = field(init=False)
     grounds: list[Geom_Surface] = field(init=False)
     vertices: dict[TopoDS_TShape, tuple[gp_Pnt, float]] = field(init=False)
 
     def __post_init__(self) -> None:
-        edges = [edge for edge, _ in (*self.slid, *self.ending)]
+        edges = [edge for edge, _ in (*self.slid.values(), *self.ending.values())]
         stays = [BRep_Tool.Surface_s(face, TopLoc_Location()) for face in self._staying()]
         self.grounds = stays
         self.curves = [
@@ -139,19 +139,24 @@ class Sliding:
 
     def _staying(self) -> Iterator[TopoDS_Face]:
         """The faces that stay."""
-        yield from (face for _, face in self.slid)
-        yield from (face for _, faces in self.ending for face in faces)
+        yield from (face for _, face in self.slid.values())
+        yield from (face for _, faces in self.ending.values() for face in faces)
 
     def bare(self) -> list[Laid]:
         """Take the curves of edges that slide on faces that stay away."""
-        return [Laid.bare(*each) for each in self.slid]
+        return [Laid.bare(*each) for each in self.slid.values()]
 
     def again(self, bare: Iterable[Laid]) -> list[tuple[TopoDS_Edge, TopoDS_Face]]:
         """Give them new ones, and let edges end at vertices that moved; whatever has new curves, by face."""
         for each in bare:
             each.again()
-        trimmed = [(edge, faces) for edge, faces in self.ending if self._retrimmed(edge, faces)]
-        return [*self.slid, *((edge, face) for edge, faces in trimmed for face in faces)]
+        trimmed = [(edge, faces) for edge, faces in self.ending.values() if self._retrimmed(edge, faces)]
+        return [*self.slid.values(), *((edge, face) for edge, faces in trimmed for face in faces)]
+
+    def loose(self, limit: float) -> set[int]:
+        """The edges whose tolerance has grown beyond a limit, memory units."""
+        both = zip((*self.slid, *self.ending), self.curves, strict=True)
+        return {number for number, (edge, _, was) in both if BRep_Tool.Tolerance_s(edge) > max(was, limit)}
 
     def restore(self) -> None:
         """Make all of them what they were."""

@@ -28,7 +28,7 @@ class Still(Enum):
     FLAT = "curvature undefined along the seam"
     APART = "its faces are edited separately"
     STAYS = "one of its faces stays"
-    UNSLID = "cannot slide along its {} neighbour within the tolerance"
+    UNSLID = "could not slide along its {} neighbour"
     BARE = "no copy on the other side"
     UNSEWN = "trimmed and not sewn"
     OPEN = "trimmed: cannot be kept within the tolerance"

@@ -67,6 +67,10 @@ class Sheetlike:
         near = np.linalg.norm(self.net.evaluate(self.seeds)[None] - local[:, None], axis=2).argmin(axis=1)
         return feet(self.net, local, self.seeds[near])
 
+    def far(self, points: Array) -> Array:
+        """Distances of points ``(q, 3)``, mm."""
+        return self.at(points)[1]
+
     def off(self, points: Array) -> tuple[Array, Array]:
         """Signed distances of points ``(q, 3)`` and unit normals at their feet."""
         uv, _ = self.at(points)
@@ -143,7 +147,7 @@ class Slide:
         """Distances (mm) of the edge, on a displaced surface, from the neighbour at fractions of the edge."""
         face = model.faces[self.trace.face]
         points = np.asarray(net.evaluate(self.trace.places(share), 0, self.trace.limits))
-        return np.asarray(np.abs(self.ground.off(face.placed(points))[0]))
+        return self.ground.far(face.placed(points))
 
 
 @dataclass(frozen=True, eq=False)

@@ -101,6 +101,12 @@ class Joints:
         yield from ((seam.a.surface, seam.b.surface) for seam in self.exact)
         yield from ((seam.a.surface, seam.b.surface) for seam in self.loose)
 
+    def firm(self, sliding: Collection[int] = ()) -> Joints:
+        """The same joints, in which edges slide of some surfaces only, by default of none."""
+        slides = tuple(slide for slide in self.slides if slide.trace.surface in sliding)
+        still = {slide.edge: slide.cause for slide in self.slides if slide.trace.surface not in sliding}
+        return replace(self, slides=slides, frozen={**self.frozen, **still})
+
     def among(self, surfaces: Collection[int]) -> Joints:
         """The joints between some surfaces, with all others as rims."""
         exact = tuple(s for s in self.exact if s.a.surface in surfaces and s.b.surface in surfaces)
@@ -134,10 +140,10 @@ def joints(model: Model, movable: Collection[int], wishes: Wishes) -> Joints:
     joined = Joints(tuple(exact), tuple(loose), known.closing, frozen, known.meetings, jumps, zones=wishes.zones)
     if wishes.free:
         joined = replace(_freed(joined), cornered=not wishes.corners)
-    return _opened(joined) if wishes.open else _sliding(model, joined, wishes.slide)
+    return _opened(joined) if wishes.open else _sliding(model, joined, movable, wishes.slide)
 
 
-def _sliding(model: Model, joined: Joints, able: Collection[int]) -> Joints:
+def _sliding(model: Model, joined: Joints, movable: Collection[int], able: Collection[int]) -> Joints:
     """The same joints, with edges that slide along neighbours that stay."""
     if not able:
         return joined
@@ -147,7 +153,7 @@ def _sliding(model: Model, joined: Joints, able: Collection[int]) -> Joints:
     for edge in joined.open:
         surface = next((model.faces[side.face].surface for side in model.edges[edge].sides), None)
         pairs += [] if surface is None else [(edge, surface, surface)]
-    found = slides(model, joined.frozen, pairs, able)
+    found = slides(model, {edge: joined.frozen[edge] for edge in joined.frozen if edge in able}, pairs, movable)
     gone = {slide.edge for slide in found}
     return replace(joined, slides=found, frozen={e: why for e, why in joined.frozen.items() if e not in gone})
 

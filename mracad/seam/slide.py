@@ -23,7 +23,7 @@ STEEP = 10.0
 
 
 def slides(
-    model: Model, frozen: Mapping[int, Cause], pairs: Iterable[tuple[int, int, int]], able: Collection[int]
+    model: Model, frozen: Mapping[int, Cause], pairs: Iterable[tuple[int, int, int]], movable: Collection[int]
 ) -> tuple[Slide, ...]:
     """The edges that can slide.
 
@@ -31,16 +31,16 @@ def slides(
     ----------
     model : Model
     frozen : mapping of int to Cause
-        Edges that stay otherwise.
+        Edges that may slide, and why they stay otherwise.
     pairs : iterable of (int, int, int)
         Edges that move with the two surfaces that they join; free ones with one of them, twice.
-    able : collection of int
-        Edges that may slide.
+    movable : collection of int
+        Faces that move.
     """
     found = [
         (model.edges[edge], cause, sides)
         for edge, cause in frozen.items()
-        if edge in able and edge in model.rails.ends and (sides := _sides(model, model.edges[edge], cause))
+        if edge in model.rails.ends and (sides := _sides(model, model.edges[edge], cause, movable))
     ]
     looks = views(model, [(edge, side) for edge, _, sides in found for side in sides])
     steep = [
@@ -52,15 +52,25 @@ def slides(
     return tuple(_slide(model, edge, cause, sides, meets) for edge, cause, sides in steep)
 
 
-def _sides(model: Model, edge: Edge, cause: Cause) -> tuple[Side, Side] | None:
+def _sides(model: Model, edge: Edge, cause: Cause, movable: Collection[int]) -> tuple[Side, Side] | None:
     """The side of an edge that moves and the one that stays, if the latter is something to slide along."""
     if cause.still not in (Still.ANALYTIC, Still.NEIGHBOUR) or len(edge.sides) != 2 or edge.closing:
         return None
-    kinds = [model.faces[side.face].surface is None for side in edge.sides]
-    if cause.still is Still.ANALYTIC and sum(kinds) == 1:
-        moves, stays = edge.sides[:: 1 if kinds[1] else -1]
-        return (moves, stays) if stays.face in model.rails.grounds else None
-    return None
+    moving = [side.face in movable for side in edge.sides]
+    if sum(moving) != 1:
+        return None
+    moves, stays = edge.sides[:: 1 if moving[0] else -1]
+    return (moves, stays) if stays.face in model.rails.grounds or _roomy(model, edge, stays, movable) else None
+
+
+def _roomy(model: Model, edge: Edge, side: Side, movable: Collection[int]) -> bool:
+    """Whether a NURBS face stays with its whole surface, which goes on beyond an edge."""
+    face = model.faces[side.face]
+    if face.surface is None:
+        return False
+    surface = model.surfaces[face.surface]
+    trim = next(trim for trim in face.trims if trim.edge == edge.index)
+    return end(surface.net, trim) is None and not any(each in movable for each in surface.faces)
 
 
 def _slide(model: Model, edge: Edge, cause: Cause, sides: tuple[Side, Side], meets: _Meets) -> Slide:

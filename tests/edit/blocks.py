@@ -72,3 +72,15 @@ def _there():
 def document(name, net):
     """A block, with a boss through it, or on another base."""
     return documents.single(SHAPES[name](block(net)).wrapped, name)
+
+
+def walled(net):
+    """A block cut out by a vertical NURBS wall, which stays: a wave in plan, extruded through the top."""
+    knots = KnotVector.clamped(np.linspace(0, 1, 9), 3)
+    across = KnotVector.clamped([0.0, 1.0], 1)
+    x = -10 + 120 * knots.greville()
+    wall = np.stack([x, 60 + 6 * np.sin(x / 15), np.full_like(x, -10)], axis=-1)
+    poles = np.stack([wall, wall + np.array([0, 0, 70])], axis=1)
+    tool = cadquery.Face(BRepBuilderAPI_MakeFace(spline(Net(knots, across, poles)), 1e-7).Face())
+    halves = block(net).split(tool).Solids()
+    return documents.single(min(halves, key=lambda each: each.Center().y).wrapped, "walled")
