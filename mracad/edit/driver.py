@@ -14,11 +14,12 @@ from dataclasses import replace
 import numpy as np
 
 from mracad.bspline.surface import Net
-from mracad.edit.moved import Moved, Result
+from mracad.edit.moved import Moved, Result, closely, worthwhile
 from mracad.edit.pose import Scene, beside_rims
 from mracad.edit.target import Sheet, Wish
 from mracad.edit.tolerances import Tolerances
 from mracad.edit.trial import ENOUGH, WHOLE, Trial, Verdict, rank
+from mracad.edit.watch import Tried, Watch
 from mracad.seam.cause import Cause, Still
 from mracad.seam.interface import Joints
 from mracad.seam.natural import Seam
@@ -31,6 +32,9 @@ ROUNDS = 4
 
 LEAST = 0.25
 """A surface with a smaller allowed amount is left, so that the others can do more."""
+
+LASTING = 20_000
+"""Most control points of joined surfaces for which what is measured closely is kept: some kilobytes each."""
 
 FIRST = 2
 """Number of surfaces in a group that succeed alone before all are tried together, ahead of the rest alone."""
@@ -63,7 +67,7 @@ def drive(scene: Scene, wish: Wish, progress: Callable[[int, int], None] | None 
                 loose += joined.loose
                 result |= part
         result |= {i: _by_itself(scene, wish, i) for i in group if i not in result}
-    result = {i: result[i] for i in scene.sheets}
+    result = {i: result[i].done() for i in scene.sheets}
     moving = {i for i, moved in result.items() if moved.amount > 0}
     exact += [seam for seam in scene.joints.exact if seam.a.surface == seam.b.surface and seam.a.surface in moving]
     closing = {edge: pair for edge, pair in scene.joints.closing.items() if pair[0].surface in moving}
@@ -163,11 +167,11 @@ def _alike(found: Mapping[int, Moved], tolerances: Tolerances) -> dict[int, Move
     If that does not settle, or surfaces gain nothing from it, they stay.
     """
     for _ in range(ROUNDS):
-        found = {i: moved.confirmed(tolerances) for i, moved in found.items()}
         least = min(moved.amount for moved in found.values())
         if not least or all(moved.amount == least for moved in found.values()):
             return dict(found)
-        found = {i: moved.scaled(least) for i, moved in found.items()}
+        now = [moved.scaled(least).confirmed(tolerances) for moved in found.values()]
+        found = dict(zip(found, worthwhile(now, tolerances), strict=True))
     return {i: moved.undone() for i, moved in found.items()}
 
 
@@ -244,8 +248,8 @@ def _tried(
     if trial.pose.share is not None:
         target = trial.pose.share * target
     wished = sum(trial.problem.gains(target, target, [1.0] * len(members)))
-    found = [trial.nothing(least * wished)]
-    for batch in wish.ways(trial.problem, target, trial.width) if trial.problem.free.any() else ():
+    found, promising = [trial.nothing(least * wished)], trial.most(target) > least * wished
+    for batch in wish.ways(trial.problem, target, trial.width) if promising else ():
         first = len(found)
         for wanted in batch:
             found.append(trial.judged(trial.pose.faded(wanted), target, found))
@@ -281,11 +285,19 @@ def _confirmed(trial: Trial, members: Mapping[int, Sheet], found: Sequence[Verdi
     """The result that is worth most after a closer look."""
     best: dict[int, Moved] = {}
     most, wanted = (-1.0, 0.0), sum(trial.problem.gains(target, target, [1.0] * len(members)))
+    nets = {i: space.net for i, space in trial.problem.spaces.items()}
+    lasting = trial.problem.free.size <= LASTING
+    looks = [closely(members[i], net) for i, net in nets.items()]
     for verdict in sorted(found, key=rank, reverse=True)[:CANDIDATES]:
         if rank(verdict) <= most:
             break
         verdict = trial.settled(verdict, target)
-        moved = [each.confirmed(trial.tolerances) for each in _moved(trial, members, verdict)]
+        moved = []
+        fresh = (closely(members[i], net) for i, net in nets.items())
+        for each in _moved(trial, members, verdict, looks if lasting else fresh):
+            each = each.confirmed(trial.tolerances)
+            moved.append(each if lasting else each.done())
+        moved = worthwhile(moved, trial.tolerances)
         verdict = trial.left(verdict, [each.amount for each in moved], target)
         if rank(verdict) > most:
             most = rank(verdict)
@@ -293,22 +305,11 @@ def _confirmed(trial: Trial, members: Mapping[int, Sheet], found: Sequence[Verdi
     return best
 
 
-def _moved(trial: Trial, members: Mapping[int, Sheet], verdict: Verdict) -> list[Moved]:
+def _moved(
+    trial: Trial, members: Mapping[int, Sheet], verdict: Verdict, looks: Iterable[Watch]
+) -> Iterable[Moved]:
     """The displacement that a verdict allows, by surface."""
-    figures = zip(verdict.parts, verdict.amounts, verdict.changes, verdict.limits, strict=True)
-    slides = trial.pose.led is not None
-    return [
-        Moved(
-            members[i],
-            space.net,
-            amount * part,
-            amount,
-            changes,
-            limits,
-            int(space.free.sum()),
-            0.0,
-            0.0,
-            sliding=slides,
-        )
-        for (i, space), (part, amount, changes, limits) in zip(trial.problem.spaces.items(), figures, strict=True)
-    ]
+    figures = zip(verdict.parts, looks, verdict.amounts, verdict.changes, verdict.limits, strict=True)
+    for (i, space), (part, look, amount, changes, limits) in zip(trial.problem.spaces.items(), figures, strict=True):
+        tried, free, slides = Tried(look, [space.net], [part]), int(space.free.sum()), trial.pose.led is not None
+        yield Moved(members[i], tried, amount, changes, limits, free, sliding=slides)

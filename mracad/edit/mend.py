@@ -18,7 +18,6 @@ from mracad.edit.driver import groups
 from mracad.edit.moved import Moved, Result
 from mracad.edit.pose import Pose, Scene, pose
 from mracad.edit.target import Sheet, stiffness
-from mracad.edit.watch import Watch, displaced
 from mracad.model.brep import Model
 from mracad.model.displacement import lifted
 from mracad.seam.interface import Joints
@@ -127,22 +126,13 @@ def _shut(scene: Scene, members: Mapping[int, Sheet], joined: Joints, wide: floa
 def _moved(members: Mapping[int, Sheet], found: Pose, delta: Array) -> dict[int, Moved]:
     result = {}
     for (i, space), part in zip(found.problem.spaces.items(), found.problem.split(delta).values(), strict=True):
-        result[i] = _whole(members[i], space.net, part, int(space.free.sum()))
+        result[i] = Moved.whole(members[i], space.net, part, int(space.free.sum()))
     return result
-
-
-def _whole(sheet: Sheet, net: Net, offset: Array, free: int) -> Moved:
-    """A displacement made in full."""
-    now = Watch.of([(net, sheet.base, sheet.faces)], sheet.wavelength, [sheet.reach]).changes(
-        {0: displaced(net, offset)}
-    )[0]
-    return Moved(sheet, net, offset, 1.0, now, (), free, 0.0, 0.0)
 
 
 def _both(first: Moved, then: Moved, sheet: Sheet) -> Moved:
     """One displacement after another."""
     net = sheet.origin.over(then.net.u, then.net.v)
-    whole = _whole(sheet, net, lifted(first.net, then.net, first.offset) + then.offset, then.free)
-    return replace(
-        whole, amount=then.amount or 1.0, limits=then.limits, gain=then.gain, wanted=then.wanted, rough=then.rough
-    )
+    offset = lifted(first.net, then.net, first.offset) + then.offset
+    whole = Moved.whole(sheet, net, offset, then.free, then.amount or 1.0)
+    return replace(whole, limits=then.limits, gain=then.gain, wanted=then.wanted, rough=then.rough)

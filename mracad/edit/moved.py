@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -11,14 +11,14 @@ from mracad.bspline.surface import Net
 from mracad.edit.target import Sheet
 from mracad.edit.tolerances import Tolerances
 from mracad.edit.trial import gained
-from mracad.edit.watch import Tried, Watch, amounts, displaced
+from mracad.edit.watch import Tried, Watch, amounts
 from mracad.inspect.roughness import Change, Worse
 from mracad.model.displacement import Displacement, Offset
 from mracad.seam.interface import Joints
 
 Array = np.ndarray
 
-CLOSER = 9
+CLOSER = 7
 """Points a span at which a result is judged again."""
 
 
@@ -29,9 +29,8 @@ class Moved:
     Attributes
     ----------
     sheet : Sheet
-    net : Net
-        Before, in the space of the displacement.
-    offset : ndarray (nu, nv, 3)
+    tried : Tried
+        The wanted displacement, watched closely.
     amount : float
         Share of the wanted change that was allowed.
     changes : mapping of int to Change
@@ -51,17 +50,32 @@ class Moved:
     """
 
     sheet: Sheet
-    net: Net
-    offset: Array
+    tried: Tried
     amount: float
     changes: Mapping[int, Change]
     limits: tuple[Worse, ...]
     free: int
-    gain: float
-    wanted: float
+    gain: float = 0.0
+    wanted: float = 0.0
     rough: bool = True
     sliding: bool = False
     hindered: bool = False
+
+    @classmethod
+    def whole(cls, sheet: Sheet, net: Net, offset: Array, free: int, amount: float = 1.0) -> Moved:
+        """A displacement ``(nu, nv, 3)`` that is made as it is, said to be an amount of what was wanted."""
+        tried = Tried(closely(sheet, net), [net], [offset / amount])
+        return cls(sheet, tried, amount, tried.changes({0: amount})[0], (), free)
+
+    @property
+    def net(self) -> Net:
+        """The surface before, in the space of the displacement."""
+        return self.tried.nets[0]
+
+    @property
+    def offset(self) -> Array:
+        """The displacement made, mm, ``(nu, nv, 3)``."""
+        return np.asarray(self.amount * self.tried.parts[0])
 
     @property
     def deviation(self) -> float:
@@ -87,34 +101,28 @@ class Moved:
         """The same change with another amount."""
         if amount == self.amount:
             return self
-        offset = self.offset * (amount / self.amount)
-        now = self._watch().changes({0: displaced(self.net, offset)})[0]
-        return replace(self, offset=offset, amount=amount, changes=now)
+        return replace(self, amount=amount, changes=self.tried.changes({0: amount})[0])
 
     def shifted(self, offset: Array) -> Moved:
         """A slightly different change."""
-        return replace(self, offset=offset, changes=self._watch().changes({0: displaced(self.net, offset)})[0])
+        tried = Tried(self.tried.watch, self.tried.nets, [offset / self.amount])
+        return replace(self, tried=tried, changes=tried.changes({0: self.amount})[0])
 
     def undone(self) -> Moved:
         """No change instead."""
         still = {face: change.undone() for face, change in self.changes.items()}
-        return replace(self, offset=np.zeros_like(self.offset), amount=0.0, changes=still, limits=(), gain=0.0)
+        return replace(self, amount=0.0, changes=still, limits=(), gain=0.0)
+
+    def done(self) -> Moved:
+        """The same, without what was measured for it."""
+        return replace(self, tried=Tried(closely(self.sheet, self.net), self.tried.nets, self.tried.parts))
 
     def confirmed(self, tolerances: Tolerances) -> Moved:
-        """The part that passes a closer look: growth between the points of the first is taken back; nothing is left if
-        no face gains from the rest."""
+        """The part that passes a closer look: growth between the points of the first is taken back."""
         if not self.amount:
             return self
-        whole, most = self.offset / self.amount, np.array([self.amount])
-        tried = Tried(self._watch(), [self.net], [whole])
-        (amount,), (changes,), (limits,) = amounts(tried, np.zeros(1), most, tolerances)
-        found = replace(self, offset=amount * whole, amount=amount, changes=changes, limits=limits or self.limits)
-        return found if gained(changes, tolerances) else replace(found.undone(), limits=found.limits)
-
-    def _watch(self) -> Watch:
-        return Watch.of(
-            [(self.net, self.sheet.base, self.sheet.faces)], self.sheet.wavelength, [self.sheet.reach], CLOSER
-        )
+        (amount,), (changes,), (limits,) = amounts(self.tried, np.zeros(1), np.array([self.amount]), tolerances)
+        return replace(self, amount=amount, changes=changes, limits=limits or self.limits)
 
     def displacement(self) -> Offset:
         """The displacement over the original surface."""
@@ -135,3 +143,15 @@ class Result:
         """The displacement of all surfaces that move."""
         offsets = {i: each.displacement() for i, each in self.moved.items() if np.any(each.offset)}
         return Displacement(offsets, {s.edge: s.trace.face for s in self.joints.slides if s.trace.surface in offsets})
+
+
+def worthwhile(moved: Sequence[Moved], tolerances: Tolerances) -> list[Moved]:
+    """Surfaces that move together; none moves if none gains enough to be touched."""
+    if any(gained(each.changes, tolerances) for each in moved):
+        return list(moved)
+    return [replace(each.undone(), limits=each.limits) for each in moved]
+
+
+def closely(sheet: Sheet, net: Net) -> Watch:
+    """A closer look at the faces of a surface, in the space of a displacement."""
+    return Watch([(net, sheet.base, sheet.faces)], sheet.wavelength, [sheet.reach], CLOSER)

@@ -93,7 +93,15 @@ class Trial:
         surfaces = [(space.net, members[i].base, members[i].faces) for i, space in spaces.items()]
         self.nets = [space.net for space in spaces.values()]
         self.stretches = [members[i].stretch for i in spaces]
-        self.watch = Watch.of(surfaces, self.width, [members[i].reach for i in spaces])
+        self.watch = Watch(surfaces, self.width, [members[i].reach for i in spaces])
+
+    def most(self, target: Array) -> float:
+        """The largest possible gain: that of the admissible displacement nearest to a target, if nothing is soft; 0 if
+        nothing may move."""
+        if not self.problem.free.any():
+            return 0.0
+        nearest = target if self.problem.soft is not None else self.problem.nearest(target)
+        return sum(self.problem.gains(nearest, target, [1.0] * len(self.nets)))
 
     def nothing(self, least: float = 0.0) -> Verdict:
         """The verdict on no change, with a gain that others have to exceed."""
@@ -109,7 +117,7 @@ class Trial:
             within = [bounded(net, part, bound, s.times(self.width)).reshape(-1, 3) for net, part, s in every]
             delta = self.problem.nearest(np.concatenate(within))
         tried = Tried(self.watch, self.nets, self._split(delta))
-        return self._verdict(tried, target, self._floor(delta, target, others), BISECTIONS[len(self.nets) > 1])
+        return self._verdict(tried, target, self._floor(delta, target, others), BISECTIONS[0])
 
     def settled(self, verdict: Verdict, target: Array) -> Verdict:
         """The same verdict, with closer amounts."""
@@ -126,9 +134,9 @@ class Trial:
     def _verdict(self, tried: Tried, target: Array, floor: Array, steps: int) -> Verdict:
         delta = np.concatenate([part.reshape(-1, 3) for part in tried.parts])
         shares, found, limits = amounts(tried, floor, self._ceilings(delta), self.tolerances, steps)
-        for i, faces in enumerate(found):
-            if not gained(faces, self.tolerances):
-                shares[i], found[i] = 0.0, {face: change.undone() for face, change in faces.items()}
+        if not any(gained(faces, self.tolerances) for faces in found):
+            shares = [0.0] * len(found)
+            found = [{face: change.undone() for face, change in faces.items()} for faces in found]
         return Verdict(tried, shares, found, limits, *self._gains(delta, target, shares))
 
     def eased(self, verdict: Verdict, target: Array, others: Sequence[Verdict] = ()) -> Verdict:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -24,39 +25,42 @@ SINGULAR = 1e5
 
 @dataclass(frozen=True, eq=False)
 class Watch:
-    """The faces of surfaces, each watched separately.
+    """The faces of surfaces, each watched separately, once somebody looks.
 
     Attributes
     ----------
-    surveys : sequence of Survey
-    owners : sequence of (int, int)
-        Place of the surface of each, and the face.
+    surfaces : sequence of (Net, Net, sequence of Face)
+        Surfaces before an edit, their bases and faces.
+    width : float
+        The edit removes waves up to this length, mm.
+    reaches : sequence of (float, float)
+        It spreads changes of each within these distances along u and v, mm.
+    points : int
+        Points a span.
     """
 
-    surveys: Sequence[Survey]
-    owners: Sequence[tuple[int, int]]
+    surfaces: Sequence[tuple[Net, Net, Sequence[Face]]]
+    width: float
+    reaches: Sequence[tuple[float, float]]
+    points: int = POINTS
 
-    @classmethod
-    def of(
-        cls,
-        surfaces: Sequence[tuple[Net, Net, Sequence[Face]]],
-        width: float,
-        reaches: Sequence[tuple[float, float]],
-        points: int = POINTS,
-    ) -> Watch:
-        """Watch faces of surfaces, with their bases, before an edit that removes waves up to a width and spreads them
-        within a reach along u and v (mm, for each surface), at so many points a span."""
-        every = [(place, net, base, face) for place, (net, base, faces) in enumerate(surfaces) for face in faces]
-        looked = [(net, (face,), net.u, net.v) for _, net, _, face in every]
-        bases = [base for *_, base, _ in every] if np.isfinite(reaches).all() else ()
-        return cls(
-            surveys(looked, points, SINGULAR / width, [reaches[place] for place, *_ in every], bases),
-            [(place, face.index) for place, *_, face in every],
-        )
+    @property
+    def owners(self) -> list[tuple[int, int]]:
+        """Place of the surface of each face, and the face."""
+        return [(place, face.index) for place, (*_, faces) in enumerate(self.surfaces) for face in faces]
+
+    @cached_property
+    def surveys(self) -> Sequence[Survey]:
+        """The faces before the edit."""
+        both = zip(self.surfaces, self.reaches, strict=True)
+        every = [(net, base, face, reach) for (net, base, faces), reach in both for face in faces]
+        looked = [(net, (face,), net.u, net.v) for net, _, face, _ in every]
+        bases = [base for _, base, *_ in every] if np.isfinite(self.reaches).all() else ()
+        return surveys(looked, self.points, SINGULAR / self.width, [reach for *_, reach in every], bases)
 
     def still(self) -> list[dict[int, Change]]:
         """The changes of the faces of each surface if nothing moves."""
-        found: list[dict[int, Change]] = [{} for _ in range(self.owners[-1][0] + 1)]
+        found: list[dict[int, Change]] = [{} for _ in self.surfaces]
         for (place, face), survey in zip(self.owners, self.surveys, strict=True):
             found[place][face] = Change(survey.roughness, survey.roughness, survey.noise)
         return found
