@@ -305,9 +305,7 @@ def _confirmed(trial: Trial, members: Mapping[int, Sheet], found: Sequence[Verdi
     return best
 
 
-def _moved(
-    trial: Trial, members: Mapping[int, Sheet], verdict: Verdict, looks: Iterable[Watch]
-) -> Iterable[Moved]:
+def _moved(trial: Trial, members: Mapping[int, Sheet], verdict: Verdict, looks: Iterable[Watch]) -> Iterable[Moved]:
     """The displacement that a verdict allows, by surface."""
     figures = zip(verdict.parts, looks, verdict.amounts, verdict.changes, verdict.limits, strict=True)
     for (i, space), (part, look, amount, changes, limits) in zip(trial.problem.spaces.items(), figures, strict=True):

@@ -13,7 +13,6 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from mracad.bspline.surface import Net
 from mracad.edit.driver import groups
 from mracad.edit.moved import Moved, Result
 from mracad.edit.pose import Pose, Scene, pose
