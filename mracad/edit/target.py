@@ -154,6 +154,8 @@ def _sheet(index: int, origin: Net, every: tuple[Face, ...], faces: tuple[Face, 
     form = forms(net, metric, points, sharp, stretch)
     depends = seen(net, form)
     trend, base = (at_scale(net, stretch.times(waves * wavelength), sharp) for waves in (TREND, BASE))
+    if stretch.even and stretch.limit and stretch.limit.tight:  # projected on splines, rounds would bend all around
+        trend = net.with_poles(np.zeros_like(net.poles))
     reach = stretch.times(wish.spread * wavelength)
     sheet = Sheet(index, origin, net, every, faces, metric, sharp, wavelength, stretch, reach, trend, base)
     alone = Problem({index: Space(net, form, depends, depends, sheet.trend.poles)})

@@ -9,7 +9,7 @@ With ℓ the length of an energy of second derivatives H (:mod:`mracad.seam.ener
   r, no length is more than about θ r in that direction, so that rounds keep their shape.
 
 S must not be that of the waves that are to go.  The surface is looked at without waves shorter than w, w / 2, w / 4 …;
-the first of these that does not bend by more than θ within w / 2π shows the shape at a point.
+the first of these that hardly turns within w / 2π shows the shape at a point.
 """
 
 from __future__ import annotations
@@ -29,8 +29,9 @@ Array = np.ndarray
 Form = tuple[Array, Array, Array]
 """Components 11, 12 and 22 of a symmetric form at points."""
 
-THETA = 0.3
-"""Turn of the normal within a length, radians, up to which a surface carries it."""
+THETA, TIGHT = 0.1, 0.2
+"""Turn of the normal within a length, radians, up to which no length is limited; and beyond which a surface without
+shorter waves does not show the shape."""
 
 HALVINGS = 6
 """Most times that the wavelength is halved to see the shape."""
@@ -68,6 +69,14 @@ class Limit:
                 break
         return cls(max(wavelengths) / (2 * np.pi), tuple(looks))
 
+    @property
+    def tight(self) -> bool:
+        """Whether there are places that bend too much for the longest look."""
+        length, net = self.looks[0]
+        us, vs = net.u.greville()[:, None], net.v.greville()[:, None]
+        mean, half = _halves(Limit(self.length, self.looks[:1]).shape(us, vs, orthonormal(net, us, vs)))
+        return bool(((np.abs(mean) + half) * length > TIGHT).any())
+
     def shape(self, u: Array, v: Array, frame: Form) -> Form:
         """The shape operator in the frame (p, q, r: p ∂_u and q ∂_u + r ∂_v are orthonormal), ``(qu, qv)`` each."""
         p, q, r = frame
@@ -82,7 +91,7 @@ class Limit:
             now = p * p * a, p * (q * a + r * b), q * q * a + 2 * q * r * b + r * r * c
             found = np.where(left, now, found)
             mean, half = _halves(now)
-            left &= (np.abs(mean) + half) * length > THETA
+            left &= (np.abs(mean) + half) * length > TIGHT
             if not left.any():
                 break
         return found[0], found[1], found[2]
@@ -147,6 +156,15 @@ class Stretch:
 
 
 EVEN = Stretch()
+
+
+def orthonormal(net: Net, us: Array, vs: Array) -> Form:
+    """p, q and r at pairs of parameters, ``(qu, qv)`` each: p ∂_u and q ∂_u + r ∂_v are orthonormal on a surface."""
+    xu, xv = (net.tangents(us.ravel(), vs.ravel(), axis) for axis in (0, 1))
+    e, f, g = ((a * b).sum(axis=-1) for a, b in ((xu, xu), (xu, xv), (xv, xv)))
+    e = np.maximum(e, 1e-300)
+    rest = np.sqrt(np.maximum(g - f * f / e, 1e-12 * g + 1e-300))
+    return 1 / np.sqrt(e), -f / e / rest, 1 / rest
 
 
 def stretched(frame: Array, root: Form) -> Array:

@@ -11,7 +11,7 @@ import numpy as np
 from mracad.bspline.surface import Net
 from mracad.model.brep import Face
 from mracad.model.region import supported
-from mracad.seam.stretch import Limit
+from mracad.seam.stretch import Limit, orthonormal
 from mracad.spec.places import Box, Disc, Point, Tight, Zone
 
 Array = np.ndarray
@@ -73,11 +73,7 @@ class Zoned:
     def _curvature(self) -> Array:
         """The largest curvature at the points, 1/mm."""
         us, vs = self._parameters
-        xu, xv = (self.net.tangents(us.ravel(), vs.ravel(), axis) for axis in (0, 1))
-        e, f, g = ((a * b).sum(axis=-1) for a, b in ((xu, xu), (xu, xv), (xv, xv)))
-        e = np.maximum(e, 1e-300)
-        rest = np.sqrt(np.maximum(g - f * f / e, 1e-12 * g + 1e-300))
-        a, b, c = self.look.shape(us, vs, (1 / np.sqrt(e), -f / e / rest, 1 / rest))
+        a, b, c = self.look.shape(us, vs, orthonormal(self.net, us, vs))
         return np.asarray(np.abs(a + c) / 2 + np.sqrt(((a - c) / 2) ** 2 + b * b))
 
     def _apart(self, zone: Disc | Box, points: Array) -> Array:

@@ -38,7 +38,7 @@ def test_the_largest_scale_reaches_the_bound(patches, most, way, monkeypatch):
     edit = smooth(patches, Smooth(max_deviation=f"{most}mm", **way))
     reached = deviation(patches, edit)
     print(f"{most} mm: {edit.scale:.3g} mm, {reached / most:.3f} of the bound, {len(solved)} problems solved unjudged")
-    assert 0.95 * most <= reached <= most * (1 + 1e-6)
+    assert 0.95 * most <= reached <= 1.001 * most  # of what is judged, measured between the points of the judge, too
     assert 1 <= len(solved) <= bound_module.LOOKS
     assert {outcome.status for outcome in edit.outcomes} == {"edited"}
 
