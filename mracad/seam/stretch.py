@@ -29,9 +29,8 @@ Array = np.ndarray
 Form = tuple[Array, Array, Array]
 """Components 11, 12 and 22 of a symmetric form at points."""
 
-THETA, TIGHT = 0.1, 0.2
-"""Turn of the normal within a length, radians, up to which no length is limited; and beyond which a surface without
-shorter waves does not show the shape."""
+THETA = 0.3
+"""Turn of the normal within a length, radians, up to which a surface carries it."""
 
 HALVINGS = 6
 """Most times that the wavelength is halved to see the shape."""
@@ -75,7 +74,7 @@ class Limit:
         length, net = self.looks[0]
         us, vs = net.u.greville()[:, None], net.v.greville()[:, None]
         mean, half = _halves(Limit(self.length, self.looks[:1]).shape(us, vs, orthonormal(net, us, vs)))
-        return bool(((np.abs(mean) + half) * length > TIGHT).any())
+        return bool(((np.abs(mean) + half) * length > THETA).any())
 
     def shape(self, u: Array, v: Array, frame: Form) -> Form:
         """The shape operator in the frame (p, q, r: p ∂_u and q ∂_u + r ∂_v are orthonormal), ``(qu, qv)`` each."""
@@ -91,7 +90,7 @@ class Limit:
             now = p * p * a, p * (q * a + r * b), q * q * a + 2 * q * r * b + r * r * c
             found = np.where(left, now, found)
             mean, half = _halves(now)
-            left &= (np.abs(mean) + half) * length > TIGHT
+            left &= (np.abs(mean) + half) * length > THETA
             if not left.any():
                 break
         return found[0], found[1], found[2]
