@@ -183,6 +183,19 @@ def test_edges_slide_along_a_nurbs_face_that_stays(tmp_path, mracad):
     assert check(read(target)).valid
 
 
+def test_edges_of_a_solid_that_was_moved_slide():
+    place = cadquery.Location(cadquery.Vector(20, -30, 12), cadquery.Vector(1, 2, 3), 40)
+    beside = cadquery.Solid.makeBox(5, 5, 5).moved(cadquery.Location(cadquery.Vector(300, 0, 0)))
+    both = cadquery.Compound.makeCompound([blocks.block(NOISY).moved(place), beside])
+    document = documents.single(both.wrapped, "moved")
+    assert not np.allclose(sculpted(view(document))[0].frame, np.eye(4))
+    report = run(document, smooth, SLIDE)
+    assert {each.how for each in report.edit.edges} == {"slid"}
+    assert max(each.gap for each in report.after) < 1e-9
+    verdict = check(document)
+    assert verdict.valid and verdict.edge_tolerance < 1e-6
+
+
 def test_an_edge_stays_where_that_does_more(made, monkeypatch):
     """The judge is made to allow nothing that slides."""
     model = looked(made("block"))
