@@ -1,5 +1,7 @@
 """Solids whose noisy, sculpted top meets flat and round sides in sharp edges; the top is known without its noise."""
 
+from itertools import pairwise
+
 import cadquery
 import numpy as np
 from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeFace
@@ -27,26 +29,39 @@ def nets(spans=SPANS, noise=NOISE, seed=SEED):
     return Net(knots, knots, poles), Net(knots, knots, poles + shake)
 
 
-def block(net):
-    """A solid of a top, four flat sides and a flat bottom."""
-    top = cadquery.Face(BRepBuilderAPI_MakeFace(spline(net), 1e-7).Face())
+def halves(net):
+    """A top cut in two along its middle, as two patches of the same knots."""
+    middle, degree = SIZE / 2, net.u.degree
+    fine = net.refined(np.repeat(middle, degree - 1), ())
+    knots = fine.u.knots
+    at = int(np.searchsorted(knots, middle, side="right"))
+    left = KnotVector(np.append(knots[:at], middle), degree)
+    right = KnotVector(np.append(middle, knots[at - degree :]), degree)
+    return Net(left, fine.v, fine.poles[: left.count]), Net(right, fine.v, fine.poles[left.count - 1 :])
+
+
+def block(*nets):
+    """A solid of a top, in one or more patches, four flat sides and a flat bottom."""
+    tops = [cadquery.Face(BRepBuilderAPI_MakeFace(spline(net), 1e-7).Face()) for net in nets]
     corners = [(0, 0, 0), (SIZE, 0, 0), (SIZE, SIZE, 0), (0, SIZE, 0)]
     bottom = cadquery.Wire.makePolygon([cadquery.Vector(*each) for each in corners], close=True)
-    faces = [top, cadquery.Face.makeFromWires(bottom), *map(_side, top.Edges())]
+    sides = [_side(tops, axis, at) for axis in (0, 1) for at in (0.0, SIZE)]
+    faces = [*tops, cadquery.Face.makeFromWires(bottom), *sides]
     fix = ShapeFix_Solid(cadquery.Solid.makeSolid(cadquery.Shell.makeShell(faces)).wrapped)
     fix.Perform()
     return cadquery.Shape.cast(fix.Solid())
 
 
-def _side(edge):
-    """The flat face under an edge of the top."""
-    start, end = edge.startPoint(), edge.endPoint()
-    below = [cadquery.Vector(each.x, each.y, 0) for each in (end, start)]
-    lines = zip([end, *below], [*below, start], strict=True)
-    wire = cadquery.Wire.assembleEdges([edge, *(cadquery.Edge.makeLine(*each) for each in lines)])
-    normal = (end - start).cross(cadquery.Vector(0, 0, 1)).normalized()
-    plane = gp_Pln(gp_Pnt(*below[1].toTuple()), gp_Dir(*normal.toTuple()))
-    return cadquery.Face(BRepBuilderAPI_MakeFace(plane, wire.wrapped).Face())
+def _side(tops, axis, at):
+    """The flat face under the edges of tops in a plane x or y = const."""
+    ends = {e: [p.toTuple() for p in (e.startPoint(), e.endPoint())] for top in tops for e in top.Edges()}
+    edges = [each for each, points in ends.items() if all(abs(point[axis] - at) < 1e-6 for point in points)]
+    start, *_, end = sorted((point for each in edges for point in ends[each]), key=lambda point: point[1 - axis])
+    path = [start, (*start[:2], 0.0), (*end[:2], 0.0), end]
+    lines = [cadquery.Edge.makeLine(cadquery.Vector(*a), cadquery.Vector(*b)) for a, b in pairwise(path)]
+    wire = cadquery.Wire.assembleEdges([*edges, *lines])
+    normal = gp_Dir(*np.eye(3)[axis].tolist())
+    return cadquery.Face(BRepBuilderAPI_MakeFace(gp_Pln(gp_Pnt(*start), normal), wire.wrapped).Face())
 
 
 def _up(solid):

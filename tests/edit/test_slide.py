@@ -183,6 +183,21 @@ def test_edges_slide_along_a_nurbs_face_that_stays(tmp_path, mracad):
     assert check(read(target)).valid
 
 
+def test_seams_that_move_end_where_their_edges_slid(tmp_path, mracad):
+    document = documents.single(blocks.block(*blocks.halves(NOISY)).wrapped, "halves")
+    source, target = tmp_path / "in.step", tmp_path / "out.step"
+    documents.write(document, source)
+    found = mracad("smooth", source, "-o", target, "--scale", blocks.SCALE, "--edges", "slide", "--json")
+    assert found.code == 0, found.err
+    ways = sorted(each["how"] for each in json.loads(found.out)["edges"])
+    assert ways == ["coupled"] + ["slid"] * 6
+    after = read(target)
+    assert check(after).valid and check(after).edge_tolerance < 1e-6
+    before, now = (next(e for e in view(read(f)).edges if len(e.sides) == 2 and e.sides[0].uv is not None
+                        and e.sides[1].uv is not None) for f in (source, target))  # fmt: skip
+    assert np.abs(before.points - now.points)[[0, -1]].max() > 1e-3
+
+
 def test_edges_of_a_solid_that_was_moved_slide():
     place = cadquery.Location(cadquery.Vector(20, -30, 12), cadquery.Vector(1, 2, 3), 40)
     beside = cadquery.Solid.makeBox(5, 5, 5).moved(cadquery.Location(cadquery.Vector(300, 0, 0)))
