@@ -1,14 +1,9 @@
-"""Denoising: remove noise at a wavelength that the noise itself determines.
+"""Denoising: remove noise at wavelengths that the noise itself determines.
 
-The filter is that of smoothing (:mod:`mracad.edit.fair`).  For δ = −D y, with y the control points and σ their noise,
-the expected squared distance to the truth is, up to a constant,
-
-    Cp = ‖δ‖² − 2 · 3 σ² tr D
-
-(C. L. Mallows, Some comments on Cp, Technometrics 15, 1973; 0 for no change).  The wavelength with the least Cp is
-taken, and none if that is not below 0.  It is first searched in closed form, with the filter of the control points of
-each surface along both axes, then near there with the filter itself, on all surfaces that seams join; the trace is
-estimated with random ±1 (M. F. Hutchinson, Commun. Stat. Simul. Comput. 18, 1989).
+The noise of every surface is measured (:mod:`mracad.inspect.noise`) unless it is stated.  Of the estimates of the
+surface without it (:mod:`mracad.edit.estimate`) the one with the least risk is the target; where none is surely better
+than no change there is none.  The wavelengths of the spline, along u and v, are first searched in closed form, for each
+surface alone.
 """
 
 from __future__ import annotations
@@ -20,13 +15,15 @@ from typing import ClassVar
 import numpy as np
 
 from mracad.bspline.surface import Net
-from mracad.edit.fair import ways
-from mracad.edit.modes import inside, modes
+from mracad.edit.estimate import Asked, Noisy, best
 from mracad.edit.result import Edit, FaceOutcome, Reason
+from mracad.edit.search import FIRST, alone
 from mracad.edit.target import Sheet, stiffness
+from mracad.edit.tolerances import NOISY
 from mracad.edit.whole import edited
-from mracad.inspect.noise import noise
-from mracad.model.brep import Face, Model
+from mracad.inspect.noise import Noise, noise
+from mracad.inspect.roughness import Growth
+from mracad.model.brep import Face, Model, Surface
 from mracad.seam.hold import separate
 from mracad.seam.interface import Joints
 from mracad.seam.ladders import Creases
@@ -36,17 +33,12 @@ from mracad.spec.quantity import length
 from mracad.spec.select import Scope
 from mracad.spec.select import scope as scope_of
 from mracad.spec.steps.smooth import Denoise
+from mracad.wavelet.ladder import arc_lengths
 
 Array = np.ndarray
 
-STEPS = 4
-"""Wavelengths that are tried in every octave."""
-
-LONGEST = 0.5
-"""Longest wavelength over the size of a surface."""
-
-BESIDE = 2.0**-0.5, 1.0, 2.0**0.5
-"""Wavelengths that are tried with the filter itself, over the best for control points alone."""
+RARE = 3.0
+"""Standard deviations that noise hardly exceeds."""
 
 
 @dataclass(frozen=True)
@@ -55,26 +47,36 @@ class Quiet:
 
     Attributes
     ----------
-    noise : mapping of int to float
-        Standard deviation of each coordinate of control points, mm, by surface; 0 where there is none.
+    noise : mapping of int to Noise
+        That the control points of each surface count to have; those without any are not named.
+    asked : Asked
     """
 
-    noise: Mapping[int, float]
+    noise: Mapping[int, Noise]
+    asked: Asked
     spread: ClassVar[float] = 1.0
     fairs: ClassVar[bool] = True
     limited: ClassVar[bool] = False
+    growth: ClassVar[Growth] = NOISY
 
     def wavelength(self, net: Net, faces: Sequence[Face], creases: Creases) -> float:
-        """The wavelength with the least Cp for a surface alone, mm."""
-        axes = [modes(net, axis) for axis in (0, 1)]
-        power = (inside(axes, net.poles) ** 2).sum(axis=2)
-        bent = np.add.outer(axes[0].squares, axes[1].squares) ** 2
-        shortest, longest = min(a.step for a in axes), LONGEST * max(a.step * len(a.squares) for a in axes)
-        count = 1 + int(STEPS * max(np.log2(longest / (2 * shortest)), 0.0))
-        every = 2 * shortest * 2.0 ** (np.arange(count) / STEPS)
-        size = 6 * self.noise[_surface(faces)] ** 2
-        taken = [(stiffness(w) * bent) ** 2 / (1 + (stiffness(w) * bent) ** 2) for w in every.tolist()]
-        return float(every[np.argmin([float((power * d**2).sum() - size * d.sum()) for d in taken])])
+        """The mean, along u and v, of the wavelengths of which the best spline of a surface alone keeps half, mm."""
+        found = []
+        for axis, stiff in enumerate(self._start(net, faces, creases)):
+            step = float(arc_lengths(net, axis).sum()) / max(net.poles.shape[axis] - 1, 1)
+            found.append(step * max(2 * np.pi * stiff ** (1 / 6), 2.0))
+        return float(np.sqrt(found[0] * found[1]))
+
+    def _start(self, net: Net, faces: Sequence[Face], creases: Creases) -> tuple[float, float]:
+        noise = self.noise.get(_surface(faces))
+        if noise is None:
+            return FIRST, FIRST
+        variance = noise.size**2
+
+        def score(size: float, removed: float) -> float:
+            return size - 2 * variance * removed if self.asked.shrink else size / max(removed, 1e-100) ** 2
+
+        return alone(net, noise.over(net), creases, score)
 
     def stretch(self, faces: Sequence[Face]) -> Stretch:
         """The same in every direction."""
@@ -84,34 +86,29 @@ class Quiet:
         """The surface over its own knots."""
         return net
 
+    def detail(self, alone: Problem, sheet: Sheet) -> float:
+        """What noise moves few control points by."""
+        noise = self.noise.get(sheet.index)
+        return RARE * noise.size if noise else 0.0
+
     def target(self, problem: Problem, sheets: Mapping[int, Sheet], joined: Joints) -> Array:
-        """What the filter with the least Cp would do if no rim were held, ``(points, 3)``; 0 if no Cp is below 0."""
-        sizes = [np.full((space.free.size, 1), self.noise[i]) for i, space in problem.spaces.items()]
-        noise = np.concatenate(sizes)
-        if not noise.any():
+        """The estimate with the least risk, ``(points, 3)``; 0 if no change has less."""
+        noise = {i: self.noise[i] for i in problem.spaces if i in self.noise}
+        if not noise:
             return np.zeros_like(problem.f)
-        width = max(sheet.wavelength for sheet in sheets.values())
-        every = [stiffness(scale * width) for scale in BESIDE]
-        best: Array = np.zeros(problem.f.shape)
-        least = 0.0
-        for stiff in every:
-            delta = problem.filtered(stiff, problem.seen)
-            cp = _risk(problem, stiff, delta, noise)
-            if cp < least:
-                best, least = delta, cp
-        return best
+        start = {i: self._start(sheets[i].origin, sheets[i].faces, sheets[i].creases) for i in problem.spaces}
+        return best(Noisy(problem, sheets, noise), start, self.asked)
 
     def ways(self, problem: Problem, target: Array, width: float) -> Iterable[Iterable[Array]]:
-        """As for smoothing; none if there is nothing to do."""
-        return ways(problem, target, width) if target.any() else ()
-
-
-def _risk(problem: Problem, stiff: float, delta: Array, noise: Array) -> float:
-    """Cp of a displacement, over σ² (mm, ``(points, 1)``) at each point that has noise."""
-    signs = np.random.default_rng(0).choice([-1.0, 1.0], delta.shape) * problem.seen[:, None]
-    removed = -signs * problem.filtered(stiff, problem.seen, of=noise * signs)
-    noisy = noise[:, 0] > 0
-    return float(((delta[noisy] / noise[noisy]) ** 2 - 2 * removed[noisy] / noise[noisy]).sum())
+        """Meet the target next to what is held, ever more smoothly, or fade out; none if there is nothing to do."""
+        if not target.any():
+            return
+        if not problem.rimmed:
+            yield [target]
+            return
+        yield [problem.nearest(target, stiff) for stiff in (0.0, stiffness(width / 4), stiffness(width / 2))]
+        faded = problem.fading(width) * target
+        yield problem.nearest(faded, stiffness(width / 2)), problem.nearest(faded)
 
 
 def denoise(
@@ -124,20 +121,24 @@ def denoise(
     """Remove noise from the NURBS faces of a model; parameters and errors as for :func:`mracad.edit.whole.edited`."""
     stated = None if options.noise is None else length(options.noise, model.diagonal, "noise")
     chosen = scope or scope_of(model, options)
-    found = {}
-    for surface in model.surfaces:
-        faces = [model.faces[i] for i in surface.faces if i in chosen.chosen]
-        found[surface.index] = stated if stated is not None else _noise(surface.net, faces)
-    wish = Quiet({i: options.strength * each for i, each in found.items()})
+    found = {surface.index: _noise(model, surface, chosen, stated) for surface in model.surfaces}
+    counted = {i: replace(each, size=options.strength * each.size) for i, each in found.items() if each}
+    wish = Quiet(counted, Asked(options.method == "wiener", options.outliers / 100))
     edit = edited(model, options, wish, chosen, progress)
     return replace(edit, outcomes=tuple(_said(each, model, found) for each in edit.outcomes))
 
 
-def _noise(net: Net, faces: Sequence[Face]) -> float:
-    """The noise of a surface, mm, from control points inside its faces: those beyond their edges may be anything."""
+def _noise(model: Model, surface: Surface, chosen: Scope, stated: float | None) -> Noise | None:
+    """The noise of the chosen faces of a surface, if any."""
+    faces = [model.faces[i] for i in surface.faces if i in chosen.chosen]
     if not faces:
-        return 0.0
-    return noise(net, separate(net, faces, [face.index for face in faces], "g0").free) or 0.0
+        return None
+    net = surface.net
+    parts = separate(net, faces, [face.index for face in faces], "g0")
+    found = noise(net, parts.free, parts.visible)
+    if stated is None:
+        return found
+    return Noise(stated, found.where if found else parts.visible, (net.u.greville(), net.v.greville()))
 
 
 def _surface(faces: Sequence[Face]) -> int:
@@ -146,10 +147,12 @@ def _surface(faces: Sequence[Face]) -> int:
     return surface
 
 
-def _said(outcome: FaceOutcome, model: Model, noises: Mapping[int, float]) -> FaceOutcome:
-    """An outcome with the noise of its face; a fair face has none."""
+def _said(outcome: FaceOutcome, model: Model, noises: Mapping[int, Noise | None]) -> FaceOutcome:
+    """An outcome with the noise of its face."""
     surface = model.faces[outcome.face].surface
     if surface is None or outcome.status in ("held", "unselected"):
         return outcome
-    reason = Reason.CLEAN if outcome.reason is Reason.FAIR else outcome.reason
-    return replace(outcome, noise=noises[surface], reason=reason)
+    noise, reason = noises[surface], outcome.reason
+    if reason is Reason.FAIR:
+        reason = Reason.UNSURE if noise else Reason.CLEAN
+    return replace(outcome, noise=noise.size if noise else 0.0, reason=reason)

@@ -23,9 +23,10 @@ from mracad.edit.driver import drive
 from mracad.edit.mend import Mended, mended
 from mracad.edit.moved import Result
 from mracad.edit.pose import Scene
-from mracad.edit.target import Sheet, Wish, eased, sheets, stiffness
-from mracad.edit.tolerances import Tolerances
+from mracad.edit.target import Sheet, Wish, eased, largest, sheets, stiffness
+from mracad.edit.tolerances import GROWTH, Tolerances
 from mracad.inspect.curvature import forms
+from mracad.inspect.roughness import Growth
 from mracad.model.brep import Face, Model
 from mracad.seam.interface import Joints, joints
 from mracad.seam.ladders import Creases
@@ -64,6 +65,7 @@ class Filter:
     limited: bool = False
     spread: ClassVar[float] = 1.0
     fairs: ClassVar[bool] = True
+    growth: ClassVar[Growth] = GROWTH
 
     def wavelength(self, net: Net, faces: Sequence[Face], creases: Creases) -> float:
         """The scale, for every surface: the longer one."""
@@ -81,6 +83,10 @@ class Filter:
     def space(self, net: Net) -> Net:
         """The surface over its own knots."""
         return net
+
+    def detail(self, alone: Problem, sheet: Sheet) -> float:
+        """The largest change in the target."""
+        return largest(self, alone, sheet)
 
     def target(self, problem: Problem, sheets: Mapping[int, Sheet], joined: Joints) -> Array:
         """What smoothing would do if no rim were held, ``(points, 3)``."""

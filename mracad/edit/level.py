@@ -26,7 +26,9 @@ from mracad.bspline.gram import gram
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.refine import refinement
 from mracad.bspline.surface import Net
-from mracad.edit.target import Sheet, stiffness
+from mracad.edit.target import Sheet, largest, stiffness
+from mracad.edit.tolerances import GROWTH
+from mracad.inspect.roughness import Growth
 from mracad.model.brep import Face
 from mracad.seam.conditions import rows
 from mracad.seam.constrained import Constrained
@@ -60,6 +62,7 @@ class Level:
     level: float
     fairs: ClassVar[bool] = True
     limited: ClassVar[bool] = False
+    growth: ClassVar[Growth] = GROWTH
     spread: ClassVar[float] = math.inf  # waves beside what goes are part of a projection
 
     def wavelength(self, net: Net, faces: Sequence[Face], creases: Creases) -> float:
@@ -81,6 +84,10 @@ class Level:
     def space(self, net: Net) -> Net:
         """The surface over its own knots."""
         return net
+
+    def detail(self, alone: Problem, sheet: Sheet) -> float:
+        """The largest change in the target."""
+        return largest(self, alone, sheet)
 
     def target(self, problem: Problem, sheets: Mapping[int, Sheet], joined: Joints) -> Array:
         """The level of the surface that the sheets form, less that surface, ``(points, 3)``."""

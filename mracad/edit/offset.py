@@ -15,8 +15,10 @@ import numpy as np
 from mracad.bspline.fit import Knots, divided, middles, missing, offsets_over, spans, through
 from mracad.bspline.surface import Net, pairs
 from mracad.edit.result import Edit
-from mracad.edit.target import Sheet, stiffness
+from mracad.edit.target import Sheet, largest, stiffness
+from mracad.edit.tolerances import RESHAPED
 from mracad.edit.whole import edited
+from mracad.inspect.roughness import Growth
 from mracad.model.brep import Face, Model
 from mracad.seam.interface import Joints
 from mracad.seam.ladders import Creases
@@ -53,6 +55,7 @@ class Outward:
     spread: ClassVar[float] = math.inf
     fairs: ClassVar[bool] = False
     limited: ClassVar[bool] = False
+    growth: ClassVar[Growth] = RESHAPED
 
     def wavelength(self, net: Net, faces: Sequence[Face], creases: Creases) -> float:
         """The width within which it fades, mm."""
@@ -75,6 +78,10 @@ class Outward:
             return extra if points <= MOST_POINTS else ()
 
         return net.over(*divided((net.u, net.v), more)) if self.refine else net
+
+    def detail(self, alone: Problem, sheet: Sheet) -> float:
+        """The largest change in the target."""
+        return largest(self, alone, sheet)
 
     def target(self, problem: Problem, sheets: Mapping[int, Sheet], joined: Joints) -> Array:
         """d n, ``(points, 3)``."""

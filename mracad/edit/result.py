@@ -24,6 +24,7 @@ class Reason(Enum):
 
     FAIR = "already fair"
     CLEAN = "no noise"
+    UNSURE = "noise that cannot be told from shape"
     AMOUNT = "amount 0"
     NO_COPY = "no copy on it"
     NO_FREE = "no free control points"

@@ -10,6 +10,7 @@ from typing import Protocol
 import numpy as np
 
 from mracad.bspline.surface import Net
+from mracad.inspect.roughness import Growth
 from mracad.model.brep import Face, Model
 from mracad.model.cells import quadrature
 from mracad.seam.energy import forms
@@ -41,6 +42,8 @@ class Wish(Protocol):
         Whether it makes faces fairer; otherwise it changes their shape, and free edges and poles move along.
     limited : bool
         Whether wavelengths follow the radii of curvature where these are too small for them.
+    growth : Growth
+        How much rougher it may make a face.
     """
 
     @property
@@ -52,6 +55,9 @@ class Wish(Protocol):
     @property
     def limited(self) -> bool: ...
 
+    @property
+    def growth(self) -> Growth: ...
+
     def wavelength(self, net: Net, faces: Sequence[Face], creases: Creases) -> float:
         """Wavelength below which it removes waves from a surface, mm; beside what is held it fades within this."""
         ...
@@ -62,6 +68,10 @@ class Wish(Protocol):
 
     def space(self, net: Net) -> Net:
         """The surface over knots that can hold the target; the surface itself if its own can."""
+        ...
+
+    def detail(self, alone: Problem, sheet: Sheet) -> float:
+        """About the largest change of a control point of a surface if nothing were held, mm; see :func:`largest`."""
         ...
 
     def target(self, problem: Problem, sheets: Mapping[int, Sheet], joined: Joints) -> Array:
@@ -159,8 +169,13 @@ def _sheet(index: int, origin: Net, every: tuple[Face, ...], faces: tuple[Face, 
     reach = stretch.times(wish.spread * wavelength)
     sheet = Sheet(index, origin, net, every, faces, metric, sharp, wavelength, stretch, reach, trend, base)
     alone = Problem({index: Space(net, form, depends, depends, sheet.trend.poles)})
-    change = wish.target(alone, {index: sheet}, Joints())
-    return replace(sheet, detail=float(np.linalg.norm(change[alone.seen], axis=1).max(initial=0.0)))
+    return replace(sheet, detail=wish.detail(alone, sheet))
+
+
+def largest(wish: Wish, alone: Problem, sheet: Sheet) -> float:
+    """The largest change of a control point in the target for a surface alone, mm."""
+    change = wish.target(alone, {sheet.index: sheet}, Joints())
+    return float(np.linalg.norm(change[alone.seen], axis=1).max(initial=0.0))
 
 
 def eased(net: Net, share: Array, widths: tuple[float, float]) -> Array:

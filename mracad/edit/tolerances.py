@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,6 +15,9 @@ from mracad.spec.steps import Fitting, Selection
 GROWTH = Growth(0.005, 0.005, 0.005, 0.02, 30.0, 0.25)
 """Growth that the judge allows by default: a quarter of the 2 % that count as worse when faces are compared, and waves
 at a place an eighth larger than those around it."""
+
+NOISY = replace(GROWTH, singular=0.25, each=False)
+"""Growth that the judge allows if noise is removed: kinks and singular points that noise makes are random."""
 
 RESHAPED = Growth(np.inf, np.inf, np.inf, np.inf, 30.0, np.inf)
 """Growth that the judge allows if an edit changes the shape of faces: they must not fold."""

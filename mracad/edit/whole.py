@@ -12,7 +12,7 @@ from mracad.edit.pose import Scene
 from mracad.edit.result import Edit, FaceOutcome, Reason, Status, spared
 from mracad.edit.slid import settled, unslid
 from mracad.edit.target import Wish
-from mracad.edit.tolerances import RESHAPED, tolerances
+from mracad.edit.tolerances import tolerances
 from mracad.inspect.roughness import Worse
 from mracad.model.brep import Face, Model
 from mracad.seam.cause import Cause, Still
@@ -57,7 +57,7 @@ def edited(
             movable,
             wish,
             replace(wishes, slide=wishes.slide - lost.keys()),
-            allowed if wish.fairs else replace(allowed, growth=RESHAPED, fairer=False),
+            replace(allowed, growth=wish.growth, fairer=wish.fairs),
             refine=options.refine == "auto",
             progress=progress,
         )

@@ -1,13 +1,15 @@
 """The noise of a control net: the part that no smooth surface explains.
 
-Divided differences with weights of unit norm keep the standard deviation of white noise on control points; those of a
-smooth surface are small.  The noise is the least of the estimates by differences of order 3 along both axes and of
-order 4 along each, or the mean of those that agree with it.
+Divided differences with weights of unit norm keep the standard deviation of white noise on control points, whatever
+their order; those of a smooth surface are small, and change with the order.  The noise is the least of the estimates
+by differences of order 3 along both axes and of order 4 along each, or the mean of those that agree with it, if those
+of neighbouring orders do.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -15,9 +17,10 @@ from numpy.lib.stride_tricks import sliding_window_view
 from mracad.bspline.surface import Net
 
 Array = np.ndarray
+Orders = tuple[int, int]
 
-ORDERS = (3, 3), (4, 0), (0, 4)
-"""Orders of the differences along u and v."""
+KINDS: tuple[tuple[Orders, ...], ...] = ((3, 3), (2, 2)), ((4, 0), (3, 0), (5, 0)), ((0, 4), (0, 3), (0, 5))
+"""Orders of differences along u and v: of each kind the one that counts, and its neighbours."""
 
 MEDIAN = 1.5381723
 """Median length of a vector of three standard normal numbers: of χ with three degrees of freedom."""
@@ -25,45 +28,144 @@ MEDIAN = 1.5381723
 AGREE = 1.15
 """An estimate above this times the least contains shape."""
 
-FEWEST, ACROSS = 40, 6
-"""Least number of differences, and of control points along either axis, to tell noise."""
+LEVEL = 1.6
+"""Most by which estimates of neighbouring orders differ, as a factor, where there is noise."""
+
+FEWEST, BESIDE = 16, 8
+"""Fewest differences that tell noise, and of neighbouring orders."""
+
+ROUNDING = 1e-12
+"""Share of the coordinates below which differences are rounding."""
+
+LOCAL, CALM, RUN = 7, 0.3, 5
+"""Differences in a row that are looked at together, the share of the noise below which there is none, and the fewest
+control points in a row without."""
 
 
-def noise(net: Net, points: Array) -> float | None:
-    """Standard deviation of each coordinate of control points, mm; None where there are too few to tell.
+@dataclass(frozen=True, eq=False)
+class Noise:
+    """The noise of a net.
+
+    Attributes
+    ----------
+    size : float
+        Standard deviation of each coordinate of control points, mm.
+    where : ndarray of bool (nu, nv)
+        Control points that have it.
+    at : (ndarray, ndarray)
+        Their Greville points along u and v.
+    """
+
+    size: float
+    where: Array
+    at: tuple[Array, Array]
+
+    def over(self, net: Net) -> Array:
+        """Control points that have it, of the same surface over more knots."""
+        own = (net.u.greville(), net.v.greville())
+        near = [np.abs(there[:, None] - here).argmin(axis=1) for there, here in zip(own, self.at, strict=True)]
+        return np.asarray(self.where[np.ix_(*near)])
+
+
+def noise(net: Net, points: Array, seen: Array) -> Noise | None:
+    """The noise of a net; None where there is none that can be told.
 
     Parameters
     ----------
     net : Net
     points : ndarray of bool (nu, nv)
-        Control points that may have noise.
+        Control points that tell it.
+    seen : ndarray of bool (nu, nv)
+        Those that follow the surface at all.
     """
-    if min(points.any(axis=0).sum(), points.any(axis=1).sum()) < ACROSS:
+    size = _size(net, points, seen, seen)
+    if not size:
         return None
-    found = np.array([np.median(each) for each in _lengths(net, points) if len(each) >= FEWEST]) / MEDIAN
-    return float(found[found <= AGREE * found.min()].mean()) if len(found) else None
+    where = seen & ~_runs(_around(net, seen) <= (CALM * size) ** 2)
+    size = _size(net, where & points, seen, where)
+    at = net.u.greville(), net.v.greville()
+    return Noise(size, where, at) if size > ROUNDING * float(np.abs(net.poles).max()) else None
 
 
-def _lengths(net: Net, points: Array) -> Iterator[Array]:
-    """Lengths of the differences of each order that only involve these points."""
-    for orders in ORDERS:
-        window = orders[0] + 1, orders[1] + 1
-        if all(count >= size for count, size in zip(points.shape, window, strict=True)):
-            whole = sliding_window_view(points, window).all(axis=(2, 3))
-            found = net.poles
-            for axis, order in enumerate(orders):
-                found = _differences((net.u, net.v)[axis].greville(), found, order, axis)
-            yield np.linalg.norm(found, axis=2)[whole & np.isfinite(found).all(axis=2)]
+def _size(net: Net, points: Array, seen: Array, noisy: Array) -> float:
+    """Standard deviation by the differences about ``points``, if ``noisy`` ones have noise; 0 for none."""
+    every = [
+        [_estimate(net, orders, points, seen, noisy, BESIDE if k else FEWEST) for k, orders in enumerate(kind)]
+        for kind in KINDS
+    ]
+    found = [each for each in every if np.isfinite(each[0])]
+    if not found:
+        return 0.0
+    known = [x for x in min(found) if np.isfinite(x)]
+    if len(known) < 2 or max(known) > LEVEL * min(known):
+        return 0.0
+    main = np.array([each[0] for each in found])
+    return float(main[main <= AGREE * main.min()].mean())
 
 
-def _differences(x: Array, values: Array, order: int, axis: int) -> Array:
-    """Divided differences of values at places along an axis, their weights of unit norm."""
-    if not order:
-        return values
+def _estimate(net: Net, orders: Orders, points: Array, seen: Array, noisy: Array, fewest: int) -> float:
+    lengths, share, within = _differences(net, orders, points, seen, noisy)
+    use = within & (share > 0)
+    return float(np.median(lengths[use] / np.sqrt(share[use])) / MEDIAN) if use.sum() >= fewest else np.inf
+
+
+def _around(net: Net, seen: Array) -> Array:
+    """Mean square of the differences in a row about each control point, the least of both axes, mm²."""
+    from scipy.ndimage import uniform_filter1d
+
+    least = np.full(seen.shape, np.inf)
+    for axis, orders in enumerate(((4, 0), (0, 4))):
+        lengths, _, within = _differences(net, orders, seen, seen, seen)
+        counted = np.zeros((2, *seen.shape))
+        middle = tuple(slice(k // 2, k // 2 + n) for k, n in zip(orders, lengths.shape, strict=True))
+        counted[0][middle], counted[1][middle] = np.where(within, lengths**2 / 3, 0.0), within
+        total, count = uniform_filter1d(counted, LOCAL, axis=1 + axis, mode="constant")
+        least = np.where(count > 2.5 / LOCAL, np.minimum(least, total / np.maximum(count, 1e-300)), least)
+    return least
+
+
+def _runs(points: Array) -> Array:
+    """Those of some points that have enough neighbours in a row among them along an axis."""
+    from scipy.ndimage import binary_opening
+
+    return np.asarray(binary_opening(points, np.ones((RUN, 1))) | binary_opening(points, np.ones((1, RUN))))
+
+
+def _differences(net: Net, orders: Orders, points: Array, seen: Array, noisy: Array) -> tuple[Array, Array, Array]:
+    """Lengths of differences, the share of each that noise on ``noisy`` control points has, and whether it is about
+    some of ``points`` alone and follows the surface."""
+    window = orders[0] + 1, orders[1] + 1
+    if any(count < size for count, size in zip(points.shape, window, strict=True)):
+        return np.zeros((0, 0)), np.zeros((0, 0)), np.zeros((0, 0), bool)
+    found, share = net.poles, noisy.astype(float)
+    for axis, order in enumerate(orders):
+        if order:
+            weights = _weights((net.u, net.v)[axis].greville(), order)
+            found, share = _applied(weights, found, axis), _applied(weights**2, share, axis)
+    lengths = np.linalg.norm(found, axis=2)
+    within = sliding_window_view(seen, window).all(axis=(2, 3)) & np.isfinite(lengths)
+    for i in _middle(orders[0]):
+        for j in _middle(orders[1]):
+            within &= points[i : i + lengths.shape[0], j : j + lengths.shape[1]]
+    return lengths, share, within
+
+
+def _middle(order: int) -> Sequence[int]:
+    """The control points with the largest weights in a difference."""
+    return sorted({order // 2, (order + 1) // 2})
+
+
+def _weights(x: Array, order: int) -> Array:
+    """Weights of divided differences at places, ``(n - order, order + 1)``, of unit norm."""
     at = sliding_window_view(x, order + 1)
     apart = at[:, :, None] - at[:, None, :] + np.eye(order + 1)
     with np.errstate(divide="ignore", invalid="ignore"):
         weights = 1.0 / apart.prod(axis=2)
-        weights /= np.linalg.norm(weights, axis=1, keepdims=True)
-        windows = sliding_window_view(np.moveaxis(values, axis, 0), order + 1, axis=0)
+        return np.asarray(weights / np.linalg.norm(weights, axis=1, keepdims=True))
+
+
+def _applied(weights: Array, values: Array, axis: int) -> Array:
+    """Sums of neighbours along an axis with weights."""
+    windows = sliding_window_view(np.moveaxis(values, axis, 0), weights.shape[1], axis=0)
+    with np.errstate(invalid="ignore"):
         return np.moveaxis(np.einsum("nk,n...k->n...", weights, windows), 0, axis)

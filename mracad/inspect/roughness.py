@@ -125,6 +125,10 @@ class Growth:
         By how much a normal may turn, degrees.
     spread : float
         By how much the figures of a place may exceed all that was around it, relative.
+    singular : float
+        Share by which the curvature at singular points may change.
+    each : bool
+        Whether angles across knot lines may nowhere grow; otherwise the largest of a face: noise opens them at random.
     """
 
     bending: float = 0.0
@@ -133,6 +137,8 @@ class Growth:
     kink: float = 0.0
     fold: float = 30.0
     spread: float = 0.0
+    singular: float = SETTLED
+    each: bool = True
 
 
 @dataclass(frozen=True)
@@ -155,11 +161,12 @@ def worse(change: Change, allowed: Growth) -> tuple[Worse, ...]:
     ]
     if after.curvature > _most(before.curvature, allowed.curvature) + noise.curvature:
         found.append(Worse(Rougher.CURVATURE, before.curvature, after.curvature))
-    if change.opened > allowed.kink + noise.kink:
+    opened = change.opened if allowed.each else after.kink - before.kink
+    if opened > allowed.kink + noise.kink:
         found.append(Worse(Rougher.KINK, before.kink, after.kink))
     if change.turn > allowed.fold:
         found.append(Worse(Rougher.FOLD, 0.0, change.turn))
-    if change.unsettled > max(SETTLED, allowed.curvature):
+    if change.unsettled > max(allowed.singular, allowed.curvature):
         found.append(Worse(Rougher.SINGULAR, 0.0, change.unsettled))
     if change.spread > allowed.spread:
         found.append(Worse(Rougher.SPREAD, 1.0, 1.0 + change.spread))
@@ -185,11 +192,12 @@ def places(change: Change, allowed: Growth) -> Array:
     found = change.placed
     assert found is not None
     most = _most(change.before.curvature, allowed.curvature) + change.noise.curvature
-    steep = (found.turn > np.radians(allowed.fold)) | (found.opened > np.radians(allowed.kink + change.noise.kink))
+    opened = np.radians(allowed.kink + change.noise.kink) if allowed.each else np.inf
+    steep = (found.turn > np.radians(allowed.fold)) | (found.opened > opened)
     rough = (found.spread > allowed.spread) | (found.curvature > most)
     grown = [_grown(change, what, allowed) for what in SUMS]
     more = (found.rise[grown] > 1.0).any(axis=0)
-    return np.asarray(steep | rough | more | (found.unsettled > max(SETTLED, allowed.curvature)))
+    return np.asarray(steep | rough | more | (found.unsettled > max(allowed.singular, allowed.curvature)))
 
 
 def better(change: Change, share: float, local: float = np.inf, mean: float = 0.0) -> bool:

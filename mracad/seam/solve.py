@@ -217,9 +217,10 @@ class Problem:
         first = solve(-stiffness * (self.bending @ (above + mended)), exactly=False)
         return mended + solve.settled(_chebyshev(lambda x: solve(self.mass @ x, exactly=False), first))
 
-    def faired(self, stiffness: float) -> Array:
-        """δ of the filter of gain 1 / (1 + x), ``(points, 3)``; stiffness in mm⁴."""
-        return self._solver(stiffness, self.free)(-stiffness * (self.bending @ self.f))
+    def faired(self, stiffness: float, free: Array | None = None, of: Array | None = None) -> Array:
+        """δ of the filter of gain 1 / (1 + x), ``(points, k)``; arguments as for :meth:`filtered`."""
+        above, free = self.f if of is None else of, self.free if free is None else free
+        return self._solver(stiffness, free)(-stiffness * (self.bending @ above))
 
     def nearest(self, wanted: Array, stiffness: float = 0.0, beyond: bool = False) -> Array:
         """The admissible δ nearest to ``wanted``, both ``(points, 3)``, over the faces.
@@ -227,8 +228,7 @@ class Problem:
         The distance is ‖δ − w‖²_M + a |δ − w|²_K, with ``stiffness`` a (mm⁴): δ − w is then smooth.
         ``beyond``: control points that the faces hardly depend on also move as wanted; otherwise they stay.
         """
-        moving = self.free | ~self.seen if beyond else self.free
-        kept = np.where(moving[:, None], wanted, 0.0)
+        kept = np.where((self.free | ~self.seen if beyond else self.free)[:, None], wanted, 0.0)
         held = wanted - kept
         pull = self.mass @ held
         if stiffness:
@@ -239,9 +239,10 @@ class Problem:
             pull = pull + self.pull
         return np.asarray(kept + self._solver(stiffness, self.free)(pull, start=kept, goal=self.goal))
 
-    def settled(self, delta: Array, stiffness: float = 0.0) -> Array:
-        """A displacement ``(points, 3)`` corrected as smoothly as possible to meet the conditions."""
-        return np.asarray(delta + self._solver(stiffness, self.free)(np.zeros_like(delta), start=delta, goal=self.goal))
+    def settled(self, delta: Array, stiffness: float = 0.0, free: Array | None = None) -> Array:
+        """A displacement ``(points, k)`` corrected as smoothly as possible to meet the conditions."""
+        solver = self._solver(stiffness, self.free if free is None else free)
+        return np.asarray(delta + solver(np.zeros_like(delta), start=delta, goal=self.goal))
 
     def aimed(self, delta: Array, stiffness: float, ways: Array, off: Array) -> Array:
         """A displacement ``(points, 3)`` corrected as smoothly as possible for edges off what they slide along.
@@ -312,10 +313,9 @@ class Problem:
         return [float(part.sum()) for part in self.split(done * (self.mass @ (2 * target - done))).values()]
 
     def split(self, values: Array) -> dict[int, Array]:
-        """Values of all points by surface, ``(nu, nv, 3)`` each."""
-        sizes = [space.free.size for space in self.spaces.values()]
-        parts = np.split(values, np.cumsum(sizes)[:-1])
-        return {i: part.reshape(s.net.poles.shape) for (i, s), part in zip(self.spaces.items(), parts, strict=True)}
+        """Values of all points, ``(points, k)``, by surface, ``(nu, nv, k)`` each."""
+        parts = np.split(values, np.cumsum([space.free.size for space in self.spaces.values()])[:-1])
+        return {i: part.reshape(*s.free.shape, -1) for (i, s), part in zip(self.spaces.items(), parts, strict=True)}
 
 
 def faded(away: Array, width: float) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from collections.abc import Set as AbstractSet
 
 import numpy as np
@@ -21,6 +22,7 @@ def rungs_by_level(
     keep: AbstractSet[float] | Array = frozenset(),
     lengths: Array | None = None,
     tolerance: float = 1e-4,
+    odd: Sequence[bool] = (),
 ) -> list[KnotVector]:
     """Nested knot vectors from ``kv`` to the coarsest, each without every second interior knot of the one before.
 
@@ -33,6 +35,8 @@ def rungs_by_level(
         Arc length of each span, mm; if not given, parameters are used and ``tolerance`` does not apply.
     tolerance : float
         Breaks closer than this (mm), or than 1e-6 of the whole, count as one knot.
+    odd : sequence of bool
+        For the first rungs, whether the other knots of each run go: the second, the fourth, and so on.
 
     Returns
     -------
@@ -48,7 +52,8 @@ def rungs_by_level(
         simple = ladder.thinned(np.ones(len(ladder.alive), dtype=int))
         if simple != kv:
             rungs.append(simple)
-    while ladder.drop(np.ones(len(ladder.alive), dtype=bool)):
+    others = iter(odd)
+    while ladder.drop(ladder.inner(next(others, False))):
         rungs.append(ladder.thinned(np.ones(len(ladder.alive), dtype=int)))
     return rungs
 
@@ -203,6 +208,13 @@ class _Ladder:
         if self.kv.periodic:
             before[0], after[-1] = self.spans[-1], self.spans[0]
         return np.asarray(before + after)
+
+    def inner(self, odd: bool) -> Array:
+        """All clusters; if ``odd``, without the ends of each run between fixed ones, where anything is left."""
+        free = ~self.fixed[self.alive]
+        within = np.pad(free, 1)
+        within = free & within[:-2] & within[2:]
+        return within if odd and within.any() else free
 
     def drop(self, candidate: Array) -> bool:
         """Remove alternate clusters of each run of candidates; return whether any went."""

@@ -110,8 +110,10 @@ WAYS = {
     "max_tolerance": ("--max-tolerance 1e-9mm",),
     "max_volume_change": ("--max-volume-change 1e-9", "REF slab.step IN smoothslab.step"),
     "min_wall": ("--min-wall 9mm", "IN slab.step"),
+    "method": ("--method spline",),
     "mirror": ("--mirror", "--rotate 20"),
     "mode": ("--mode replace", "--from #1 --to #1 --band 0mm:8mm"),
+    "outliers": ("--outliers 2%", "IN spiky.step"),
     "output": ("-o b.feature",),
     "noise": ("--noise 0.2mm",),
     "outputs": ("-o b.brep",),
@@ -197,6 +199,10 @@ def folder(small, tmp_path_factory):
     angle, along = np.meshgrid(np.linspace(0, 3, 60), np.linspace(0, 20, 24), indexing="ij")
     bent = np.stack([2 * np.cos(angle), 2 * np.sin(angle), along + 0.02 * np.sin(9 * angle) * np.sin(along)], axis=-1)
     mracad.write(shapes.document(shapes.face_on(shapes.bspline(bent))), place / "tube.step")
+    x, y = np.meshgrid(np.arange(20.0), np.arange(20.0), indexing="ij")
+    spiky = np.stack([x, y, 0.1 * x], axis=-1) + 0.05 * np.random.default_rng(0).standard_normal((20, 20, 3))
+    spiky[[5, 12], [14, 7], 2] += 1.0
+    mracad.write(shapes.document(shapes.face_on(shapes.bspline(spiky))), place / "spiky.step")
     text = (place / "sheet.step").read_bytes()
     (place / "latin.step").write_bytes(text.replace(b"'part'", b"'t\xe9t\xe9'"))
     for name in ("sheet", "slab"):

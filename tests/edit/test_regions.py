@@ -40,7 +40,7 @@ def change(model, edit, options, net=0):
         (smooth, Smooth(scale="25mm", free_edges="smooth")),
         (smooth, Smooth(scale="25mm", across="20mm", along="x")),
         (smooth, Smooth(level=2.0)),
-        (denoise, Denoise(noise="0.3mm")),
+        (denoise, Denoise(noise="0.03mm")),
         (offset, OffsetFaces(distance="1mm")),
     ],
 )

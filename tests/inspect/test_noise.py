@@ -18,38 +18,68 @@ def net(sigma, size=(40, 30), degree=3, seed=0):
     return Net(u, v, poles + sigma * rng.standard_normal(poles.shape))
 
 
-def every(found):
-    return np.ones(found.poles.shape[:2], bool)
+def size(found, points=None, seen=None):
+    """The noise of a net, told by some of its control points; 0 for none."""
+    every = np.ones(found.poles.shape[:2], bool)
+    told = noise(found, every if points is None else points, every if seen is None else seen)
+    return told.size if told else 0.0
+
+
+def inside(found, by=4):
+    return np.pad(np.ones(np.subtract(found.poles.shape[:2], 2 * by), bool), by)
 
 
 @pytest.mark.parametrize("degree", [2, 3, 5])
 def test_white_noise_is_found_whatever_the_shape_degree_and_knots(degree):
-    found = [noise(each, every(each)) for each in (net(0.05, degree=degree, seed=seed) for seed in range(4))]
+    found = [size(net(0.05, degree=degree, seed=seed)) for seed in range(4)]
     assert max(abs(each / 0.05 - 1) for each in found) < 0.1 and abs(np.mean(found) / 0.05 - 1) < 0.04
 
 
 def test_a_smooth_net_has_next_to_none():
-    assert noise(net(0.0), every(net(0.0))) < 1e-3
+    assert size(net(0.0)) < 1e-3
 
 
 def test_noise_turns_and_grows_with_the_net():
     one = net(0.05)
     other = Net(one.u, one.v, 7.0 * one.poles @ rotation([1, 2, 3], 0.7).T)
-    assert noise(other, every(one)) == pytest.approx(7.0 * noise(one, every(one)), rel=1e-9)
+    assert size(other) == pytest.approx(7.0 * size(one), rel=1e-9)
 
 
-def test_only_points_that_may_have_noise_count():
+def test_what_does_not_follow_the_surface_does_not_count():
     one = net(0.05)
-    inside = np.pad(np.ones(np.subtract(one.poles.shape[:2], 8), bool), 4)
-    poles = np.where(inside[..., None], one.poles, net(0.0).poles)
-    assert noise(Net(one.u, one.v, poles), inside) == pytest.approx(0.05, rel=0.1)
+    far = np.where(inside(one, 2)[..., None], one.poles, net(3.0, seed=1).poles)
+    assert size(Net(one.u, one.v, far), inside(one), inside(one, 2)) == pytest.approx(0.05, rel=0.1)
+
+
+def test_clean_rows_beside_noisy_ones_are_found_and_dilute_nothing():
+    """Two clean rows all around, as beside seams that were kept tangent."""
+    one = net(0.05)
+    noisy = inside(one, 2)
+    mixed = Net(one.u, one.v, np.where(noisy[..., None], one.poles, net(0.0).poles))
+    told = noise(mixed, inside(one, 1), np.ones_like(noisy))
+    assert (told.where == noisy).mean() > 0.97 and told.where[noisy].mean() > 0.97
+    assert told.size == pytest.approx(0.05, rel=0.08)
+
+
+def test_noise_everywhere_is_everywhere():
+    one = net(0.05, seed=2)
+    assert noise(one, inside(one, 1), np.ones(one.poles.shape[:2], bool)).where.all()
+
+
+def test_ripple_is_no_noise():
+    """A ripple of six control points has the same size in neighbouring differences only if it is white."""
+    one = net(0.0)
+    waves = 0.05 * np.sin(np.arange(one.poles.shape[0]) * 2 * np.pi / 6)[:, None] * np.ones(one.poles.shape[1])
+    rippled = Net(one.u, one.v, one.poles + waves[..., None] * [0, 0, 1])
+    assert size(rippled) < 0.01
 
 
 def test_few_points_tell_nothing():
     one = net(0.05, (2, 40))
-    assert noise(one, every(one)) is None
-    some = np.zeros_like(every(net(0.05)))
-    some[:10, :10] = True
-    assert FEWEST < (10 - 3) ** 2 and noise(net(0.05), some) is not None
-    some[::3] = False
-    assert noise(net(0.05), some) is None
+    assert size(one, np.zeros(one.poles.shape[:2], bool)) == 0.0
+    few = np.zeros(one.poles.shape[:2], bool)
+    few[2, 10 : 10 + FEWEST - 1] = True
+    assert size(one, few) == 0.0
+    more = np.zeros(net(0.05).poles.shape[:2], bool)
+    more[10:16, 10:16] = True
+    assert size(net(0.05), more) > 0.0

@@ -8,7 +8,7 @@ from msgspec import Meta
 
 from mracad.errors import UsageError
 from mracad.spec import places
-from mracad.spec.quantity import Angle, Length
+from mracad.spec.quantity import Angle, Length, Share
 from mracad.spec.steps.base import Selection
 
 
@@ -169,10 +169,25 @@ class Denoise(Fairing, frozen=True, kw_only=True, forbid_unknown_fields=True):
             "measured, face by face."
         ),
     ] = None
+    method: Annotated[
+        Literal["wiener", "spline"],
+        Meta(
+            description="wiener: shrink details in wavelet space about a smoothing spline, or take the spline alone "
+            "where that is expected to be nearer; spline: a smoothing spline, its wavelengths by cross-validation."
+        ),
+    ] = "wiener"
     strength: Annotated[
         float,
         Meta(description="What the noise counts for, times what it is: above 1 more is taken.", gt=0.0, le=10.0),
     ] = 1.0
+
+    outliers: Annotated[
+        Annotated[Share, Meta(ge=0.0, le=10.0)],
+        Meta(
+            description="Share of the control points that may be wrong (0.5%): those farther off than noise explains "
+            "go where the others put them."
+        ),
+    ] = 0.0
 
     @property
     def done(self) -> str:

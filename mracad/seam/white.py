@@ -1,0 +1,163 @@
+"""The metric in which noise on control points is white: their own, in which each counts alike.
+
+    x = argmin Σ w |x − f|² + Σ λ_u |D_u x|² + λ_v |D_v x|²
+
+D are third divided differences of control points along u and v on their Greville points, scaled so that on even knots
+they are plain differences of neighbours: a wave of Λ control points keeps 1 / (1 + λ (2 sin π/Λ)⁶).  On knots inserted
+into a surface everything counts as if they were not there: w and the differences go by the spacing of its own points.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+
+from mracad.bspline.knots import KnotVector
+from mracad.bspline.surface import Net
+from mracad.seam.energy import Forms
+from mracad.seam.ladders import Creases
+from mracad.seam.solve import Problem, Soft, Space
+
+Array = np.ndarray
+
+ORDER = 3
+"""Order of the differences."""
+
+
+@dataclass(frozen=True, eq=False)
+class White:
+    """Forms of one surface in the metric of its control points, in row-major order.
+
+    Attributes
+    ----------
+    mass : ndarray (points,)
+        w; 0 for control points that its faces do not depend on.
+    along : pair of csr_array (points, points)
+        DᵀD in u and v.
+    """
+
+    mass: Array
+    along: tuple[Any, Any]
+
+
+def white(net: Net, origin: Net, points: Array, creases: Creases) -> White:
+    """The forms of a surface.
+
+    Parameters
+    ----------
+    net, origin : Net
+        The surface over the knots that it is solved on, and over its own.
+    points : ndarray of bool (nu, nv)
+        Control points of ``net`` that count.
+    creases : pair of frozenset of float
+        Lines in u and v that differences do not cross.
+    """
+    both = [(knots, own.greville()) for knots, own in ((net.u, origin.u), (net.v, origin.v))]
+    mass = np.multiply.outer(*(_spacing(knots.greville(), own) for knots, own in both)) * points
+    along = [_energy(differences(knots, own, creases[axis]), points, axis) for axis, (knots, own) in enumerate(both)]
+    return White(mass.ravel(), (along[0], along[1]))
+
+
+def differences(knots: KnotVector, own: Array, creases: frozenset[float] = frozenset()) -> Array:
+    """The differences along one direction, ``(rows, n)``: see the module.
+
+    Parameters
+    ----------
+    knots : KnotVector
+    own : ndarray
+        Greville points before knots were inserted.
+    creases : frozenset of float
+    """
+    g, n = knots.greville(), knots.count
+    index = np.arange(n)
+    if knots.periodic:
+        g = np.unwrap(g, period=knots.period)
+        g, index = np.concatenate([g, g[:ORDER] + knots.period]), np.concatenate([index, index[:ORDER]])
+    if len(g) <= ORDER:
+        return np.zeros((0, n))
+    at, columns = (sliding_window_view(each, ORDER + 1) for each in (g, index))
+    apart = at[:, :, None] - at[:, None, :] + np.eye(ORDER + 1)
+    middle, step = at.mean(axis=1), np.diff(at, axis=1).mean(axis=1)
+    spacing = np.interp(middle, own, np.gradient(own)) if len(own) > 1 else step
+    with np.errstate(divide="ignore", invalid="ignore"):
+        weights = 6.0 * (spacing**ORDER * np.sqrt(step / spacing))[:, None] / apart.prod(axis=2)
+    crossed = np.any([(at[:, 0] < c) & (c < at[:, -1]) for c in creases] or [np.zeros(len(at), bool)], axis=0)
+    rows = np.flatnonzero(np.isfinite(weights).all(axis=1) & ~crossed)
+    matrix = np.zeros((len(rows), n))
+    np.add.at(matrix, (np.arange(len(rows))[:, None], columns[rows]), weights[rows])
+    return matrix
+
+
+def _spacing(g: Array, own: Array) -> Array:
+    """Spacing of Greville points over that of others about them."""
+    if len(g) < 2 or len(own) < 2:
+        return np.ones(len(g))
+    return np.asarray(np.gradient(g) / np.maximum(np.interp(g, own, np.gradient(own)), 1e-300))
+
+
+def _energy(matrix: Array, points: Array, axis: int) -> Any:
+    """DᵀD for all lines of a net along an axis, of the differences that only involve ``points``."""
+    from scipy.sparse import csr_array, eye_array, kron
+
+    used = np.abs(matrix) > 0
+    here = points if axis == 0 else points.T
+    whole = (used @ ~here) == 0
+    single = csr_array(matrix), eye_array(here.shape[1])
+    every = kron(*(single if axis == 0 else single[::-1]), format="csr")
+    rows = every[np.flatnonzero((whole if axis == 0 else whole.T).ravel())]
+    return (rows.T @ rows).tocsr()
+
+
+@dataclass(frozen=True, eq=False)
+class Whitened:
+    """A problem in the metric of control points.
+
+    Attributes
+    ----------
+    problem : Problem
+        The same in that of the surfaces.
+    forms : mapping of int to White
+    precision : ndarray (points, 1)
+        Factors on w: control points with less noise count more.
+    scale : mapping of int to float
+        Factors on λ: those of the noisy control points of each surface.
+    """
+
+    problem: Problem
+    forms: Mapping[int, White]
+    precision: Array
+    scale: Mapping[int, float]
+
+    @cached_property
+    def weights(self) -> Array:
+        """w of all control points, ``(points, 1)``."""
+        return np.concatenate([form.mass for form in self.forms.values()])[:, None]
+
+    @cached_property
+    def seen(self) -> Array:
+        """Control points that count, ``(points,)``."""
+        return np.asarray(self.weights[:, 0] > 0)
+
+    def at(self, stiffness: Mapping[int, tuple[float, float]]) -> Problem:
+        """The problem with λ along u and v for each surface; joints stay as they are."""
+        from scipy.sparse import csr_array, diags_array
+
+        spaces: dict[int, Space] = {}
+        for (i, space), precision in zip(
+            self.problem.spaces.items(), self.problem.split(self.precision).values(), strict=True
+        ):
+            form, (lu, lv) = self.forms[i], stiffness[i]
+            mass = diags_array(precision.ravel() * form.mass).tocsr()
+            bending = self.scale[i] * (lu * form.along[0] + lv * form.along[1])
+            points = (form.mass > 0).reshape(space.seen.shape)
+            forms = Forms(mass, bending.tocsr(), csr_array(mass.shape))
+            spaces[i] = replace(space, forms=forms, free=space.free & points, seen=points, trend=None)
+        old = self.problem
+        area = float(old.mass.diagonal().sum() / max(self.seen.sum(), 1))
+        soft, between = (None if each is None else each / area for each in (old.soft, old.between))
+        return Problem(spaces, old.rows, None, Soft(soft, between=between), old.effort)
