@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from mracad.bspline.surface import Net
-from mracad.edit.moved import Moved, Result, closely, worthwhile
+from mracad.edit.moved import Moved, Result, closely
 from mracad.edit.pose import Scene, beside_rims
 from mracad.edit.target import Sheet, Wish
 from mracad.edit.tolerances import Tolerances
@@ -170,8 +170,7 @@ def _alike(found: Mapping[int, Moved], tolerances: Tolerances) -> dict[int, Move
         least = min(moved.amount for moved in found.values())
         if not least or all(moved.amount == least for moved in found.values()):
             return dict(found)
-        now = [moved.scaled(least).confirmed(tolerances) for moved in found.values()]
-        found = dict(zip(found, worthwhile(now, tolerances), strict=True))
+        found = {i: moved.scaled(least).confirmed(tolerances) for i, moved in found.items()}
     return {i: moved.undone() for i, moved in found.items()}
 
 
@@ -297,7 +296,6 @@ def _confirmed(trial: Trial, members: Mapping[int, Sheet], found: Sequence[Verdi
         for each in _moved(trial, members, verdict, looks if lasting else fresh):
             each = each.confirmed(trial.tolerances)
             moved.append(each if lasting else each.done())
-        moved = worthwhile(moved, trial.tolerances)
         verdict = trial.left(verdict, [each.amount for each in moved], target)
         if rank(verdict) > most:
             most = rank(verdict)

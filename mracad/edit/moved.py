@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -118,11 +118,13 @@ class Moved:
         return replace(self, tried=Tried(closely(self.sheet, self.net), self.tried.nets, self.tried.parts))
 
     def confirmed(self, tolerances: Tolerances) -> Moved:
-        """The part that passes a closer look: growth between the points of the first is taken back."""
+        """The part that passes a closer look: growth between the points of the first is taken back; nothing is left if
+        no face gains from the rest."""
         if not self.amount:
             return self
         (amount,), (changes,), (limits,) = amounts(self.tried, np.zeros(1), np.array([self.amount]), tolerances)
-        return replace(self, amount=amount, changes=changes, limits=limits or self.limits)
+        found = replace(self, amount=amount, changes=changes, limits=limits or self.limits)
+        return found if gained(changes, tolerances) else replace(found.undone(), limits=found.limits)
 
     def displacement(self) -> Offset:
         """The displacement over the original surface."""
@@ -143,13 +145,6 @@ class Result:
         """The displacement of all surfaces that move."""
         offsets = {i: each.displacement() for i, each in self.moved.items() if np.any(each.offset)}
         return Displacement(offsets, {s.edge: s.trace.face for s in self.joints.slides if s.trace.surface in offsets})
-
-
-def worthwhile(moved: Sequence[Moved], tolerances: Tolerances) -> list[Moved]:
-    """Surfaces that move together; none moves if none gains enough to be touched."""
-    if any(gained(each.changes, tolerances) for each in moved):
-        return list(moved)
-    return [replace(each.undone(), limits=each.limits) for each in moved]
 
 
 def closely(sheet: Sheet, net: Net) -> Watch:

@@ -117,7 +117,7 @@ class Trial:
             within = [bounded(net, part, bound, s.times(self.width)).reshape(-1, 3) for net, part, s in every]
             delta = self.problem.nearest(np.concatenate(within))
         tried = Tried(self.watch, self.nets, self._split(delta))
-        return self._verdict(tried, target, self._floor(delta, target, others), BISECTIONS[0])
+        return self._verdict(tried, target, self._floor(delta, target, others), BISECTIONS[len(self.nets) > 1])
 
     def settled(self, verdict: Verdict, target: Array) -> Verdict:
         """The same verdict, with closer amounts."""
@@ -134,9 +134,9 @@ class Trial:
     def _verdict(self, tried: Tried, target: Array, floor: Array, steps: int) -> Verdict:
         delta = np.concatenate([part.reshape(-1, 3) for part in tried.parts])
         shares, found, limits = amounts(tried, floor, self._ceilings(delta), self.tolerances, steps)
-        if not any(gained(faces, self.tolerances) for faces in found):
-            shares = [0.0] * len(found)
-            found = [{face: change.undone() for face, change in faces.items()} for faces in found]
+        for i, faces in enumerate(found):
+            if not gained(faces, self.tolerances):
+                shares[i], found[i] = 0.0, {face: change.undone() for face, change in faces.items()}
         return Verdict(tried, shares, found, limits, *self._gains(delta, target, shares))
 
     def eased(self, verdict: Verdict, target: Array, others: Sequence[Verdict] = ()) -> Verdict:

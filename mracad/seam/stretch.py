@@ -180,7 +180,7 @@ def stretched(frame: Array, root: Form) -> Array:
 def _halves(form: Form) -> tuple[Array, Array]:
     """Half the sum and half the difference of the eigenvalues of a form."""
     a, b, c = form
-    return (a + c) / 2, np.sqrt(((a - c) / 2) ** 2 + b * b)
+    return (a + c) / 2, np.hypot((a - c) / 2, b)
 
 
 def _power(form: Form, of: Callable[[Array], Array]) -> Form:

@@ -51,7 +51,7 @@ def test_a_missing_file_and_a_directory(mracad, tmp_path):
         (["--scale", "1e999"], 2, "not a length"),
         (["--scale", "5 bananas"], 2, "not a length"),
         (["--level", "nan"], 2, "level"),
-        ([], 2, "scale or a level"),
+        ([], 2, "scale, a level or a bound"),
         (["--scale", "5mm", "--level", "2"], 2, "scale or a level"),
         (["--scale", "5mm", "--amount", "nan"], 2, "amount"),
         (["--scale", "5mm", "--amount", "2"], 2, "amount"),
