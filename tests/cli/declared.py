@@ -128,6 +128,7 @@ VALUES: Mapping[str, Sequence[Any]] = {
     "min_wall": ["0.5mm"],
     "mode": ["replace", "blend=0.3"],
     "noise": ["0.01mm"],
+    "outliers": ["0.5%"],
     "output": ["out.feature"],
     "reference_unit": ["mm"],
     "report": ["report.json"],
