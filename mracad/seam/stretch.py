@@ -151,7 +151,8 @@ class Stretch:
         scale = self.limit.length / THETA
         inverse, limit = _power(root, lambda x: x**-4.0), _power(bent, lambda x: (scale * x) ** 4)
         a, b, c = (one + other for one, other in zip(inverse, limit, strict=True))
-        return _power((a, b, c), lambda x: np.maximum(x, 1e-300) ** -0.25)
+        least = max(self.lengths) ** -4.0  # no limit makes a sum smaller; where it is large, rounding would
+        return _power((a, b, c), lambda x: np.maximum(x, least) ** -0.25)
 
 
 EVEN = Stretch()
