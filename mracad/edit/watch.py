@@ -19,7 +19,7 @@ Array = np.ndarray
 BISECTIONS = 3, 5
 """Steps in which an amount is found: roughly among several displacements of one surface; otherwise closely."""
 
-SINGULAR = 1e5
+SINGULAR = 1e3
 """Curvature over the wavelength above which a face is singular."""
 
 
