@@ -9,7 +9,7 @@ import pytest
 
 import mracad
 from tests.cli import declared
-from tests.edit import halves
+from tests.edit import blocks, halves
 from tests.occ import shapes
 
 TESTS = Path(__file__).parents[1]
@@ -173,6 +173,15 @@ OWN = {
     "repeat polar": ("--polar 2,8,5,0,0,0,1",),
 }
 
+VALUES = {
+    "smooth edges=slide": ("--edges slide", "IN block.step --scale 30mm"),
+    "denoise edges=slide": ("--edges slide", "IN block.step --noise 0.05mm"),
+    "smooth keep=g0": ("--keep g0", "IN tangent.step"),
+    "smooth keep=g1": ("--keep g1", "IN tangent.step --keep g0"),
+    "repeat overlap=replace": ("--overlap replace", "--grid 2x1,0.8,0.8"),
+}
+"""Further values of options that choose among several."""
+
 
 @pytest.fixture(scope="session")
 def folder(small, tmp_path_factory):
@@ -203,6 +212,7 @@ def folder(small, tmp_path_factory):
     spiky = np.stack([x, y, 0.1 * x], axis=-1) + 0.05 * np.random.default_rng(0).standard_normal((20, 20, 3))
     spiky[[5, 12], [14, 7], 2] += 1.0
     mracad.write(shapes.document(shapes.face_on(shapes.bspline(spiky))), place / "spiky.step")
+    shapes.save(blocks.block(blocks.nets(16)[1]).wrapped, place / "block.step")
     text = (place / "sheet.step").read_bytes()
     (place / "latin.step").write_bytes(text.replace(b"'part'", b"'t\xe9t\xe9'"))
     for name in ("sheet", "slab"):
@@ -223,6 +233,8 @@ def cases():
             if case not in ELSEWHERE and option != "debug":
                 yield pytest.param(case, kind not in seen, id=case)
             seen.add(kind)
+    for case in VALUES:
+        yield pytest.param(case, True, id=case)
 
 
 _known = {}
@@ -238,8 +250,8 @@ def once(mracad, folder, place, given, old):
 
 def words(case):
     """The words of a command with and without an option, and files that are there before."""
-    command, _, option = case.rpartition(" ")
-    given, *needs = OWN.get(case) or WAYS[option]
+    command, _, option = case.partition("=")[0].rpartition(" ")
+    given, *needs = VALUES.get(case) or OWN.get(case) or WAYS[option]
     base, old, more = list(BASE[command]), [], " ".join(needs).split()
     while more:
         word = more.pop(0)
@@ -257,7 +269,7 @@ def words(case):
         base.remove("--json")
         return base, [*base, "--json"], old
     changed, own = list(base), given.split()
-    if option in ("scale", "to", "from_", "feature", "folder", "output") and own[0] in changed:
+    if option in ("scale", "to", "from_", "feature", "folder", "output", "keep") and own[0] in changed:
         _give(changed, own)
     else:
         changed += own
