@@ -56,6 +56,7 @@ class Quiet:
     asked: Asked
     spread: ClassVar[float] = 1.0
     fairs: ClassVar[bool] = True
+    whole: ClassVar[bool] = False
     limited: ClassVar[bool] = False
     growth: ClassVar[Growth] = NOISY
 

@@ -65,6 +65,7 @@ class Filter:
     limited: bool = False
     spread: ClassVar[float] = 1.0
     fairs: ClassVar[bool] = True
+    whole: ClassVar[bool] = False
     growth: ClassVar[Growth] = GROWTH
 
     def wavelength(self, net: Net, faces: Sequence[Face], creases: Creases) -> float:

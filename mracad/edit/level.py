@@ -61,6 +61,7 @@ class Level:
 
     level: float
     fairs: ClassVar[bool] = True
+    whole: ClassVar[bool] = False
     limited: ClassVar[bool] = False
     growth: ClassVar[Growth] = GROWTH
     spread: ClassVar[float] = math.inf  # waves beside what goes are part of a projection

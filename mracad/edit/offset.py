@@ -54,6 +54,7 @@ class Outward:
     refine: bool = True
     spread: ClassVar[float] = math.inf
     fairs: ClassVar[bool] = False
+    whole: ClassVar[bool] = True
     limited: ClassVar[bool] = False
     growth: ClassVar[Growth] = RESHAPED
 

@@ -39,7 +39,9 @@ class Wish(Protocol):
     spread : float
         Number of wavelengths within which a change at a place spreads; infinite where that is no fault.
     fairs : bool
-        Whether it makes faces fairer; otherwise it changes their shape, and free edges and poles move along.
+        Whether faces that do not get fairer stay as they are.
+    whole : bool
+        Whether less of it is not what was asked for: then it is done in full or not at all.
     limited : bool
         Whether wavelengths follow the radii of curvature where these are too small for them.
     growth : Growth
@@ -51,6 +53,9 @@ class Wish(Protocol):
 
     @property
     def fairs(self) -> bool: ...
+
+    @property
+    def whole(self) -> bool: ...
 
     @property
     def limited(self) -> bool: ...

@@ -22,6 +22,9 @@ NOISY = replace(GROWTH, singular=0.25, each=False)
 RESHAPED = Growth(np.inf, np.inf, np.inf, np.inf, 30.0, np.inf)
 """Growth that the judge allows if an edit changes the shape of faces: they must not fold."""
 
+TURNED = replace(RESHAPED, fold=90.0)
+"""The same if normals may turn, too: not beyond a right angle."""
+
 MORE = 0.02
 """Share by which the gap of an edge may grow if it is already as wide as allowed."""
 

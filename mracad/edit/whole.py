@@ -49,7 +49,7 @@ def edited(
     scope = scope or scope_of(model, options)
     movable = {i for i in scope.chosen if model.faces[i].surface is not None}
     allowed = tolerances(model, options)
-    wishes = replace(wished(model, options, scope), open=not wish.fairs)
+    wishes = wished(model, options, scope)
     lost = {edge: unslid(model, edge) for edge in scope.firm}
     for left in range(ROUNDS, -1, -1):
         result = faired(
@@ -75,9 +75,9 @@ def edited(
 def _amounts(result: Result, wish: Wish, options: Fitting) -> dict[int, Moved]:
     """The amount that was asked for of every change."""
     amounts = {i: moved.scaled(options.amount * moved.amount) for i, moved in result.moved.items()}
-    if wish.fairs:
+    if not wish.whole:
         return amounts
-    return {  # less of it is not what was asked for
+    return {
         i: now if result.moved[i].amount == 1.0 else replace(now.undone(), limits=now.limits)
         for i, now in amounts.items()
     }
@@ -97,7 +97,7 @@ def wished(model: Model, options: Fitting, scope: Scope) -> Wishes:
     free = isinstance(options, Fairing) and options.free_edges == "smooth"
     corners = isinstance(options, Fairing) and options.corners == "move"
     wishes = Wishes(options.keep, fit, options.close_gaps, held, scope.zones, free=free, corners=corners)
-    return replace(wishes, slide=able)
+    return replace(wishes, slide=able, open=not isinstance(options, Fairing))
 
 
 def _outcome(face: Face, result: Result, movable: Collection[int], scope: Scope, options: Fitting) -> FaceOutcome:

@@ -2,6 +2,7 @@
 
     filtered   (M + aK) δ = −aK f         gain 1 / (1 + x),   x = (ℓ ω)⁴,  a = ℓ⁴   (m2)
                Re (M + iaK) δ = −i aK f   gain 1 / (1 + x²)                          (b4)
+               for bands of wavelength    gain 1 / (1 + x⁴)
     nearest    δ = argmin (δ − w)ᵀ M (δ − w)
 
 over all δ that vanish on held control points and satisfy L δ = r; contacts add Cᵀ W C to the form.  With B = M + aK
@@ -9,32 +10,28 @@ over all δ that vanish on held control points and satisfy L δ = r; contacts ad
 
     δ_m2 = −B⁻¹ aK f,      δ_b4 = p(C) δ_m2,      p(c) = (1 − c) / (1 − 2c + 2c²),
 
-so one factorisation serves both.  p is expanded in Chebyshev polynomials on [0, 1]: its poles at (1 ± i) / 2 make the
-error fall by a factor of 2.4 with every term.  The map from f to δ is linear: it commutes with rotation, and half the
-noise gives half the displacement.
+so one factorisation serves all.  p is expanded in Chebyshev polynomials (:mod:`mracad.seam.gain`).  The map from f to
+δ is linear: it commutes with rotation, and half the noise gives half the displacement.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.polynomial.chebyshev import chebvander
 
 from mracad.bspline.surface import Net
 from mracad.seam.constrained import Constrained
 from mracad.seam.divided import LEFT, Divided
 from mracad.seam.energy import Forms
+from mracad.seam.gain import applied
 from mracad.seam.guided import Guided, Guides
 from mracad.seam.strips import Division, Layout, joints, strips
 
 Array = np.ndarray
 Solver = Constrained | Divided | Guided
-
-TERMS = 8
-"""Degree of the Chebyshev expansion of p: an error of the gain of 1e-4."""
 
 KEPT = 60_000
 """Control points whose factors are cached, besides the last one."""
@@ -47,16 +44,6 @@ WIDTH = 7.0
 
 MASS = 0.37
 """Length within which masses alone make it fade, in chords of the control net times degrees."""
-
-
-def _expansion() -> Array:
-    """Chebyshev coefficients of p((t + 1) / 2), with the least error of (1 − c) p(c), which is the gain."""
-    t = np.cos(np.pi * (np.arange(200) + 0.5) / 200)
-    weighted = chebvander(t, TERMS) * (1 - t)[:, None]
-    return np.asarray(np.linalg.lstsq(weighted, (1 - t) ** 2 / (1 + t * t), rcond=None)[0])
-
-
-_EXPANSION = _expansion()
 
 
 @dataclass(frozen=True, eq=False)
@@ -192,8 +179,8 @@ class Problem:
         above = f - np.concatenate([each.reshape(-1, 3) for each in trends])
         self.above = above - above[self.seen].mean(axis=0)
 
-    def filtered(self, stiffness: float, free: Array | None = None, of: Array | None = None) -> Array:
-        """δ of the filter of gain 1 / (1 + x²), which leaves the bending of trends alone.
+    def filtered(self, stiffness: float, free: Array | None = None, of: Array | None = None, order: int = 2) -> Array:
+        """δ of the filter of gain 1 / (1 + xⁿ), n = 2 by default, which leaves the bending of trends alone.
 
         Parameters
         ----------
@@ -203,6 +190,8 @@ class Problem:
             Control points that may move, instead of those of the spaces; then only contacts between surfaces count.
         of : ndarray (points, 3), optional
             Displacements to filter, instead of the part above trends.
+        order : int
+            n.
 
         Returns
         -------
@@ -215,7 +204,7 @@ class Problem:
             mended = solve(np.zeros_like(self.above) if pull is None else pull, goal=self.goal)
         above = self.above if of is None else of
         first = solve(-stiffness * (self.bending @ (above + mended)), exactly=False)
-        return mended + solve.settled(_chebyshev(lambda x: solve(self.mass @ x, exactly=False), first))
+        return mended + solve.settled(applied(order, lambda x: solve(self.mass @ x, exactly=False), first))
 
     def faired(self, stiffness: float, free: Array | None = None, of: Array | None = None) -> Array:
         """δ of the filter of gain 1 / (1 + x), ``(points, k)``; arguments as for :meth:`filtered`."""
@@ -334,17 +323,3 @@ def _sum(forms: Forms, stiffness: float) -> Any:
     if np.may_share_memory(bending.indices, mass.indices) and not forms.creases.nnz:
         return csr_array((mass.data + stiffness * bending.data, mass.indices, mass.indptr), shape=mass.shape)
     return mass + stiffness * (bending + forms.creases)
-
-
-def _chebyshev(power: Callable[[Array], Array], first: Array) -> Array:
-    """p(C) first, by Clenshaw's recursion; ``power`` applies C."""
-    last, before = _EXPANSION[TERMS] * first, np.zeros_like(first)
-    for k in range(TERMS - 1, -1, -1):
-        now = power(last)
-        now *= 2
-        now -= last
-        now *= 2 if k else 1
-        now += _EXPANSION[k] * first
-        now -= before
-        last, before = now, last
-    return np.asarray(last)

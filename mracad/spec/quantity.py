@@ -18,6 +18,9 @@ MILLIMETRES = {"um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4, "ft":
 NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 """A number in a text, as a regular expression."""
 
+MOST_GAIN = 1000.0
+"""Largest gain of a band."""
+
 _QUANTITY = re.compile(rf"\s*({NUMBER})\s*([a-zA-Z]*|%|°)\s*")
 
 
@@ -121,14 +124,30 @@ def length(text: str, diagonal: float, name: str) -> float:
     return LENGTH.read(text, name, diagonal / 100)
 
 
-def band_of(text: str, diagonal: float) -> tuple[float, float]:
-    """The least and the largest wavelength of a band, mm; raises UsageError."""
+def band_of(text: str, diagonal: float | None) -> tuple[float, float]:
+    """The least and the largest wavelength of a band, mm, on a model of a diagonal (of 1 mm where that is not known
+    yet); raises UsageError."""
     low, colon, high = text.partition(":")
-    hint = "write a band as 0.5mm:20mm or 0mm:20mm"
+    hint = "write a band as 0.5mm:20mm or :20mm"
     if not colon:
         raise UsageError(f"band: {text!r} is not a band", hint)
+    if not high.strip():
+        message = f"band: {text!r} has no end: the longest waves are the shape itself"
+        raise UsageError(message, f"give its longest wavelength: {text.strip()}500mm")
     zero = re.fullmatch(r"\s*0*\.?0*\s*[a-z]*\s*", low) is not None
-    band = 0.0 if zero else length(low, diagonal, "band"), length(high, diagonal, "band")
-    if band[0] >= band[1]:
+    whole = 1.0 if diagonal is None else diagonal
+    band = 0.0 if zero else length(low, whole, "band"), length(high, whole, "band")
+    if band[0] >= band[1] and (diagonal is not None or "%" not in text):
         raise UsageError(f"band: {text!r} is empty", hint)
     return band
+
+
+def gain_of(text: str, diagonal: float | None) -> tuple[float, float, float]:
+    """The least and the largest wavelength of a band, mm, and its gain, from ``"2mm:10mm=0"``; raises UsageError."""
+    band, equals, gain = text.partition("=")
+    hint = "write a band and its gain as 2mm:10mm=0, or :10mm=1.5"
+    if not equals or not re.fullmatch(rf"\s*{NUMBER}\s*", gain):
+        raise UsageError(f"band: {text!r} is not a band with a gain", hint)
+    if not 0.0 <= float(gain) <= MOST_GAIN:
+        raise UsageError(f"band: a gain of {gain.strip()} is not between 0 and {MOST_GAIN:g}", hint)
+    return (*band_of(band, diagonal), float(gain))

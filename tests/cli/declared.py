@@ -65,6 +65,17 @@ TOGETHER: Mapping[str, Sequence[tuple[str, Sequence[Words]]]] = {
         _RIMS,
     ],
     "denoise": [_RIMS],
+    "equalize": [
+        _RIMS,
+        (
+            "band amount",
+            [
+                ("--band", ":3mm=0"),
+                ("--band", "0.5mm:3mm=2", "--band", "3mm:50%=0.5", "--amount", "1.5"),
+                ("--band", ":2mm=1.2", "--amount", "0"),
+            ],
+        ),
+    ],
     "move": [("base band", _LEVEL), ("to", [("--to", "5,7,0"), ("--to", "#1@0.6,0.7")])],
     "repeat": [
         ("base band", _LEVEL),

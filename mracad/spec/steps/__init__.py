@@ -6,7 +6,7 @@ help.  This package imports no numerical library, so that the command line can s
 
 from __future__ import annotations
 
-from mracad.spec.steps import checks, features, smooth
+from mracad.spec.steps import checks, features, shape, smooth
 from mracad.spec.steps.base import Options, Selection
 from mracad.spec.steps.checks import Check, Compare
 from mracad.spec.steps.features import Copied, Extract, Featured, Move, Repeat, Single, Transfer
@@ -19,7 +19,7 @@ __all__ = [
 
 STEPS: dict[str, type[Options]] = {
     struct.function.partition(":")[2]: struct
-    for module in (smooth, features, checks)
+    for module in (smooth, shape, features, checks)
     for struct in vars(module).values()
     if isinstance(struct, type) and issubclass(struct, Options) and "function" in vars(struct)
 }

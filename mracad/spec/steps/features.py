@@ -53,7 +53,7 @@ class Featured(Selection, frozen=True, kw_only=True, forbid_unknown_fields=True)
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.band is not None:
-            band_of(self.band, 1.0)
+            band_of(self.band, None)
         if self.base == "level" and self.band is None:
             raise UsageError("base: a level needs a band", "give --band 0.5mm:20mm", "base")
 

@@ -1,0 +1,74 @@
+"""Options of edits that change the shape of whole faces by wavelength."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Annotated, ClassVar
+
+from msgspec import Meta
+
+from mracad.errors import UsageError
+from mracad.spec.quantity import gain_of
+from mracad.spec.steps.smooth import Fairing
+
+
+def _band(text: str, name: str) -> None:
+    """Raise UsageError for a text that is not a band with a gain."""
+    gain_of(text, None)
+
+
+class Equalize(Fairing, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Weaken or amplify the waves of NURBS faces, band by band of wavelength."""
+
+    function: ClassVar[str] = "mracad.edit.equalize:equalize"
+
+    band: Annotated[
+        tuple[Annotated[str, _band], ...],
+        Meta(
+            description="A band of wavelengths and its gain: 2mm:10mm=0 takes waves between 2 and 10 mm out, :10mm=3 "
+            "makes waves up to 10 mm three times as high; repeatable. Waves in no band stay."
+        ),
+    ] = ()
+    amount: Annotated[
+        float,
+        Meta(
+            description="How much of the edit to apply: a gain g counts as 1 + amount (g - 1). 0 is none, and above 1 "
+            "exaggerates.",
+            ge=0.0,
+        ),
+    ] = 1.0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not self.band:
+            raise UsageError("band: no band is given", "give --band 2mm:10mm=0", "band")
+        bands = self.gains(None)
+        least = min(gain for *_, gain in bands)
+        if 1.0 + self.amount * (least - 1.0) < 0.0:
+            most = 1.0 / (1.0 - least)
+            message = f"amount: {self.amount:g} would turn waves over: a gain of {least:g} allows up to {most:g}"
+            raise UsageError(message, "give a smaller amount, or gains above 1", "amount")
+        if not any("%" in text for text in self.band):
+            bands_apart(bands)
+
+    def gains(self, diagonal: float | None) -> list[tuple[float, float, float]]:
+        """Least and largest wavelength (mm) and gain of each band, in ascending order, on a model of a diagonal;
+        see :func:`mracad.spec.quantity.band_of`."""
+        return sorted(gain_of(text, diagonal) for text in self.band)
+
+    @property
+    def done(self) -> str:
+        return "equalized"
+
+    @property
+    def quiet(self) -> str:
+        return "without waves in these bands" if self.amount else "left as they are: amount 0"
+
+
+def bands_apart(bands: Sequence[tuple[float, float, float]]) -> None:
+    """Raise UsageError if bands in ascending order overlap."""
+    for (_, high, _), (low, _, _) in pairwise(bands):
+        if low < high:
+            message = f"band: one begins at {low:g}mm, before another ends at {high:g}mm"
+            raise UsageError(message, "let each begin where another ends, or beyond", "band")
