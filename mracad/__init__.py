@@ -7,7 +7,7 @@
 >>> mracad.apply(document, model, edit.displacement)
 >>> mracad.write(document, "smooth.step")
 
-Names are loaded on first use, so that importing the package loads no CAD kernel.
+Names are loaded on first use, so importing the package does not load the CAD kernel.
 """
 
 from __future__ import annotations

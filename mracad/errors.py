@@ -1,4 +1,4 @@
-"""The one root error: what went wrong, which exit code it means, and what to do about it."""
+"""Errors: what went wrong, what to do about it, and the exit code."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class MracadError(Exception):
 
 
 def _again(kind: type[MracadError], message: str, hint: str, code: Code) -> MracadError:
-    """An error as it was, in another process."""
+    """An error rebuilt in another process."""
     error = kind.__new__(kind)
     MracadError.__init__(error, message, hint, code)
     return error
@@ -56,7 +56,7 @@ class UsageError(MracadError, ValueError):
     Parameters
     ----------
     option : str
-        The option that is wrong, where that is known.
+        The option that is wrong, if known.
     """
 
     option = ""
@@ -81,14 +81,14 @@ class EditError(MracadError):
 
 
 class LimitError(MracadError):
-    """Work that took more time or memory than it may."""
+    """Work that exceeded its limit of time or memory."""
 
     def __init__(self, message: str, hint: str = "") -> None:
         super().__init__(message, hint, Code.LIMIT)
 
 
 class CrashError(MracadError):
-    """Work that ended in the middle, or in an error that nobody expected."""
+    """Work that crashed, or ended in an unexpected error."""
 
     def __init__(self, message: str, hint: str = "") -> None:
         super().__init__(message, hint, Code.INTERNAL)

@@ -21,7 +21,7 @@ class Format:
     name : str
         As ``--format`` takes it.
     endings : tuple of str
-        In small letters, with the dot; the first is the usual one.
+        In lower case, with the dot; the first is the usual one.
     kind : {"exact", "mesh"}
         Exact formats are read and written, meshes only written.
     """
@@ -48,11 +48,11 @@ FORMATS = {
 }
 
 READABLE = frozenset(ending for format in FORMATS.values() if format.kind == "exact" for ending in format.endings)
-"""Endings of the files that can be read."""
+"""File extensions that can be read."""
 
 
 def by_ending(path: str | os.PathLike[str]) -> Format:
-    """The format that the ending of a file name means; raises FileError."""
+    """The format for the extension of a file name; raises FileError."""
     ending = PurePath(path).suffix.lower()
     for format in FORMATS.values():
         if ending in format.endings:
@@ -62,12 +62,12 @@ def by_ending(path: str | os.PathLike[str]) -> Format:
 
 
 def by_content(data: bytes, name: str) -> Format:
-    """The format of a file that was read, whatever it is called.
+    """The format of a file, by its content alone.
 
     Raises
     ------
     FileError
-        When it is empty, or none that can be read.
+        When the file is empty or in no format that can be read.
     """
     if not data.strip():
         raise FileError(f"'{name}' is empty", "export it again")
@@ -94,10 +94,10 @@ _LACKS = {
 
 
 def unheld(*schemas: str) -> dict[str, str]:
-    """What two documents cannot be compared by, and the format or schema that does not hold it.
+    """What cannot be compared between two documents, and the format or schema that does not hold it.
 
-    Two STEP or two IGES files are compared by everything.  A format that keeps a thing in a part of the cases only
-    (levels of IGES are numbers) counts as not holding it.
+    Two STEP or two IGES files are compared in full.  A format that holds something only in some cases (layers in IGES
+    are numbers) counts as not holding it.
     """
     if len(set(schemas)) == 1 and _LACKS.get(schemas[0]) != _GEOMETRY_ONLY:
         return {}

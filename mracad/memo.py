@@ -1,4 +1,4 @@
-"""Results that are kept: few of each kind, told apart by value, read-only, forgotten between the files of a batch."""
+"""Bounded caches: keyed by value, with read-only results, cleared between the files of a batch."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ _CACHES: list[Any] = []
 
 
 def kept(most: int) -> Callable[[Function], Function]:
-    """Decorate a function so that the last ``most`` of its results are kept.
+    """Decorate a function so that its last ``most`` results are cached.
 
-    Its arguments must be hashable and equal by value.  The arrays that a result holds are made read-only: whoever asks
-    next gets the same ones.
+    Its arguments must be hashable and compare by value.  Arrays in a result are made read-only, because the next caller
+    gets the same ones.
     """
 
     def wrap(function: Function) -> Function:
@@ -33,13 +33,13 @@ def kept(most: int) -> Callable[[Function], Function]:
 
 
 def clear() -> None:
-    """Forget everything."""
+    """Clear all caches."""
     for cache in _CACHES:
         cache.cache_clear()
 
 
 def _frozen(value: Any) -> Any:
-    """The value, whose arrays are read-only, those within tuples, lists and objects, too."""
+    """The value, with all arrays in it made read-only, also those within tuples, lists and objects."""
     if isinstance(value, np.ndarray):
         value.setflags(write=False)
     for part in value if isinstance(value, tuple | list) else getattr(value, "__dict__", {}).values():

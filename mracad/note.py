@@ -1,4 +1,4 @@
-"""What this process is at, told to the process that watches it: for the message should it crash or come to a limit."""
+"""The current activity of this process, for the error message should it crash or exceed a limit."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ import mmap
 
 
 class Note:
-    """A few words from a child to its parent, which remain when the child is lost.
+    """A short text from a child to its parent, which survives the child.
 
     Parameters
     ----------
     file : int
-        Descriptor of a file of a page that both have, where the child is no fork.
+        Descriptor of a shared file of one page, where the child is not a fork.
     """
 
     def __init__(self, file: int = -1) -> None:
@@ -42,25 +42,25 @@ def noting(note: Note) -> None:
 
 
 def doing(stage: str = "", subject: str = "") -> None:
-    """Note what this process is at, for the message should it crash or come to a limit.
+    """Note the current activity of this process, for the error message should it crash or exceed a limit.
 
     Parameters
     ----------
     stage : str
-        As ``"reading"``; by default what it was.
+        Such as ``"reading"``; by default unchanged.
     subject : str
-        The name of the model; by default what it was.
+        The name of the model; by default unchanged.
     """
     if _note:
         _note.write(stage or _note.stage, subject or _note.subject)
 
 
 def now() -> str:
-    """What this process is at, as ``" while reading 'part.step'"``; ``""`` where that is not known."""
+    """The current activity, such as ``" while reading 'part.step'"``; ``""`` if unknown."""
     return str(_note or "")
 
 
 def ending() -> None:
-    """Say that the outputs are taking their places now: the time limit does not cut that off."""
+    """Note that outputs are being moved into place: the time limit does not interrupt that."""
     if _note:
         _note.write(_note.stage, _note.subject, ending=True)

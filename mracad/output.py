@@ -15,17 +15,17 @@ from mracad import note
 from mracad.errors import FileError
 
 PREFIX = ".mracad-"
-"""How the names of temporary files begin; 32 hexadecimal digits and ``.part`` follow, as no other file has them."""
+"""Prefix of the names of temporary files; 32 hexadecimal digits and ``.part`` follow, as in no other file."""
 
-_ABANDONED = 60.0  # seconds: an unlocked temporary file of that age has no writer any more
+_ABANDONED = 60.0  # seconds: an unlocked temporary file of that age has lost its writer
 
 
 @contextlib.contextmanager
 def beside(target: str | os.PathLike, prefix: str = PREFIX) -> Iterator[Path]:
-    """A temporary path in the target's folder, which takes the target's place when the block ends well.
+    """A temporary path in the target's folder, which replaces the target when the block succeeds.
 
-    Nothing is left behind when it does not, unless the process is killed: then a file that :func:`temporary` knows.
-    It was locked while its writer lived; the next one to write into the folder, a minute later or more, removes it.
+    Nothing is left behind when it fails, unless the process is killed: then :func:`temporary` finds a file.
+    It was locked while its writer lived; the next writer into the folder removes it, once a minute has passed.
 
     Raises
     ------
@@ -55,18 +55,18 @@ def beside(target: str | os.PathLike, prefix: str = PREFIX) -> Iterator[Path]:
 
 
 def temporary(folder: Path, prefix: str = PREFIX) -> list[Path]:
-    """The temporary files in a folder, whether their writers live or not: told by their names."""
+    """The temporary files in a folder, by their names, whether their writers live or not."""
     return [p for p in folder.glob(f"{prefix}*") if re.fullmatch(r"[0-9a-f]{32}\.part", p.name[len(prefix) :])]
 
 
 def put_all(files: Mapping[str | os.PathLike, bytes], last: Callable[[], object] = bool, prefix: str = PREFIX) -> None:
-    """Write files whole; where one cannot be written, or ``last`` fails, none takes its place.
+    """Write files whole; if one cannot be written, or ``last`` fails, none is put in place.
 
     Parameters
     ----------
     files : mapping
     last : callable
-        Called when all are written and before the first takes its place.
+        Called when all are written and before the first is put in place.
 
     Raises
     ------
@@ -96,7 +96,7 @@ def put(data: bytes, target: str | os.PathLike | BinaryIO, prefix: str = PREFIX)
 
 
 def holds(path: Path, data: bytes) -> bool:
-    """Whether a file exists and has this content already."""
+    """Whether a file exists and already has this content."""
     try:
         return path.stat().st_size == len(data) and path.read_bytes() == data
     except OSError:
@@ -104,7 +104,7 @@ def holds(path: Path, data: bytes) -> bool:
 
 
 def _remove_abandoned(folder: Path, prefix: str) -> None:
-    """Remove the temporary files that killed writers left."""
+    """Remove temporary files left by killed writers."""
     for left in temporary(folder, prefix):
         with contextlib.suppress(OSError):
             if time.time() - left.stat().st_mtime > _ABANDONED:
@@ -123,7 +123,7 @@ def _lock(file: IO[bytes]) -> None:
 
 
 def _mode(path: Path) -> int:
-    """The permissions of the file that is replaced, or those that a new file gets."""
+    """The permissions of the file to be replaced, or of a new file."""
     if path.exists():
         return path.stat().st_mode & 0o777
     mask = os.umask(0)
@@ -133,7 +133,7 @@ def _mode(path: Path) -> int:
 
 @contextlib.contextmanager
 def _writing(path: Path) -> Iterator[None]:
-    """What goes wrong in the block as the error of a file that cannot be written."""
+    """Turn an OSError in the block into a FileError for a file that cannot be written."""
     try:
         yield
     except OSError as error:

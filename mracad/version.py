@@ -1,3 +1,3 @@
-"""Which version this is: what writes files says so in them."""
+"""The version of mracad, which is also written into files."""
 
 __version__ = "0.1.0"

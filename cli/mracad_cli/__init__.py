@@ -1,4 +1,4 @@
-"""The command line of mracad: one module a command in ``commands``."""
+"""The command line of mracad: one module per command in ``commands``."""
 
 import os
 

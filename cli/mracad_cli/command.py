@@ -1,4 +1,4 @@
-"""How a command is run: in a child process within its limits, what goes wrong as a MracadError."""
+"""Running a command in a child process within its limits; every failure becomes a MracadError."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from mracad.job.wire import internal
 
 
 class Command(click.Command):
-    """A command that a crash of the kernel, or a limit, does not end without a word."""
+    """A command that reports a crash of the kernel, or an exceeded limit, as an error."""
 
     guarded = True
 
@@ -35,7 +35,7 @@ class Command(click.Command):
 
 
 class Unguarded(Command):
-    """A command whose workers are its guard; its limits are theirs."""
+    """A command that does its work in worker processes, to which its limits apply."""
 
     guarded = False
 
@@ -48,16 +48,16 @@ class Group(click.Group):
 
 @contextlib.contextmanager
 def told(debug: bool | None) -> Iterator[None]:
-    """What goes wrong in the block as a MracadError; with ``debug`` as it is, where nobody expected it."""
+    """Turn exceptions in the block into MracadErrors; with ``debug`` unexpected ones are raised as they are."""
     try:
         yield
     except (MracadError, MemoryError, click.ClickException, click.exceptions.Exit):
-        raise  # a limit of memory is known to the guard
+        raise  # the guard reports memory limits
     except (KeyboardInterrupt, click.Abort):
         raise KeyboardInterrupt from None
     except BrokenPipeError as error:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # what is left of it goes nowhere
-        raise MracadError("the reader of standard output went away", "", Code.FILE) from error
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # discard the rest of the output
+        raise MracadError("standard output was closed", "", Code.FILE) from error
     except Exception as error:
         if debug:
             raise
@@ -69,7 +69,7 @@ def told(debug: bool | None) -> Iterator[None]:
 
 
 def run(group: click.Group, arguments: list[str], *, guarded: bool) -> int:
-    """Run a command of a group; its exit code, or what went wrong as a MracadError."""
+    """Run a command of a group; returns its exit code, and raises every failure as a MracadError."""
     try:
         with told("--debug" in arguments):
             code: Any = group.main(arguments, prog_name="mracad", standalone_mode=False, obj=guarded)

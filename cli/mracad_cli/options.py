@@ -27,7 +27,7 @@ METAVARS = {"faces": "SEL", "instance": "PATH", "hold": "SEL"}
 
 
 class Quantity(click.ParamType):
-    """A quantity: its value; a length stays a text, for it may be a share of the model."""
+    """A quantity, converted to its value; a length stays text, because it may be a share of the model."""
 
     def __init__(self, kind: Kind) -> None:
         self.kind, self.name = kind, SHORT.get(kind, "")
@@ -40,7 +40,7 @@ class Quantity(click.ParamType):
 
 
 class Declared(click.ParamType):
-    """A value of a field of a struct of options."""
+    """The value of a field of a struct of options."""
 
     def __init__(self, field: Field) -> None:
         self.field, self.name = field, "text"
@@ -52,15 +52,15 @@ class Declared(click.ParamType):
 def of(
     struct: type[Struct], name: str, without: str = "", arguments: Mapping[str, str] = MappingProxyType({})
 ) -> Callable[[Command], Command]:
-    """Add one option for each field of a struct, its own before the inherited ones; the command gets the struct.
+    """Add one option per field of a struct, its own fields before inherited ones; the command gets the struct.
 
     Parameters
     ----------
     struct : type
     name : str
-        Of the command's parameter.
+        Name of the command's parameter.
     without : str
-        Fields, between blanks, that get no option.
+        Fields that get no option, separated by blanks.
     arguments : mapping
         Placeholders of the fields that are arguments.
     """
@@ -84,7 +84,7 @@ def of(
 
 
 def gathered(name: str, kind: type, *options: Callable[[Command], Command]) -> Callable[[Command], Command]:
-    """Options that the command gets as one parameter: a dataclass whose fields have their names."""
+    """Options that the command gets as one parameter: a dataclass with a field for each."""
 
     def decorate(command: Command) -> Command:
         @functools.wraps(command)
@@ -108,7 +108,7 @@ def _option(field: Field) -> Callable[[Command], Command]:
     if metavar is None and not field.choices:
         metavar = {float: "FLOAT", int: "INTEGER"}.get(field.type, "TEXT")
     shown = default not in (None, (), "")
-    known: dict[str, Any] = {"required": True} if missing else {"default": default}  # a default of None is one
+    known: dict[str, Any] = {"required": True} if missing else {"default": default}  # a default of None counts
     return click.option(
         field.name, flag, help=field.help, metavar=metavar, multiple=field.many, type=kind, show_default=shown, **known
     )
@@ -151,7 +151,7 @@ class Writing:
 
 @dataclass(frozen=True)
 class Editing:
-    """What is written beside the models."""
+    """Files that are written beside the models."""
 
     report: str | None
     depfile: str | None
@@ -162,7 +162,7 @@ class Editing:
 
 @dataclass(frozen=True)
 class Reports:
-    """Where a verdict is written."""
+    """Files to which a verdict is written."""
 
     junit: str | None
     sarif: str | None
@@ -174,12 +174,12 @@ path = click.Path()
 input_unit = click.option(
     "--input-unit",
     metavar="UNIT",
-    help="Length unit of the file, if it states a wrong one: mm, m, in …",
+    help="Length unit of the file, if it states the wrong one: mm, m, in …",
 )
 encoding = click.option(
     "--encoding",
     metavar="NAME",
-    help="Character set of the texts in the file: utf-8, gb18030, cp932, latin-1 …  [default: UTF-8 if that fits, "
+    help="Character encoding of the file: utf-8, gb18030, cp932, latin-1 …  [default: UTF-8 if that fits, "
     "else the most likely one]",
 )
 schema = click.option(
@@ -199,7 +199,7 @@ verify = click.option(
     default="on",
     show_default=True,
     callback=lambda ctx, param, value: value == "on",
-    help="Read each output back and check it before it is put in place; off: write without checking.",
+    help="Read each output back and check it before it is put in place. off: write without checking.",
 )
 depfile = click.option("--depfile", metavar="F.d", type=path, help="Write what the outputs depend on, for make.")
 record = click.option(
@@ -230,7 +230,7 @@ writing = gathered(
         metavar="OUT",
         multiple=True,
         type=click.Path(allow_dash=True),
-        help="File to write; its ending says the format (" + " ".join(f.endings[0] for f in FORMATS.values()) + "); "
+        help=f"File to write; its extension gives the format ({' '.join(f.endings[0] for f in FORMATS.values())}); "
         "repeatable; - for standard output.",
     ),
     click.option(
@@ -238,7 +238,7 @@ writing = gathered(
         type=click.Choice(list(FORMATS)),
         default="step",
         show_default=True,
-        help="Format of what goes to standard output.",
+        help="Format of standard output.",
     ),
     schema,
     click.option(
@@ -246,14 +246,14 @@ writing = gathered(
         type=Quantity(LENGTH),
         default="0.02%",
         show_default=True,
-        help="Meshes: largest distance of triangles from the surface.",
+        help="Meshes: largest distance between triangles and surface.",
     ),
     click.option(
         "--angle",
         type=Quantity(ANGLE),
         default=12.0,
         show_default=True,
-        help="Meshes: largest turn along a triangle's edge.",
+        help="Meshes: largest turn of the normal along a triangle's edge (degrees).",
     ),
     click.option("--ascii", "ascii_stl", is_flag=True, help="STL: write text instead of binary."),
     verify,
@@ -265,7 +265,7 @@ editing = gathered(
     Editing,
     click.option("--report", metavar="F.json", type=path, help="Write the full report (JSON) to a file."),
     depfile,
-    click.option("--dry-run", is_flag=True, help="Say what would be done; write nothing but the report."),
+    click.option("--dry-run", is_flag=True, help="Report what would be done; write nothing but the report."),
 )
 reports = gathered(
     "reports",
@@ -277,7 +277,7 @@ reports = gathered(
 
 
 def _kept(ctx: click.Context, param: click.Parameter, value: Any) -> None:
-    """Keep what decides how the command is run (see :mod:`mracad_cli.command`)."""
+    """Keep an option that controls how the command is run (see :mod:`mracad_cli.command`)."""
     ctx.meta[f"mracad.{param.name}"] = value
 
 
@@ -291,7 +291,7 @@ printing = apply(
         type=Quantity(TIME),
         expose_value=False,
         callback=_kept,
-        help="Time limit of the command: 90s, 10min. Exit code 5 beyond it.",
+        help="Time limit of the command: 90s, 10min. Exit code 5 when exceeded.",
     ),
     click.option(
         "--memory-limit",

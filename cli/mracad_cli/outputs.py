@@ -29,7 +29,7 @@ def load(source: str) -> Text:
 
 
 def read(reading: Reading, text: Text | None = None) -> Document:
-    """Read a model, from its ``text`` where that is there already; say what is lost on the way."""
+    """Read a model, from ``text`` if it is loaded already; print warnings."""
     from mracad.occ.files import read as read_file
 
     text = text or load(reading.file)
@@ -41,14 +41,14 @@ def read(reading: Reading, text: Text | None = None) -> Document:
 
 
 def check_outputs(writing: Writing, beside: Iterable[str | None] = (), *, needed: bool = True) -> list[Target]:
-    """How each output is written; refuses those that could not be, and texts beside them that could not.
+    """The outputs to write; refuses outputs, and files ``beside`` them, that could not be written.
 
     Raises
     ------
     UsageError
-        Where none is named though one is ``needed``, or a file is named twice or exists.
+        When none is named although one is ``needed``, or a file is named twice or exists.
     FileError
-        For an unknown ending, or a folder that cannot be written to.
+        For an unknown file extension, or a folder that cannot be written to.
     """
     from mracad.job.produce import Target
 
@@ -89,16 +89,16 @@ def check_target(path: Path, overwrite: bool) -> None:
 
 
 def deliver(files: Mapping[str, str | bytes | None], lines: Iterable[str], *, stream: bytes | None = None) -> None:
-    """End a command: print what it says, and let its files take their places; all of this or nothing.
+    """End a command: print its lines and put its files in place; all of this or nothing.
 
     Parameters
     ----------
     files : mapping
-        Contents by path; texts are written as UTF-8, what is None is left out.
+        Contents by path; texts are written as UTF-8, None is skipped.
     lines : iterable of str
-        What is printed.
+        The lines to print.
     stream : bytes, optional
-        A model for standard output; the lines go to standard error then.
+        A model for standard output; the lines then go to standard error.
 
     Raises
     ------
@@ -122,7 +122,7 @@ def deliver(files: Mapping[str, str | bytes | None], lines: Iterable[str], *, st
 def deliver_models(
     writing: Writing, made: Sequence[Made], files: Mapping[str, str | None], lines: Iterable[str]
 ) -> None:
-    """End a command that made models, one for each output or none: like :func:`deliver`."""
+    """End a command that made models, one for each output or none; see :func:`deliver`."""
     from mracad.output import holds
 
     for each in made:
@@ -135,7 +135,7 @@ def deliver_models(
 
 
 def deliver_verdict(judged: Judged, command: str, reports: Reports) -> int:
-    """End a command that judges: print the verdict, write its reports; the exit code."""
+    """End a command that judges: print the verdict, write its reports; returns the exit code."""
     from mracad_cli.render import json, junit, sarif, text
 
     found = judged.verdict, judged.failed
@@ -146,7 +146,7 @@ def deliver_verdict(judged: Judged, command: str, reports: Reports) -> int:
 
 
 def depfile_text(outputs: Iterable[str], inputs: Iterable[str]) -> str:
-    """A rule for make: what the outputs depend on; and one for each input, so that make bears with its absence."""
+    """A make rule with what the outputs depend on, and an empty rule per input, so that make accepts a missing one."""
     targets, needs = ([_for_make(path) for path in paths if path != "-"] for paths in (outputs, inputs))
     return f"{' '.join(targets)}: {' '.join(needs)}\n" + "".join(f"\n{need}:\n" for need in needs)
 

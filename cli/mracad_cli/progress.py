@@ -19,7 +19,7 @@ class Progress:
     Parameters
     ----------
     rate : bool
-        Show how many steps are done a second, and the time that is left; from the beginning.
+        Show steps per second and the remaining time, and show the bar at once.
     """
 
     def __init__(self, rate: bool = False) -> None:

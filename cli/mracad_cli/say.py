@@ -12,7 +12,7 @@ _CONTROL = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029]")
 
 
 def printable(line: str) -> str:
-    """A line for a terminal: control characters, which names may hold, are spelled as in JSON (``\\u001b``)."""
+    """A line for a terminal, with control characters (names may hold them) written as in JSON (``\\u001b``)."""
     return _CONTROL.sub(lambda match: f"\\u{ord(match[0]):04x}", line)
 
 
@@ -23,7 +23,7 @@ def say(*lines: str, file: TextIO | None = None) -> None:
 
 
 def json_text(value: Any, indent: int | None = None) -> str:
-    """JSON that any reader takes: what is not finite is null, signs that cannot be written as they are, escaped."""
+    """JSON that any parser accepts: null for numbers that are not finite, escapes for text that UTF-8 cannot hold."""
     body = _finite(value)
     text = json.dumps(body, indent=indent, ensure_ascii=False)
     try:

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 def edits() -> list[str]:
-    """The edits among the steps: each is a command, too."""
+    """Names of the edits among the steps; each is also a command."""
     return [use for use, struct in STEPS.items() if issubclass(struct, Selection)]
 
 
@@ -81,7 +81,7 @@ def run_steps(
 def produced(
     reading: Reading, writing: Writing, targets: Sequence[Target], steps: Sequence[Step], title: str
 ) -> tuple[Document, Production]:
-    """A document, read, and what came of it."""
+    """Read a document and take it through steps; returns the document and what was produced from it."""
     with Progress() as progress:
         progress("reading", 0, 1)
         text = load(reading.file)
@@ -101,7 +101,7 @@ def produced(
 
 
 def _lines(steps: Sequence[Step], done: Production, recipe: Recipe | None, seconds: float | None) -> list[str]:
-    """What is said of steps; ``seconds`` is None for a dry run."""
+    """The lines to print after steps; ``seconds`` is None for a dry run."""
     from mracad_cli.render import text
 
     end = f"wrote {text.sizes(done.made)}" if done.made else "dry run, nothing written"
@@ -115,7 +115,7 @@ def _lines(steps: Sequence[Step], done: Production, recipe: Recipe | None, secon
 
 
 def _body(name: str, steps: Sequence[Step], done: Production, recipe: Recipe | None) -> dict[str, Any]:
-    """The full report: that of an edit, or with a recipe that of each step."""
+    """The full report: of the edit, or with a recipe of each step."""
     from mracad_cli.render import json
 
     each = list(zip(steps, done.results, strict=False))
@@ -127,7 +127,7 @@ def _body(name: str, steps: Sequence[Step], done: Production, recipe: Recipe | N
 
 
 def plan(steps: Sequence[Step]) -> list[str]:
-    """What would be done, a line for each step."""
+    """What would be done, one line per step."""
     return [f"{i}. {step.id}: {step.text()}" for i, step in enumerate(steps, 1)]
 
 

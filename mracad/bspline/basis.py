@@ -10,11 +10,11 @@ from mracad.bspline.knots import Array, KnotVector, Side
 from mracad.memo import kept
 
 SHORT = 64
-"""Most parameters for which values are cached."""
+"""Largest number of parameters for which values are cached."""
 
 
 def basis(kv: KnotVector, x: Array, derivative: int = 0, side: Side = "right") -> tuple[Array, Array]:
-    """The functions that are not zero at ``x``, or their derivatives.
+    """Values of the functions that do not vanish at ``x``, or of their derivatives.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ def basis(kv: KnotVector, x: Array, derivative: int = 0, side: Side = "right") -
 
 
 def jet(kv: KnotVector, x: Array, orders: Sequence[int], side: Side = "right") -> tuple[Array, Array]:
-    """As :func:`basis` for derivatives of several orders at once; values ``(q, len(orders), d + 1)``."""
+    """The same as :func:`basis` for several orders of derivatives at once; values ``(q, len(orders), d + 1)``."""
     at = np.atleast_1d(np.asarray(x, dtype=float))
     if at.ndim == 1 and len(at) <= SHORT:
         return _remembered(kv, at.tobytes(), tuple(orders), side)
@@ -51,7 +51,8 @@ def jet(kv: KnotVector, x: Array, orders: Sequence[int], side: Side = "right") -
 
 @kept(4096)
 def _remembered(kv: KnotVector, at: bytes, orders: tuple[int, ...], side: Side) -> tuple[Array, Array]:
-    """Values at a few parameters are often needed again, as at the samples of a seam before and after an edit."""
+    """Cached values at few parameters, which are often needed again: at the samples of seams before and after an
+    edit."""
     return _computed(kv, np.frombuffer(at), orders, side)
 
 
@@ -64,7 +65,7 @@ def local_values(kv: KnotVector, span: Array, offset: Array, derivative: int = 0
     """Values of functions ``span - d … span`` at ``t_span + offset``, ``(d + 1, q)``.
 
     ``offset`` has shape ``(q,)``, or ``(d - derivative, q)`` for the polar form (blossom) of the functions' polynomial
-    pieces on the span, one argument a row.
+    pieces on the span, with one argument per row.
     """
     return _local(kv, span, offset, (derivative,))[0]
 

@@ -13,8 +13,8 @@ from mracad.bspline.surface import Net
 
 Array = np.ndarray
 _STEPS = 30
-_SEEDS = 3  # from the nearest alone, a point near a thin edge may end on its wrong side
-_PLACES = 100  # at least, in each direction
+_SEEDS = 3  # with one, a point near a thin edge may end on the wrong side of it
+_PLACES = 100  # least number of places in each direction
 
 
 def distances(net: Net, points: Array) -> Array:
@@ -49,7 +49,7 @@ def feet(net: Net, points: Array, uv: Array) -> tuple[Array, Array]:
     net : Net
     points : ndarray (q, 3)
     uv : ndarray (q, 2)
-        Where to begin.
+        Initial parameters.
 
     Returns
     -------
@@ -65,7 +65,7 @@ def feet(net: Net, points: Array, uv: Array) -> tuple[Array, Array]:
 
 
 def _limits(net: Net) -> tuple[Array, Array]:
-    """Least and largest parameters; infinite where there are none."""
+    """Smallest and largest parameters; infinite where there are no limits."""
     low, high = np.array([net.u.domain, net.v.domain]).T
     periodic = np.array([net.u.periodic, net.v.periodic])
     return np.where(periodic, -np.inf, low), np.where(periodic, np.inf, high)

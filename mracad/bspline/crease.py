@@ -24,7 +24,7 @@ def crease_lines(net: Net, axis: int, visible: Array) -> frozenset[float]:
     axis : int
         0 for lines u = const, 1 for v = const.
     visible : ndarray of bool (nu, nv)
-        Control points that some face depends on; a line counts only where one of those on it is visible.
+        Control points on which some face depends; a line counts only if one of the points on it is visible.
     """
     knots, other = (net.u, net.v)[axis], (net.u, net.v)[1 - axis]
     lines, across = knots.full, other.greville()

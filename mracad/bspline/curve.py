@@ -18,7 +18,7 @@ from mracad.errors import UsageError
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """A NURBS curve; two are equal when all their numbers are.
+    """A NURBS curve; two curves are equal if all their numbers are.
 
     Attributes
     ----------
@@ -26,7 +26,7 @@ class Curve:
     poles : ndarray (n, k)
         Euclidean control points.
     weights : ndarray (n,) or None
-        None where the curve is polynomial.
+        None for a polynomial curve.
     """
 
     knots: KnotVector
@@ -66,7 +66,7 @@ class Curve:
         return np.array(stack) if self.weights is None else _curve_quotient(np.array(stack))
 
     def refined(self, extra_knots: Array | Sequence[float]) -> Curve:
-        """The same curve with more knots, exactly; itself when there is nothing to insert."""
+        """The same curve with more knots, exactly; itself if there are none to insert."""
         fine = self.knots.refined(extra_knots)
         return self if fine == self.knots else self.over(fine)
 
@@ -97,7 +97,8 @@ class Curve:
 
 
 def bezier_pieces(curves: Sequence[Curve]) -> Iterator[tuple[Array, Array]]:
-    """Homogeneous Bézier points ``(q, d + 1, k + 1)`` of curves and whose they are ``(q,)``, by degree."""
+    """Homogeneous Bézier points ``(q, d + 1, k + 1)`` of curves, and the index of each one's curve ``(q,)``, by
+    degree."""
     by_degree: dict[int, list[tuple[Array, Array]]] = defaultdict(list)
     for i, curve in enumerate(curves):
         points = curve.bezier()
@@ -117,7 +118,7 @@ def check_weights(weights: Array | None, shape: tuple[int, ...]) -> None:
 
 
 def homogeneous(poles: Array, weights: Array | None) -> Array:
-    """``(w P, w)``, or the control points themselves."""
+    """``(w P, w)``, or the control points themselves without weights."""
     if weights is None:
         return poles
     return np.concatenate([poles * weights[..., None], weights[..., None]], axis=-1)

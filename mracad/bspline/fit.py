@@ -14,16 +14,16 @@ from mracad.bspline.surface import Net, pairs
 from mracad.memo import kept
 
 Knots = tuple[KnotVector, KnotVector]
-"""In u and v."""
+"""Knots in u and v."""
 
 Sites = Sequence[tuple[Array, Array]]
 """For each direction: parameters, and the spans that contain them."""
 
 SPARE = 1.5
-"""Spans at most this many times as wide as necessary are not divided."""
+"""Factor on the necessary width up to which spans are not divided."""
 
 ROUNDS, PIECES = 5, 6
-"""Times that spans are divided, and the most pieces each time."""
+"""How often spans are divided, and the largest number of pieces each time."""
 
 
 def interpolated(u: KnotVector, v: KnotVector, values: Array) -> Array:
@@ -78,7 +78,7 @@ def missing(
     net, delta : Net
         The surface, and offsets over it.
     sites : Sites
-        Where they are compared.
+        Places at which they are compared.
     ideal : callable
         The displacement ``(q, 3)`` at parameters.
     limit : float
@@ -95,7 +95,7 @@ def missing(
 
 
 def spans(kv: KnotVector, x: Array) -> Array:
-    """The spans that parameters lie in."""
+    """Indices of the spans in which parameters lie."""
     return np.clip(np.searchsorted(kv.breaks, x, side="right") - 1, 0, kv.spans - 1)
 
 

@@ -13,7 +13,7 @@ from mracad.bspline.surface import Net, surface_quotient
 Array = np.ndarray
 
 ORDERS = ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))
-"""Orders of the derivatives along u and v, in the order in which they are given."""
+"""Orders of the derivatives along u and v, in the order of results."""
 
 
 def functions(
@@ -24,7 +24,7 @@ def functions(
     Parameters
     ----------
     net : Net
-        Its control points do not matter.
+        A surface; its control points do not matter.
     uv : ndarray (q, 2)
     derivatives : {0, 1, 2}
     side : pair of {"right", "left"}
@@ -33,7 +33,7 @@ def functions(
     Returns
     -------
     index : ndarray (q, k) of int
-        Their control points in row-major order.
+        Indices of their control points in row-major order.
     table : list of ndarray (q, k)
         Values; values, ∂u and ∂v; or those and ∂uu, ∂uv, ∂vv.
     """

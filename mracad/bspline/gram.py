@@ -70,7 +70,7 @@ def gram(kv: KnotVector, derivative: int = 0, weights: Array | None = None) -> G
     """Gram matrix of the basis, or of its derivatives.
 
     ``G_ij = ∫ N_i^(k) N_j^(k) w dt`` over the domain, ``k`` the derivative, by Gauss–Legendre quadrature with ``d + 1``
-    points a span (exact).
+    points per span (exact).
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ def gram(kv: KnotVector, derivative: int = 0, weights: Array | None = None) -> G
 
 @kept(512)
 def _remembered(kv: KnotVector, derivative: int) -> Gram:
-    """Surfaces often share their knots."""
+    """Cached, because surfaces often share their knots."""
     return _computed(kv, derivative, np.ones(kv.spans))
 
 
@@ -103,7 +103,7 @@ def _computed(kv: KnotVector, derivative: int, weights: Array) -> Gram:
 
 
 def checked_weights(kv: KnotVector, weights: Array) -> Array:
-    """The weights as an array with one positive entry a span."""
+    """The weights as an array with one positive entry per span."""
     weights = np.asarray(weights, dtype=float)
     if weights.shape != (kv.spans,):
         raise UsageError(f"{weights.size} weights for {kv.spans} spans")

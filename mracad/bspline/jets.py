@@ -14,7 +14,7 @@ from mracad.bspline.surface import Net
 Array = np.ndarray
 
 ORDERS = ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2), (3, 0), (2, 1), (1, 2), (0, 3))
-"""Orders of the derivatives along u and v, in the order in which they are given."""
+"""Orders of the derivatives along u and v, in the order of results."""
 
 
 _BLOCK = 8192
@@ -31,7 +31,7 @@ def jets(net: Net, u: Array, v: Array, mask: Array, centre: Array, most: int = 3
         Parameters; each piece lies in one knot span.
     mask : ndarray of bool (u.size, v.size)
     centre : ndarray (3,)
-        Points are given relative to it: numbers near 0 keep more digits.
+        Origin of the results: numbers near 0 keep more digits.
     most : {1, 2, 3}
         Highest order.
 
@@ -44,7 +44,7 @@ def jets(net: Net, u: Array, v: Array, mask: Array, centre: Array, most: int = 3
 
 
 def blocks(net: Net, u: Array, v: Array, mask: Array, centre: Array, most: int = 3) -> Iterator[Array]:
-    """As :func:`jets`, some points at a time."""
+    """The same as :func:`jets`, in blocks of points."""
     poles = net.poles - centre
     if net.weights is not None:
         poles = np.concatenate([poles * net.weights[..., None], net.weights[..., None]], axis=2)

@@ -22,7 +22,7 @@ class KnotVector:
     Parameters
     ----------
     knots : array_like
-        Flat, non-decreasing, knots repeated as often as their multiplicity.  The domain is ``[t_d, t_n]`` with
+        Flat and non-decreasing, with knots repeated by their multiplicity.  The domain is ``[t_d, t_n]`` with
         ``n = len(knots) - d - 1``; knots beyond it only shape the first and last functions (unclamped ends).
         A periodic vector is laid out as by OCCT's ``BSplCLib::KnotSequence``: with ``m`` the multiplicity of the
         end knot it holds ``count + (d + 1 - m) + d + 1`` knots, and extended function ``i`` belongs to control point
@@ -40,7 +40,7 @@ class KnotVector:
     breaks : ndarray (s + 1,)
         Distinct knots within the domain, ends included.
     multiplicities : ndarray (s + 1,) of int
-        Of each break.  For a periodic vector the last entry repeats the first.
+        Multiplicity of each break.  For a periodic vector the last entry repeats the first.
     count : int
         Dimension of the space, the number of control points.
 
@@ -202,7 +202,7 @@ class KnotVector:
         return span, x - self.knots[span]
 
     def refined(self, extra_knots: Array | Sequence[float]) -> KnotVector:
-        """This vector with more knots (repeated as often as they are to be inserted).
+        """This vector with more knots (repeated by the number of times that they are inserted).
 
         Raises
         ------
@@ -232,9 +232,9 @@ class KnotVector:
         return np.repeat(self.breaks[1:-1], (self.multiplicities - there)[1:-1])
 
     def elevated(self, degree: int) -> KnotVector:
-        """The least vector of that degree whose splines include all of this one's; itself if its degree suffices.
+        """The smallest vector of that degree whose splines include all of this one's; itself if its degree suffices.
 
-        Every knot is repeated as many times more as the degree grows; unclamped ends become clamped ones.
+        The multiplicity of every knot grows by as much as the degree; unclamped ends become clamped.
         """
         more = degree - self.degree
         if more <= 0:
@@ -247,7 +247,7 @@ class KnotVector:
     def with_multiplicities(self, mults: Array) -> KnotVector:
         """This vector with the multiplicities of its breaks replaced; 0 removes a break.
 
-        The ends of a non-periodic vector stay as they are, whatever ``mults`` says.
+        The ends of a non-periodic vector do not change, whatever ``mults`` contains.
         """
         counts = np.array(mults, dtype=int)
         if counts.shape != self.multiplicities.shape:
@@ -261,13 +261,13 @@ class KnotVector:
         return KnotVector(np.concatenate([before, inner, after]), self.degree)
 
     def without(self, breaks: Array | Sequence[float]) -> KnotVector:
-        """This vector with the given interior breaks removed altogether."""
+        """This vector with the given interior breaks removed completely."""
         gone = np.isin(self.breaks, np.asarray(breaks, dtype=float))
         gone[[0, -1]] = False
         return self.with_multiplicities(np.where(gone, 0, self.multiplicities))
 
     def closed(self) -> tuple[KnotVector, tuple[int, int]]:
-        """The clamped vector over the whole support of the functions, and how many of its functions are extra.
+        """The clamped vector over the whole support of the functions, and the number of its extra functions.
 
         Returns
         -------

@@ -12,7 +12,7 @@ from mracad.memo import kept
 
 
 def is_nested(coarse: KnotVector, fine: KnotVector) -> bool:
-    """Whether every spline of ``coarse`` is one of ``fine``: same domain, no lower degree, no knot smoother."""
+    """Whether every spline of ``coarse`` is one of ``fine``: same domain, degree no lower, no knot smoother."""
     more = fine.degree - coarse.degree
     if more < 0 or (coarse.periodic, coarse.domain) != (fine.periodic, fine.domain):
         return False
@@ -28,10 +28,10 @@ def refinement(coarse: KnotVector, fine: KnotVector) -> Rows:
     """The matrix P that takes control points over ``coarse`` to those of the same spline over ``fine``.
 
     ``P[i, j]`` is the blossom of coarse function ``j`` at ``t_{i+1}, …, t_{i+d}`` on a piece where fine function ``i``
-    lives.  The arguments enter the recursion in an order in which every term is non-negative, so entries are exact to
-    rounding, non-negative, and rows sum to 1.  The ends may differ: a clamped vector refines an unclamped one.  Where
-    the degree is higher by one, the blossom is the mean of those with one argument left out; higher still, step by
-    step.
+    is non-zero.  The arguments enter the recursion in an order in which every term is non-negative, so entries are
+    exact to rounding and non-negative, and rows sum to 1.  The ends may differ: a clamped vector refines an unclamped
+    one.  If the degree is higher by one, the blossom is the mean of those with one argument left out; still higher
+    degrees are reached step by step.
 
     Returns
     -------

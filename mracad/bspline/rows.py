@@ -25,7 +25,7 @@ class Rows:
     start : ndarray (r,) of int
         First column of each row's run.
     values : ndarray (r, w)
-        The run; padded with zeros where it is shorter.
+        The runs, padded with zeros where shorter.
     columns : int
         Number of columns.
     periodic : bool
@@ -39,7 +39,7 @@ class Rows:
 
     @classmethod
     def from_coo(cls, row: Array, column: Array, value: Array, shape: tuple[int, int]) -> Rows:
-        """The matrix with the given entries, each place at most once."""
+        """The matrix with the given entries, each position at most once."""
         first, last = np.full(shape[0], shape[1]), np.full(shape[0], -1)
         np.minimum.at(first, row, column)
         np.maximum.at(last, row, column)
@@ -122,7 +122,7 @@ class Rows:
 
     @cached_property
     def _groups(self) -> tuple[Array, Array]:
-        """Rows sorted by their first column (modulo the columns), and where a new first column begins."""
+        """Rows sorted by their first column (modulo the columns), and the positions where a new first column begins."""
         key = self.index[:, 0]
         order = np.argsort(key, kind="stable")
         return order, np.flatnonzero(np.diff(key[order], prepend=-1))

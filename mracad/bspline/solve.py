@@ -1,4 +1,4 @@
-"""Direct solution of square banded systems: one pivoted LU, factored once, for all of them."""
+"""Direct solution of square banded systems by one pivoted LU factorisation."""
 
 from __future__ import annotations
 

@@ -31,7 +31,7 @@ class Net:
     poles : ndarray (nu, nv, k)
         Euclidean control points.
     weights : ndarray (nu, nv) or None
-        None where the surface is polynomial.
+        None for a polynomial surface.
     """
 
     u: KnotVector
@@ -47,7 +47,7 @@ class Net:
         check_weights(self.weights, self.poles.shape[:2])
 
     def with_poles(self, poles: Array) -> Net:
-        """Other control points over the same knots, with the same weights."""
+        """The net with other control points over the same knots, with the same weights."""
         return Net(self.u, self.v, poles, self.weights)
 
     @overload
@@ -162,7 +162,7 @@ class Net:
         return float(np.linalg.norm(high - low))
 
     def _limits(self, uv: Array, side: tuple[Side, Side]) -> Array:
-        """Directions of the normal next to ``uv`` on the way to the middle of the domain."""
+        """Directions of the normal near ``uv``, towards the middle of the domain."""
         low, high = np.array([self.u.domain, self.v.domain]).T
         inward = (np.clip(uv, low, high) - 0.5 * (low + high)) * -1.0
         inward = np.where(inward == 0, high - low, inward)
@@ -179,7 +179,7 @@ class Net:
         return np.asarray(normal)
 
     def refined(self, u_knots: Array | Sequence[float], v_knots: Array | Sequence[float]) -> Net:
-        """The same surface with more knots, exactly; itself when there is nothing to insert."""
+        """The same surface with more knots, exactly; itself if there are none to insert."""
         return self.over(self.u.refined(u_knots), self.v.refined(v_knots))
 
     def over(self, u: KnotVector, v: KnotVector) -> Net:
@@ -195,7 +195,7 @@ class Net:
 
 
 def pairs(us: ArrayLike, vs: ArrayLike) -> Array:
-    """All pairs of parameters ``(m n, 2)``, those of v fastest."""
+    """All pairs of parameters ``(m n, 2)``, with v varying fastest."""
     return np.stack(np.meshgrid(us, vs, indexing="ij"), axis=-1).reshape(-1, 2)
 
 
@@ -214,7 +214,7 @@ def curvature(derivatives: tuple[Array, ...], direction: Array) -> Array:
     Returns
     -------
     ndarray (q,)
-        One over the unit of length; NaN where the surface is degenerate.
+        Curvatures, in one over the unit of length; NaN where the surface is degenerate.
     """
     su, sv, suu, suv, svv = derivatives
     e, f, g, p, q = ((x * y).sum(axis=1) for x, y in ((su, su), (su, sv), (sv, sv), (su, direction), (sv, direction)))

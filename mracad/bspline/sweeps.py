@@ -69,8 +69,8 @@ def solve(triangles: tuple[Rows, Rows, Array, Array], columns: Array, b: Array, 
 def _lines(c: Array, axis: int) -> _Lines:
     """Memory of the array from its first value on, and its layout; ``axis`` is not negative.
 
-    The axes before ``axis`` must lie in memory as one, and those after it densely, as in any part of an array along
-    one axis; what does not is copied.
+    The axes before ``axis`` must be contiguous in memory, and those after it dense, as in any slice of an array along
+    one axis; other arrays are copied.
     """
     lines = c.reshape(int(np.prod(c.shape[:axis])), c.shape[axis], int(np.prod(c.shape[axis + 1 :])))
     steps = [step // c.itemsize for step in lines.strides]
@@ -82,7 +82,7 @@ def _lines(c: Array, axis: int) -> _Lines:
 
 
 def _target(out: Array, axis: int) -> _Lines:
-    """The same for an array to be written to."""
+    """Memory and layout of an array to be written to, which must not be copied."""
     flat, layout = _lines(out, axis)
     if not np.may_share_memory(flat, out):
         raise ValueError("results cannot be written to an array of this layout")
@@ -97,7 +97,7 @@ def _padded(values: Array) -> tuple[Array, Array]:
 
 
 def _window(triangle: Rows, before: bool) -> tuple[Array, Array]:
-    """A strict triangle, negative, as taps on the ``w`` rows just before (or after) each row, and where they begin (or
+    """A strict triangle, negated, as taps on the ``w`` rows just before (or after) each row, and where they begin (or
     end).
 
     The taps of row ``i`` multiply rows ``i − w … i − 1``, or ``i + 1 … i + w``.

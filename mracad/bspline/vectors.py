@@ -1,4 +1,4 @@
-"""Vectors in space, many at once."""
+"""Operations on arrays of vectors."""
 
 from __future__ import annotations
 

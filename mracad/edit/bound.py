@@ -1,7 +1,8 @@
 """The largest scale at which smoothing stays within a bound of the deviation.
 
-The deviation grows with the scale: how, is told by filters of the control points of each surface alone, whose modes are
-known.  Solving the problem of joined surfaces at a scale or two, without judging it, tells by which factor it differs.
+The deviation grows with the scale.  Filters of the control points of each surface alone, whose modes are known, tell
+how fast.  Solving the problem of joined surfaces at one or two scales, without judging it, gives the factor between the
+two.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ from mracad.wavelet.project import at_scale
 Array = np.ndarray
 
 LOOKS = 2
-"""Most scales at which the problem is solved."""
+"""Largest number of scales at which the problem is solved."""
 
 NEAR, AIM = 0.95, 0.98
 """Least share of the bound that a result must reach, and the share that is aimed at."""
@@ -38,10 +39,10 @@ CLOSE = 0.97
 """Least share that is near enough before the result is judged."""
 
 POINTS = 8
-"""Steps from one Greville point to the next at which deviations are looked at."""
+"""Steps from one Greville point to the next at which deviations are measured."""
 
 STEPS, BEYOND = 8, 4.0
-"""Scales in every octave at which control points are filtered, up to so many times the bound."""
+"""Number of scales per octave at which control points are filtered, and the largest deviation over the bound."""
 
 
 def widest(
@@ -54,7 +55,7 @@ def widest(
 ) -> Edit:
     """The edit at the largest scale at which no face deviates by more than allowed.
 
-    Where the judge takes back so much of it that it stays clear of the bound, one larger scale is tried.
+    Where the judge scales it back so far that it stays well below the bound, one larger scale is tried.
 
     Parameters
     ----------
@@ -65,7 +66,7 @@ def widest(
         Whether wavelengths follow the radii of curvature.
     wishes : Wishes
     allowed : Tolerances
-        Its ``deviation`` is the bound.
+        Its ``deviation`` is the bound, mm.
     edit : callable
         The edit at a scale, mm.
 
@@ -124,7 +125,7 @@ def _filtered(net: Net, axes: Sequence[Axis], scale: float) -> float:
 
 
 def _at(curve: Array, deviation: float, known: Mapping[float, float]) -> float:
-    """The scale at which a curve reaches a deviation, its end if it does not; some deviations are known."""
+    """The scale at which a curve reaches a deviation, or its last scale; ``known`` deviations by scale correct it."""
     scales, deviations = curve
     if known:
         places = sorted(known)

@@ -28,13 +28,13 @@ from mracad.seam.trimmed import TrimmedSeam
 Array = np.ndarray
 
 ROUNDS = 4
-"""Most times that a group is solved."""
+"""Largest number of times that a group is solved."""
 
 LEAST = 0.25
 """A surface with a smaller allowed amount is left, so that the others can do more."""
 
 LASTING = 20_000
-"""Most control points of joined surfaces for which what is measured closely is kept: some kilobytes each."""
+"""Largest number of control points of joined surfaces for which close measurements are kept: some kilobytes each."""
 
 FIRST = 2
 """Number of surfaces in a group that succeed alone before all are tried together, ahead of the rest alone."""
@@ -43,15 +43,15 @@ PRICE = 0.05
 """Share of the wanted change that doubling the control points of a surface must add to be worth it."""
 
 CANDIDATES = 3
-"""Most displacements that are judged closely after a first look."""
+"""Largest number of displacements that are judged closely after a first look."""
 
 BLENDS, PROMISE = 2, 1.05
-"""Most times that the best displacements of joined surfaces are put together, and the factor by which that, or what is
-done to each alone, has to come nearer to the target."""
+"""How often the best displacements of joined surfaces are combined at most, and the factor by which the combination, or
+the result of each alone, has to come nearer to the target."""
 
 
 def drive(scene: Scene, wish: Wish, progress: Callable[[int, int], None] | None = None) -> Result:
-    """Do as much of a wish as the judge allows."""
+    """Carry out a wish as far as the judge allows; ``progress`` gets the surfaces done and the surfaces in all."""
     tell = progress or (lambda done, total: None)
     result: dict[int, Moved] = {}
     exact: list[Seam] = []
@@ -77,7 +77,7 @@ def drive(scene: Scene, wish: Wish, progress: Callable[[int, int], None] | None 
 
 
 def _dropped(wanted: Joints, used: Joints, result: Mapping[int, Moved]) -> dict[int, Cause]:
-    """Edges that could have moved and do not, and why."""
+    """Edges that could have moved and did not, and why."""
     dropped: dict[int, Cause] = {}
     every: list[Seam | TrimmedSeam] = [*wanted.exact, *wanted.loose]
     for seam in every:
@@ -92,7 +92,7 @@ def _alone(
 ) -> tuple[dict[int, Moved], dict[tuple[int, ...], dict[int, Moved]]]:
     """Results for joined surfaces, each edited alone; only for the first few if all succeed together.
 
-    For none if they need not get fairer: between held neighbours they could hardly move at all.
+    There are none if surfaces need not get fairer: between held neighbours they could hardly move at all.
     """
     if not scene.tolerances.fairer:
         return {}, {}
@@ -110,20 +110,20 @@ def _alone(
 
 
 def _finer(scene: Scene, group: Iterable[int], alone: Mapping[int, Moved]) -> set[int]:
-    """Surfaces for which more control points pay, as far as that is known; the unknown ones too, if it does for any or
-    nothing is known."""
+    """Surfaces for which more control points pay, as far as known.  Surfaces not yet tried are included if that holds
+    for any other, or if none was tried."""
     known = {i for i, moved in alone.items() if moved.finer}
     more = scene.refine and (known or not alone)
     return {i for i in group if i in known or (more and i not in alone)}
 
 
 def _through(moved: Mapping[int, Moved]) -> bool:
-    """Whether all surfaces may make the whole wanted change."""
+    """Whether all surfaces are allowed the whole wanted change."""
     return all(each.amount > ENOUGH for each in moved.values())
 
 
 def _less(together: Mapping[int, Moved], alone: Mapping[int, Moved]) -> bool:
-    """Whether surfaces come clearly less near to the target together than alone, where that is known.
+    """Whether surfaces come clearly less near to the target together than alone, as far as that is known.
 
     Shares are compared, because their target together may differ from their targets alone.
     """
@@ -221,8 +221,8 @@ def _attempt(
 ) -> dict[int, Moved]:
     """The best result for surfaces that move together, some with more control points; amounts may differ.
 
-    They stay if that is less than a given share of the wanted change.  Where edges that slide keep them from moving in
-    full, these are held if that is better.
+    They stay if that is less than a given share of the wanted change.  Where sliding edges keep them from moving in
+    full, these edges are held if that is better.
     """
     group = list(surfaces)
     found = _tried(scene, wish, group, joined, finer, least)
@@ -232,7 +232,7 @@ def _attempt(
 
 
 def _done(found: Mapping[int, Moved]) -> tuple[float, float]:
-    """How much of the wanted change is made, to compare it with another way to make it."""
+    """How much of the wanted change is made, as a key by which results are compared."""
     share = next(iter(found.values())).share
     return share * (WHOLE if _through(found) else 1.0), sum(each.amount for each in found.values())
 
@@ -240,7 +240,7 @@ def _done(found: Mapping[int, Moved]) -> tuple[float, float]:
 def _tried(
     scene: Scene, wish: Wish, surfaces: Sequence[int], joined: Joints, finer: Collection[int], least: float
 ) -> dict[int, Moved]:
-    """The best result with edges as they are joined."""
+    """The best result with edges joined as given."""
     members = {i: scene.sheets[i] for i in surfaces}
     trial = Trial(scene, members, joined, finer)
     target = wish.target(trial.problem, members, joined)
@@ -269,7 +269,7 @@ def _tried(
 
 
 def _explained(trial: Trial, moved: dict[int, Moved], target: Array) -> dict[int, Moved]:
-    """Results with what stands against more."""
+    """Results, with what prevents more."""
     if len(moved) == 1 and target.any():
         moved = {
             i: replace(each, hindered=each.amount < LEAST and trial.unhindered(target)) for i, each in moved.items()
@@ -281,7 +281,7 @@ def _explained(trial: Trial, moved: dict[int, Moved], target: Array) -> dict[int
 
 
 def _confirmed(trial: Trial, members: Mapping[int, Sheet], found: Sequence[Verdict], target: Array) -> dict[int, Moved]:
-    """The result that is worth most after a closer look."""
+    """The result that is worth most when judged closely."""
     best: dict[int, Moved] = {}
     most, wanted = (-1.0, 0.0), sum(trial.problem.gains(target, target, [1.0] * len(members)))
     nets = {i: space.net for i, space in trial.problem.spaces.items()}

@@ -37,7 +37,7 @@ from mracad.seam.wishes import Wishes
 Array = np.ndarray
 
 SHARP = 0.2, 0.5
-"""Curvatures over ℓ above which less is done, and above which nothing is: there the filter would take shape."""
+"""Curvatures times ℓ above which less is done, and above which nothing is: there the filter would remove shape."""
 
 DETAIL = 1e-7, 1e-6
 """Least displacement that counts as detail: the tolerance of coincidence, mm, and a share of the wavelength."""
@@ -52,11 +52,11 @@ class Filter:
     scale : float
         mm.
     across : float, optional
-        The same across the lines of the parameter that leads, mm.
+        Scale across the lines of the leading parameter, mm.
     leads : mapping of int to int
         Which parameter leads, by surface: 0 for u, 1 for v.
     limited : bool
-        Whether wavelengths follow the radii of curvature where these are too small for them.
+        Whether wavelengths are reduced where radii of curvature are too small for them.
     """
 
     scale: float
@@ -69,11 +69,11 @@ class Filter:
     growth: ClassVar[Growth] = GROWTH
 
     def wavelength(self, net: Net, faces: Sequence[Face], creases: Creases) -> float:
-        """The scale, for every surface: the longer one."""
+        """The scale of every surface, mm: the larger of the two."""
         return self.scale if self.across is None else max(self.scale, self.across)
 
     def stretch(self, faces: Sequence[Face]) -> Stretch:
-        """Both scales over the longer one."""
+        """Both scales over the larger one."""
         surface = faces[0].surface
         if self.across is None or surface is None:
             return EVEN
@@ -90,7 +90,7 @@ class Filter:
         return largest(self, alone, sheet)
 
     def target(self, problem: Problem, sheets: Mapping[int, Sheet], joined: Joints) -> Array:
-        """What smoothing would do if no rim were held, ``(points, 3)``."""
+        """The displacement by smoothing if no rim were held, ``(points, 3)``."""
         width = max(sheet.wavelength for sheet in sheets.values())
         return problem.filtered(stiffness(width), problem.seen)
 

@@ -19,7 +19,7 @@ ASKEW = math.radians(30.0)
 """Largest mean angle between a direction and the parameter lines that follow it."""
 
 UPRIGHT = 0.5
-"""Least part of a direction, in the mean, that lies in a surface."""
+"""Smallest mean share of a direction that must lie in a surface."""
 
 
 def lead(model: Model, faces: Sequence[Face], along: str | None) -> int | None:
@@ -66,7 +66,7 @@ def lead(model: Model, faces: Sequence[Face], along: str | None) -> int | None:
 
 
 def _wanted(model: Model, along: str, points: Array) -> Array:
-    """The unit vector of a direction at points ``(nu, nv, 3)``: along an edge, that of its nearest point."""
+    """Unit vectors of a direction at points ``(nu, nv, 3)``: for an edge, its tangent at the nearest point."""
     from scipy.spatial import KDTree
 
     if along in AXES:
@@ -81,7 +81,7 @@ def _wanted(model: Model, along: str, points: Array) -> Array:
 
 
 def _extent(points: Array, inside: Array, axis: int) -> float:
-    """The mean size of the parts of the lines of an axis that lie inside faces, mm."""
+    """Mean length of the parts of parameter lines along an axis that lie inside faces, mm."""
     lines, seen = (np.moveaxis(each, axis, 0) for each in (points, inside))
     low, high = (
         how(np.where(seen[..., None], lines, far), axis=0) for how, far in ((np.min, np.inf), (np.max, -np.inf))

@@ -1,4 +1,4 @@
-"""Jumps of curvature along seams that are only tangent: they stay, but must not grow."""
+"""Jumps of curvature along seams that are only tangent: they remain, but must not grow."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class Jumps:
     members : collection of int
         The surfaces.
     joined : Joints
-        What is known of their edges.
+        How their edges are joined.
     width : float
         Wavelength, mm.
     """
@@ -43,7 +43,8 @@ class Jumps:
                 self.most.append(meeting.bend + allowed / max(apart, 1))
 
     def room(self, moved: Mapping[int, Net]) -> dict[int, float]:
-        """The share of a displacement that each surface may make, 0 to 1, by index; without those that may make all.
+        """The share of a displacement that each surface may make, 0 to 1, by index; surfaces that may make all are left
+        out.
 
         Parameters
         ----------

@@ -26,13 +26,13 @@ from mracad.seam.trimmed import TrimmedSeam
 Array = np.ndarray
 
 OPEN = 1e-10
-"""Gap, mm, or tilt, radians, that counts as one."""
+"""Smallest gap (mm) or angle (radians) that is mended."""
 
 HALVINGS = 4
-"""Most times that spans beside a trim curve are halved until its seam holds."""
+"""How often spans beside a trim curve are halved at most until its seam holds."""
 
 PASSES = 4
-"""Times that the remainder of a mending is mended again."""
+"""How often the remainder of a mending is mended again."""
 
 DETAIL = 3.0
 """Size of the displacements along trim curves, over the widest gap there."""
@@ -48,7 +48,7 @@ class Mended:
     moved : mapping of int to Moved
         The surfaces that it moved.
     edges : frozenset of int
-        Those that were mended.
+        The edges that were mended.
     """
 
     model: Model
@@ -85,7 +85,7 @@ def mended(scene: Scene) -> Mended:
 
 
 def _widest(joined: Joints) -> float:
-    """The largest gap (mm) or tilt (radians) that is to be mended."""
+    """The largest gap (mm) or angle (radians) that is to be mended."""
     exact = [(s.joint.close * s.gap, s.joint.fit * s.angle) for s in joined.exact]
     loose = [(s.close * s.opening[0], s.fit * s.opening[1]) for s in joined.loose]
     return float(max((max(each) for each in [*exact, *loose]), default=0.0))

@@ -14,7 +14,7 @@ from mracad.wavelet.ladder import arc_lengths
 Array = np.ndarray
 
 MOST = 600
-"""Most control points along an axis that are used."""
+"""Largest number of control points along an axis that are used."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,7 +24,7 @@ class Axis:
     Attributes
     ----------
     points : ndarray (n,) of int
-        Those that are used.
+        Indices of those that are used.
     modes : ndarray (n, n)
         Orthonormal, ordered by bending.
     squares : ndarray (n,)
@@ -62,7 +62,8 @@ def inside(axes: Sequence[Axis], values: Array) -> Array:
 
 
 def outside(axes: Sequence[Axis], shares: Array, shape: tuple[int, ...]) -> Array:
-    """Values of control points, of a shape, that have shares of the modes; 0 for those that are not used."""
+    """Values of control points, an array of the given shape, from shares of the modes; 0 for points that are not
+    used."""
     for axis, each in enumerate(axes):
         shares = np.moveaxis(np.tensordot(each.modes, shares, (1, axis)), 0, axis)
     found = np.zeros(shape)

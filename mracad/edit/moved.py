@@ -19,7 +19,7 @@ from mracad.seam.interface import Joints
 Array = np.ndarray
 
 CLOSER = 7
-"""Points a span at which a result is judged again."""
+"""Points per span at which a result is judged again."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,19 +34,19 @@ class Moved:
     amount : float
         Share of the wanted change that was allowed.
     changes : mapping of int to Change
-        Of the roughness of its faces, by face.
+        Changes of the roughness of its faces, by face.
     limits : tuple of Worse
         What limited the amount.
     free : int
         Free control points.
     gain, wanted : float
-        How much nearer the surfaces that move with it came to the target, and the whole distance, as squared norms.
+        By how much the surfaces that move with it came nearer to the target, and the whole distance, as squared norms.
     rough : bool
         Whether the wanted change would reduce its roughness at all.
     sliding : bool
         Whether its edges slide.
     hindered : bool
-        Whether nothing but what holds it stands against the wanted change: together with others it may do more.
+        Whether only its held rims prevent the wanted change: together with others it may do more.
     """
 
     sheet: Sheet
@@ -63,7 +63,8 @@ class Moved:
 
     @classmethod
     def whole(cls, sheet: Sheet, net: Net, offset: Array, free: int, amount: float = 1.0) -> Moved:
-        """A displacement ``(nu, nv, 3)`` that is made as it is, said to be an amount of what was wanted."""
+        """A displacement ``(nu, nv, 3)`` that is made in full; ``amount`` is reported as the share of what was
+        wanted."""
         tried = Tried(closely(sheet, net), [net], [offset / amount])
         return cls(sheet, tried, amount, tried.changes({0: amount})[0], (), free)
 
@@ -98,7 +99,7 @@ class Moved:
         return self.gain / self.wanted if self.wanted > 0.0 else 0.0
 
     def scaled(self, amount: float) -> Moved:
-        """The same change with another amount."""
+        """The change multiplied by an amount."""
         if amount == self.amount:
             return self
         return replace(self, amount=amount, changes=self.tried.changes({0: amount})[0])
@@ -114,12 +115,11 @@ class Moved:
         return replace(self, amount=0.0, changes=still, limits=(), gain=0.0)
 
     def done(self) -> Moved:
-        """The same, without what was measured for it."""
+        """The same change, without the measurements made for it."""
         return replace(self, tried=Tried(closely(self.sheet, self.net), self.tried.nets, self.tried.parts))
 
     def confirmed(self, tolerances: Tolerances) -> Moved:
-        """The part that passes a closer look: growth between the points of the first is taken back; nothing is left if
-        no face gains from the rest."""
+        """The part of the change that is allowed when judged at more points; none if no face gains from that part."""
         if not self.amount:
             return self
         (amount,), (changes,), (limits,) = amounts(self.tried, np.zeros(1), np.array([self.amount]), tolerances)

@@ -32,10 +32,10 @@ from mracad.spec.steps.smooth import OffsetFaces
 Array = np.ndarray
 
 MISSED, LEAST = 1e-4, 0.25
-"""Shares of the distance: the error that splines may have, and the shortest spans into which they are divided."""
+"""Shares of the distance: the allowed error of splines, and the shortest spans into which they are divided."""
 
 FADE = 8.0
-"""Distances within which an offset fades beside what is held: a face is tilted by 13° at most there."""
+"""Number of distances within which an offset fades beside what is held: it tilts faces by at most 13° there."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class Outward:
     Attributes
     ----------
     distance : float
-        Along outward normals, mm.
+        Distance along outward normals, mm.
     refine : bool
         Whether knots may be inserted where splines through d n need them.
     """
@@ -93,14 +93,14 @@ class Outward:
         return np.concatenate(found)
 
     def _offsets(self, net: Net) -> Array:
-        """d n at the Greville points, ``(nu, nv, 3)``; where there is no normal, none."""
+        """d n at the Greville points, ``(nu, nv, 3)``; 0 where there is no normal."""
         return self._moved(net, pairs(net.u.greville(), net.v.greville())).reshape(net.poles.shape)
 
     def _moved(self, net: Net, uv: Array) -> Array:
         return np.asarray(self.distance * np.nan_to_num(net.normals(uv)))
 
     def ways(self, problem: Problem, target: Array, width: float) -> Iterable[Iterable[Array]]:
-        """The nearest displacement that seams allow, faded beside what is held."""
+        """The nearest displacement that seams allow; it fades beside what is held."""
         if problem.rimmed:
             target = problem.fading(width) * target
         yield [problem.nearest(target, stiff, beyond=True) for stiff in (0.0, stiffness(width / 8))]

@@ -31,8 +31,8 @@ TIGHT = 0.3
 """Share of the allowed error of a contact that its conditions aim at."""
 
 EASY = 30.0
-"""Factor on the allowed error of smooth contacts between surfaces in the target of an edit: splines of unrelated knots
-that had to agree closely along a curve could hardly follow the target beside it.  At creases each side is on its own:
+"""Factor on the allowed error of smooth contacts between surfaces in the target of an edit: splines over unrelated
+knots that must agree closely along a curve could hardly follow the target beside it.  At creases it does not apply:
 sliding on one side would push the other."""
 
 
@@ -42,13 +42,13 @@ WITHIN = 0.8
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """What an edit works on.
+    """The model and the surfaces that an edit works on.
 
     Attributes
     ----------
     model : Model
     sheets : mapping of int to Sheet
-        The surfaces that it may move.
+        The surfaces that the edit may move.
     joints : Joints
     tolerances : Tolerances
     refine : bool
@@ -88,13 +88,13 @@ class Pose:
     opened : ndarray (conditions, 3)
         Errors of contacts between two surfaces before the edit: gap, slope, curvature.
     limits : ndarray (conditions,)
-        Their allowed errors.
+        Allowed errors of contacts.
     trimmed : ndarray of bool (conditions,)
         Conditions of seams along trim curves that are to be mended.
     share : ndarray (points, 1), optional
-        0 in regions where nothing moves, 1 farther than a wavelength from there.
+        0 in regions where nothing may move, 1 farther than a wavelength from them.
     led : Led or None
-        Where edges that slide have conditions.
+        The conditions of edges that slide.
     """
 
     problem: Problem
@@ -107,11 +107,11 @@ class Pose:
     led: Led | None = None
 
     def faded(self, delta: Array) -> Array:
-        """A displacement that fades out within a wavelength of regions where nothing moves."""
+        """A displacement, faded out within a wavelength of regions where nothing may move."""
         return delta if self.share is None else self.problem.nearest(self.share * delta)
 
     def open(self, delta: Array) -> bool:
-        """Whether a displacement leaves seams along trim curves open that should be mended."""
+        """Whether seams along trim curves that should be mended stay open after a displacement."""
         lacked = np.linalg.norm(self.opened + self.contacts.matrix @ delta, axis=1)
         return bool((lacked > self.limits)[self.trimmed].any())
 
@@ -136,7 +136,7 @@ def pose(
     width : float
         Width within which displacements fade, mm.
     detail : float
-        Size of the wanted displacements, mm: the larger, the more contacts weigh.
+        Size of the wanted displacements, mm: contacts weigh more where it is larger.
     finer : collection of int
         Surfaces that get control points beside rims if they have few.
     longest : float
@@ -190,7 +190,7 @@ def pose(
 
 
 def _zoned(sheet: Sheet, net: Net, joined: Joints, width: float) -> Zoned:
-    """The part of a surface in regions where nothing moves; its curvature is seen without what is to go."""
+    """The part of a surface in regions where nothing may move; curvature is measured without what will be removed."""
     look = sheet.stretch.limit
     if joined.zones and look is None:
         look = Limit.of(sheet.net, sheet.stretch.times(width), sheet.creases)

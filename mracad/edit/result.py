@@ -28,7 +28,7 @@ class Reason(Enum):
     AMOUNT = "amount 0"
     NO_COPY = "no copy on it"
     NO_FREE = "no free control points"
-    ASKEW = "its parameter lines run elsewhere"
+    ASKEW = "its parameter lines do not follow the direction"
     RIM = "cannot get fairer with its edges held"
     ROUGHER = "would get rougher"
     SPOILED = "would come out worse"
@@ -51,7 +51,7 @@ class FaceOutcome:
     said : str
         Details of the reason: which figures would get worse, or the kind of an analytic face.
     detail : float
-        Largest change that the edit would make to a control point of the face if nothing were held, mm.
+        Largest change of a control point of the face that the edit would make if nothing were held, mm.
     moved : float
         Largest change made, mm.
     amount : float
@@ -63,9 +63,9 @@ class FaceOutcome:
     creases : int
         Crease lines inside the surface, which every edit keeps.
     roughness : pair of Roughness, optional
-        Before and after, where the edit measures it.
+        Roughness before and after, if the edit measures it.
     noise : float, optional
-        Standard deviation of each coordinate of the control points, mm, where the edit measures it.
+        Standard deviation of each coordinate of the control points, mm, if the edit measures it.
     """
 
     face: int
@@ -91,8 +91,8 @@ class FaceOutcome:
 
 @dataclass(frozen=True, eq=False)
 class Edit:
-    """A displacement, the outcome for each face of the model in face order, the treatment of each edge, the result for
-    each copy of a feature, and the scale (mm) where the edit found it."""
+    """A displacement, the outcome for each face in face order, the treatment of each edge, the result for each copy of
+    a feature, and the scale (mm) if the edit determined it."""
 
     displacement: Displacement
     outcomes: tuple[FaceOutcome, ...]

@@ -22,11 +22,12 @@ FIRST, LAST = 1e-4, 1e7
 """Range of stiffnesses."""
 
 MOST = 600
-"""Most control points along an axis that are used in closed form."""
+"""Largest number of control points along an axis that are used in closed form."""
 
 
 def searched(start: Stiffness, score: Callable[[Stiffness], float]) -> Stiffness:
-    """The stiffnesses with the least score, changed by common factors: along u and v apart for one surface alone."""
+    """The stiffnesses with the least score, changed by common factors; for a single surface separately along u and
+    v."""
     along = ((1, 0), (0, 1), (-1, 0), (0, -1)) if len(start) == 1 else ((1, 1), (-1, -1))
     now, least = start, score(start)
     for factor in STEPS:
@@ -42,7 +43,7 @@ def searched(start: Stiffness, score: Callable[[Stiffness], float]) -> Stiffness
 
 
 def _times(stiffness: Stiffness, factors: tuple[float, float]) -> Stiffness:
-    """Stiffnesses times factors, within their range."""
+    """Stiffnesses multiplied by factors, within their range."""
     u, v = factors
     return {
         i: (min(max(along * u, FIRST), LAST), min(max(across * v, FIRST), LAST))

@@ -1,4 +1,4 @@
-"""Edges that slid: brought back onto curved neighbours, and looked at."""
+"""Edges that slid: brought back onto curved neighbours, and checked."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ LEFT = 0.4
 """Share of an edge by which one of its ends may move along it."""
 
 MORE = 1e-3
-"""Share by which an edge may be farther off its neighbour than before, where that was more than is allowed."""
+"""Share by which the gap of an edge to its neighbour may grow, if it was already more than allowed."""
 
 
 def settled(scene: Scene, result: Result) -> tuple[Result, set[int]]:
@@ -75,8 +75,8 @@ def _displaced(nets: Mapping[int, Net], parts: Mapping[int, Array]) -> dict[int,
 
 
 def _holds(scene: Scene, slide: Slide, moved: Moved) -> bool:
-    """Whether an edge lies on its neighbour as closely as is allowed, the face did not fold there, and its ends do not
-    run off theirs."""
+    """Whether an edge lies on its neighbour as closely as required, the face did not fold there, and the ends of the
+    edge stay on the edges along which they move."""
     now = displaced(moved.net, moved.offset)
     share = np.unique(np.concatenate([LOOKS, *_between(crossings(slide.trace, (now.u, now.v))), [0.0, 1.0]]))
     before, after = (slide.off(scene.model, net, share).max() for net in (moved.net, now))
@@ -95,7 +95,7 @@ def _holds(scene: Scene, slide: Slide, moved: Moved) -> bool:
 
 
 def _between(breaks: Array) -> list[Array]:
-    """Places in every piece between two breaks."""
+    """Places in every piece between two breaks, as arrays."""
     return [breaks[:-1] + part * np.diff(breaks) for part in (0.2, 0.5, 0.8)]
 
 

@@ -63,7 +63,7 @@ def _within(model: Model, options: Smooth, scope: Scope, progress: Callable[[int
 
 
 def _leads(model: Model, options: Smooth, scope: Scope) -> dict[int, int | None]:
-    """Which parameter leads, by surface with faces to edit."""
+    """The parameter that follows the direction (0 for u, 1 for v, None for neither), by surface with faces to edit."""
     along = None if options.along is None else heading(options.along, "along")
     faces = {s.index: [model.faces[i] for i in s.faces if i in scope.chosen] for s in model.surfaces}
     return {surface: lead(model, each, along) for surface, each in faces.items() if each}

@@ -28,7 +28,7 @@ DEGREE = 3
 """Least degree of a surface that moves: knots inserted into a lower one make facets."""
 
 TREND, BASE = 2.5, 6.0
-"""Waves longer than the first (in wavelengths) are shape, longer than the second the base that waves show against."""
+"""Waves longer than the first (in wavelengths) are shape; those longer than the second are the base for the judge."""
 
 
 class Wish(Protocol):
@@ -37,13 +37,13 @@ class Wish(Protocol):
     Attributes
     ----------
     spread : float
-        Number of wavelengths within which a change at a place spreads; infinite where that is no fault.
+        Number of wavelengths within which a change at a place spreads; infinite where spreading is no fault.
     fairs : bool
         Whether faces that do not get fairer stay as they are.
     whole : bool
-        Whether less of it is not what was asked for: then it is done in full or not at all.
+        Whether it is done in full or not at all, because part of it is not what was asked for.
     limited : bool
-        Whether wavelengths follow the radii of curvature where these are too small for them.
+        Whether wavelengths are reduced where radii of curvature are too small for them.
     growth : Growth
         How much rougher it may make a face.
     """
@@ -64,11 +64,11 @@ class Wish(Protocol):
     def growth(self) -> Growth: ...
 
     def wavelength(self, net: Net, faces: Sequence[Face], creases: Creases) -> float:
-        """Wavelength below which it removes waves from a surface, mm; beside what is held it fades within this."""
+        """Wavelength below which it removes waves from a surface, mm; it fades within this beside what is held."""
         ...
 
     def stretch(self, faces: Sequence[Face]) -> Stretch:
-        """Wavelengths by direction on the surface of faces, over that one: the longest is 1."""
+        """Wavelengths by direction on the surface of the faces, relative to the longest."""
         ...
 
     def space(self, net: Net) -> Net:
@@ -80,14 +80,14 @@ class Wish(Protocol):
         ...
 
     def target(self, problem: Problem, sheets: Mapping[int, Sheet], joined: Joints) -> Array:
-        """What it would do to surfaces that seams join if no rim were held, ``(points, 3)``."""
+        """The displacement of surfaces that seams join if no rim were held, ``(points, 3)``."""
         ...
 
     def ways(self, problem: Problem, target: Array, width: float) -> Iterable[Iterable[Array]]:
         """Displacements ``(points, 3)`` to choose from: the one that the judge allows nearest to the target is taken.
 
-        They come in batches: the next is only tried if the judge cuts much off the one before.  Beside what is held,
-        they fade within ``width`` (mm).
+        They come in batches: the next is tried only if the judge scales the one before back a lot.  Beside what is
+        held, they fade within ``width`` (mm).
         """
         ...
 
@@ -101,7 +101,7 @@ class Sheet:
     index : int
         In ``Model.surfaces``.
     origin, net : Net
-        The original, and the same of degree 3 at least over knots that can hold the target.
+        The original, and the same surface, of degree 3 at least, over knots that can hold the target.
     all_faces, faces : tuple of Face
         All faces on it, and those that may move.
     metric : Net
@@ -111,11 +111,11 @@ class Sheet:
     wavelength : float
         Wavelength below which the edit removes waves, mm.
     stretch : Stretch
-        Wavelengths by direction, over that one.
+        Wavelengths by direction, relative to ``wavelength``.
     reach : (float, float)
         Distance within which a change spreads along u and v, mm.
     trend, base : Net
-        The surface projected on the splines of a few wavelengths, which is shape; and of many, for the judge: a trend
+        The surface projected on the splines of a few wavelengths, which is shape, and of more, for the judge: a trend
         that oscillates around a mark would hide new waves there.
     detail : float
         Largest displacement of a control point if nothing were held, mm.
@@ -137,7 +137,7 @@ class Sheet:
 
     @property
     def movable(self) -> frozenset[int]:
-        """Numbers of the faces that may move."""
+        """Indices of the faces that may move."""
         return frozenset(face.index for face in self.faces)
 
 

@@ -1,4 +1,4 @@
-"""How much worse the result of an edit may be: one answer for conditions, the judge and the verdict on a document."""
+"""How much worse the result of an edit may be: shared by conditions, the judge and the verdict on a document."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from mracad.spec.quantity import length
 from mracad.spec.steps import Fitting, Selection
 
 GROWTH = Growth(0.005, 0.005, 0.005, 0.02, 30.0, 0.25)
-"""Growth that the judge allows by default: a quarter of the 2 % that count as worse when faces are compared, and waves
-at a place an eighth larger than those around it."""
+"""Growth that the judge allows by default: a quarter of the 2 % that count as worse in comparisons, and waves at a
+place an eighth larger than those around it."""
 
 NOISY = replace(GROWTH, singular=0.25, each=False)
 """Growth that the judge allows if noise is removed: kinks and singular points that noise makes are random."""
@@ -36,13 +36,13 @@ class Tolerances:
     Attributes
     ----------
     gap : float
-        By how much the gap of a seam that moves along a trim curve may grow, mm; the most for any other edge.
+        Allowed growth of the gap of a seam that moves along a trim curve, mm; the upper limit for any other edge.
     least : float
-        Gap that any edge may have, mm, however exact it is.
+        Gap that any edge may have, mm, however exact it was.
     angle, bend : float
-        By how much the angle (radians) and the curvature (over the wavelength of the edit) along an edge may grow.
+        Allowed growth of the angle (radians) and of the curvature (over the wavelength of the edit) along an edge.
     jump : float
-        Jumps of curvature along edges, over the wavelength, that count as none: larger ones would show.
+        Largest jump of curvature along an edge, over the wavelength, that counts as none: larger ones would show.
     growth : Growth
         Of roughness.
     deviation : float
@@ -65,7 +65,7 @@ class Tolerances:
         return self.gap, self.angle, self.bend / width
 
     def wider(self, edge: Edge, gap: float) -> float:
-        """By how much the gap (mm) of an edge that stays may grow, mm: up to the edge's own tolerance."""
+        """Allowed growth (mm) of the ``gap`` (mm) of an edge that stays: up to the edge's own tolerance."""
         return max(min(max(edge.tolerance, self.least), self.gap) - gap, MORE * gap)
 
 

@@ -20,18 +20,18 @@ def torn(
     allowed: Tolerances,
     keep: str,
 ) -> set[int]:
-    """Faces of seams that an edit would open, or whose smoothness it would lose, against its own intent.
+    """Faces of seams that an edit would open or make less smooth than it is meant to.
 
     Parameters
     ----------
     model : Model
     before, after : sequence of SeamMeasure
-        In the same order.
+        Seams in the same order.
     edit : Edit
-        Edges that it does not mention stay.
+        The edit; edges that it does not mention stay.
     allowed : Tolerances
     keep : str
-        If only the position is kept (``"g0"``), a kink is no fault.
+        Continuity to keep; with ``"g0"`` a kink is no fault.
     """
     steeper, found = math.degrees(allowed.angle), set()
     for (old, widest), new in zip(_widest(model, before, edit, allowed), after, strict=True):

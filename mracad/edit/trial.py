@@ -21,21 +21,21 @@ from mracad.seam.interface import Joints
 Array = np.ndarray
 
 GAIN = 0.01, 0.25, 0.01
-"""Least share of its bending or curvature variation that a face must lose to be touched at all; or one of its places,
-and the mean of all."""
+"""Share of its bending or curvature variation that a face must lose to be changed at all; or the share that one of its
+places must lose, and the mean of all places."""
 
 ENOUGH = 0.9
 """If more than this share of a displacement is allowed, no other is tried."""
 
 WHOLE = 1.25
-"""A displacement allowed in full is preferred to part of one that comes nearer to the target by less than this factor:
-a part leaves something of every wave everywhere."""
+"""A displacement that is allowed in full is preferred to part of one that comes nearer to the target by less than this
+factor: a part leaves some of every wave everywhere."""
 
 SHARES = 0.125, 0.25, 0.5, 1.0
-"""Amounts to choose from place by place, the largest that is allowed, where not everything is allowed everywhere."""
+"""Amounts to choose from, place by place, where a displacement is not allowed in full: the largest allowed is taken."""
 
 EASINGS = 2
-"""Most times that this is done to one displacement."""
+"""How often that is done at most to one displacement."""
 
 FINER = 3
 """Steps from one Greville point to the next at which deviations are sampled."""
@@ -54,7 +54,7 @@ class Verdict:
     changes : sequence of mapping of int to Change
         The change of roughness of its faces, by face.
     limits : sequence of tuple of Worse
-        What limits the amount.
+        The figures that limit the amount.
     gains : sequence of float
         How much nearer each surface comes to the target, as a squared norm.
     gain : float
@@ -96,8 +96,8 @@ class Trial:
         self.watch = Watch(surfaces, self.width, [members[i].reach for i in spaces])
 
     def most(self, target: Array) -> float:
-        """The largest possible gain: that of the admissible displacement nearest to a target, if nothing is soft; 0 if
-        nothing may move."""
+        """The largest possible gain: that of the admissible displacement nearest to a target, without contacts; 0 if no
+        control point may move."""
         if not self.problem.free.any():
             return 0.0
         nearest = target if self.problem.soft is not None else self.problem.nearest(target)
@@ -110,7 +110,7 @@ class Trial:
         return Verdict(still, none, self.watch.still(), [()] * len(none), none, least)
 
     def judged(self, delta: Array, target: Array, others: Sequence[Verdict] = ()) -> Verdict:
-        """The share of a displacement allowed for each surface; 0 where it could not do better than others."""
+        """The share of a displacement allowed for each surface; 0 where it could not do better than ``others``."""
         bound = self.tolerances.deviation
         if np.isfinite(bound) and np.linalg.norm(delta, axis=1).max(initial=0.0) > bound:
             every = zip(self.nets, self._split(delta), self.stretches, strict=True)
@@ -120,7 +120,7 @@ class Trial:
         return self._verdict(tried, target, self._floor(delta, target, others), BISECTIONS[len(self.nets) > 1])
 
     def settled(self, verdict: Verdict, target: Array) -> Verdict:
-        """The same verdict, with closer amounts."""
+        """The same verdict, with amounts found in more steps."""
         if not verdict.least or verdict.least == 1.0:
             return verdict
         return self._verdict(verdict.tried, target, np.zeros(len(self.nets)), BISECTIONS[1])
@@ -140,7 +140,7 @@ class Trial:
         return Verdict(tried, shares, found, limits, *self._gains(delta, target, shares))
 
     def eased(self, verdict: Verdict, target: Array, others: Sequence[Verdict] = ()) -> Verdict:
-        """The best verdict on a displacement that is scaled back where places allow less of it."""
+        """The best verdict on a displacement that is scaled back at places that allow less of it."""
         found = [verdict]
         while found[-1].least <= ENOUGH and len(found) <= EASINGS:
             delta = np.concatenate([part.reshape(-1, 3) for part in found[-1].parts])
@@ -166,7 +166,7 @@ class Trial:
         return [any(better(change, GAIN[0]) for change in faces.values()) for faces in found.values()]
 
     def unhindered(self, target: Array) -> bool:
-        """Whether the judge would allow a whole target if nothing held it."""
+        """Whether the judge would allow a whole target if nothing were held."""
         every = Tried(self.watch, self.nets, self._split(target)).changes(dict.fromkeys(range(len(self.nets)), 1.0))
         return not any(worse(change, self.tolerances.growth) for faces in every.values() for change in faces.values())
 
@@ -188,7 +188,7 @@ class Trial:
         return list(self.problem.split(delta).values())
 
     def _shares(self, tried: Tried) -> Array:
-        """The largest of :data:`SHARES` of a displacement that makes no place rougher, eased, ``(points, 1)``."""
+        """The largest of :data:`SHARES` of a displacement that makes no place rougher, smoothed, ``(points, 1)``."""
         found: dict[tuple[int, int], tuple[Placed, Array]] = {}
         for amount in SHARES:
             for i, faces in tried.changes(dict.fromkeys(range(len(self.nets)), amount)).items():
@@ -219,7 +219,7 @@ class Trial:
 
 
 def gained(faces: Mapping[int, Change], tolerances: Tolerances) -> bool:
-    """Whether one of the faces of a surface gained enough to be touched."""
+    """Whether one of the faces of a surface gained enough to be changed."""
     return not tolerances.fairer or any(better(change, *GAIN) for change in faces.values())
 
 
@@ -237,14 +237,14 @@ def _beating(best: float, half: float, whole: float) -> float:
 
 
 def rank(verdict: Verdict) -> tuple[float, float]:
-    """Its worth; if some of the surfaces may not move at all, then the gain of the others."""
+    """A sort key: its worth, then the gain of those surfaces that may move."""
     return worth(verdict), sum(verdict.gains)
 
 
 def bounded(net: Net, offset: Array, bound: float, widths: tuple[float, float]) -> Array:
     """Offsets ``(nu, nv, 3)`` scaled back, smoothly within widths, until none exceeds a bound along the normal.
 
-    Each gets the share min(1, bound / |δ · n|), eased, for the largest |δ · n| beside its Greville point.
+    Each gets the share min(1, bound / |δ · n|), smoothed, for the largest |δ · n| beside its Greville point.
 
     Parameters
     ----------
@@ -262,7 +262,7 @@ def bounded(net: Net, offset: Array, bound: float, widths: tuple[float, float]) 
 def heights(net: Net, offset: Array, steps: int = FINER) -> Array:
     """The largest |δ · n| beside the Greville point of each control point, mm, for offsets ``(nu, nv, 3)``.
 
-    It is looked at in so many steps from one Greville point to the next.
+    It is sampled in ``steps`` steps from one Greville point to the next.
     """
     from scipy.ndimage import maximum_filter
 
@@ -274,5 +274,5 @@ def heights(net: Net, offset: Array, steps: int = FINER) -> Array:
 
 
 def _between(places: Array, steps: int) -> Array:
-    """Parameters with more of them between each and the next."""
+    """Parameters, with each interval between two of them divided into equal steps."""
     return np.asarray(np.interp(np.arange(steps * (len(places) - 1) + 1) / steps, np.arange(len(places)), places))

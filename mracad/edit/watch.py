@@ -17,7 +17,7 @@ from mracad.model.brep import Face
 Array = np.ndarray
 
 BISECTIONS = 3, 5
-"""Steps in which an amount is found: roughly among several displacements of one surface; otherwise closely."""
+"""Bisections by which an amount is found: few among several displacements of one surface, otherwise more."""
 
 SINGULAR = 1e3
 """Curvature over the wavelength above which a face is singular."""
@@ -25,7 +25,7 @@ SINGULAR = 1e3
 
 @dataclass(frozen=True, eq=False)
 class Watch:
-    """The faces of surfaces, each watched separately, once somebody looks.
+    """The faces of surfaces, surveyed one by one when first needed.
 
     Attributes
     ----------
@@ -34,9 +34,9 @@ class Watch:
     width : float
         The edit removes waves up to this length, mm.
     reaches : sequence of (float, float)
-        It spreads changes of each within these distances along u and v, mm.
+        Distances within which the edit spreads changes of each surface along u and v, mm.
     points : int
-        Points a span.
+        Points per span.
     """
 
     surfaces: Sequence[tuple[Net, Net, Sequence[Face]]]
@@ -46,7 +46,7 @@ class Watch:
 
     @property
     def owners(self) -> list[tuple[int, int]]:
-        """Place of the surface of each face, and the face."""
+        """Position of the surface of each face, and index of the face."""
         return [(place, face.index) for place, (*_, faces) in enumerate(self.surfaces) for face in faces]
 
     @cached_property
@@ -59,7 +59,7 @@ class Watch:
         return surveys(looked, self.points, SINGULAR / self.width, [reach for *_, reach in every], bases)
 
     def still(self) -> list[dict[int, Change]]:
-        """The changes of the faces of each surface if nothing moves."""
+        """The changes of the faces of each surface if nothing moves, by position of the surface."""
         found: list[dict[int, Change]] = [{} for _ in self.surfaces]
         for (place, face), survey in zip(self.owners, self.surveys, strict=True):
             found[place][face] = Change(survey.roughness, survey.roughness, survey.noise)

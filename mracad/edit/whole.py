@@ -23,7 +23,7 @@ from mracad.spec.select import scope as scope_of
 from mracad.spec.steps import Fairing, Fitting
 
 ROUNDS = 3
-"""Most times that an edit is done with edges that slide; those that cannot stay the next time, and in the end all."""
+"""How often an edit is done at most with edges that slide: edges that cannot slide stay the next time, at last all."""
 
 
 def edited(
@@ -73,7 +73,7 @@ def edited(
 
 
 def _amounts(result: Result, wish: Wish, options: Fitting) -> dict[int, Moved]:
-    """The amount that was asked for of every change."""
+    """Every change, multiplied by the amount that was asked for."""
     amounts = {i: moved.scaled(options.amount * moved.amount) for i, moved in result.moved.items()}
     if not wish.whole:
         return amounts
@@ -84,7 +84,7 @@ def _amounts(result: Result, wish: Wish, options: Fitting) -> dict[int, Moved]:
 
 
 def _beside(model: Model, scope: Scope) -> frozenset[int]:
-    """The edges of faces that are held."""
+    """The edges of held faces."""
     return frozenset(edge.index for edge in model.edges if any(side.face in scope.held for side in edge.sides))
 
 
@@ -136,7 +136,7 @@ def _outcome(face: Face, result: Result, movable: Collection[int], scope: Scope,
 
 
 def _left(moved: Moved, options: Fitting) -> tuple[Status, Reason, str]:
-    """Why a face with detail stays."""
+    """Status, reason and details of a face that has detail and stays."""
     if options.amount == 0:
         return "unchanged", Reason.AMOUNT, ""
     if not moved.rough:

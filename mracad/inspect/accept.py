@@ -1,7 +1,7 @@
 """Whether a file, read back, is as good as the document that it was written from: facts of both, and the faults.
 
-A fault is a place where the file is worse than memory.  A fault that a bare read and write of the input in the same
-format (the *copy*) has as well is the kernel's own doing and is forgiven, unless a face is lost or replaced.
+A fault is a place where the file is worse than the document in memory.  A fault that a bare read and write of the input
+in the same format (the *copy*) also has is caused by the kernel and is forgiven, unless a face is lost or replaced.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ from mracad.model.facts import Facts, Line
 Array = np.ndarray
 
 SLACK = 1e-7
-"""Length, mm, by which a gap or a tolerance may be larger in the file."""
+"""Length, mm, by which a gap or a tolerance may grow in the file."""
 
 MOVED = 1e-6
-"""The same for the gaps of seams that moved with both faces."""
+"""Length, mm, by which the gap of a seam that moved with both faces may grow in the file."""
 
 STEEPER = 0.01
 """Angle, degrees, by which a smooth seam may be less smooth in the file."""
@@ -32,13 +32,13 @@ SAME = 1e-5
 """Share of an area or a volume by which these may differ, beyond what tolerances allow: they are measured to 1e-6."""
 
 PLACED = 1e-6
-"""The same for the box, as a share of the diagonal."""
+"""Allowed difference of the box, as a share of the diagonal."""
 
 CONTENT = frozenset({FaultKind.UNREAD, FaultKind.LOST, FaultKind.AREA, FaultKind.VOLUME, FaultKind.BOX})
 """Faults that are not forgiven even if the kernel's own copy has them too."""
 
-_LAID = 1e-8  # mm: an edge is the same if none of its points lies farther off
-_TURNED = 2e-5  # radians: and its faces have not turned by more
+_LAID = 1e-8  # mm: an edge is the same if none of its points moved farther
+_TURNED = 2e-5  # radians: and its faces turned by no more
 _NEAR = 0.1  # share of the diagonal: faces that are farther apart are not the same
 
 _COUNTS = {
@@ -85,7 +85,7 @@ class Slack:
     moved : collection of tuple of int
         Pairs of faces whose seams moved with both.
     gaps : mapping of tuple of int to float
-        Allowed gaps of seams, and tolerances of their edges, between faces that moved otherwise, mm.
+        Allowed gaps of seams, and tolerances of their edges, between faces that moved in other ways, mm.
     parts : mapping of int to int
         Faces that were written in parts.
     """
@@ -96,7 +96,7 @@ class Slack:
 
 
 class _File:
-    """A file by the faces of the document that it was written from."""
+    """A file, with its faces matched to those of the document from which it was written."""
 
     def __init__(self, facts: Facts, document: Facts, parts: Collection[int] = ()) -> None:
         self.facts = facts
@@ -124,7 +124,7 @@ class _File:
         return found
 
     def areas(self) -> Mapping[int, list[int]]:
-        """The faces of the file for each face of the document, one for each place."""
+        """The faces of the file for each face of the document, one per instance."""
         found: dict[int, list[int]] = defaultdict(list)
         for face in self.facts.owners.tolist():
             if face in self.partners:
@@ -135,7 +135,7 @@ class _File:
 def judge(
     memory: Facts, file: Facts, slack: Slack, copy: Callable[[], tuple[Facts, Facts]] | None = None
 ) -> tuple[tuple[Fault, ...], tuple[Fault, ...]]:
-    """Where a file is worse than the document: the faults, and those forgiven because the kernel's own copy has them.
+    """The faults of a file, and those that are forgiven because the kernel's own copy has them too.
 
     Parameters
     ----------
@@ -143,8 +143,8 @@ def judge(
         Facts of the document that was written, and of the file.
     slack : Slack
     copy : callable, optional
-        Gives the facts of the input and of the kernel's own copy of it, if needed; without it everything except
-        loss of content is forgiven.
+        Gives the facts of the input and of the kernel's own copy of it, when needed; without it everything except loss
+        of content is forgiven.
     """
     base, new = _File(memory, memory), _File(file, memory, slack.parts)
     faults = tuple(_faults(base, new, slack))
@@ -158,13 +158,13 @@ def judge(
 
 
 def _faults(memory: _File, file: _File, slack: Slack) -> Iterator[Fault]:
-    """Where a file is worse than the document."""
+    """All places where a file is worse than the document."""
     yield from _bodies(memory, file)
     yield from _beside(memory, file, slack, _changed(memory, file, lambda edge: _LAID))
 
 
 def _beside(base: _File, file: _File, slack: Slack, pairs: Collection[tuple[int, ...]]) -> Iterator[Fault]:
-    """Where a file is worse than ``base``, its seams between some pairs of faces."""
+    """Places where a file is worse than ``base``; only seams between some pairs of faces are measured."""
     if file.failures:
         for (_, status, face), count in (file.failures - base.failures).items():
             yield Fault(FaultKind.INVALID, () if face is None else (face,), count, 0, status)
@@ -219,8 +219,8 @@ def _same(memory: _File, one: int, file: _File, other: int, room: Callable[[Line
 def _bodies(memory: _File, file: _File) -> Iterator[Fault]:
     """Faces that are lost or replaced, and the volume and box of everything.
 
-    A face is the same if no edge lies farther off than its tolerance, unless its edges do not tell which side of them
-    is meant.
+    A face is the same if no edge moved farther than its tolerance, unless its edges do not tell on which side of them
+    it lies.
     """
     old, new = memory.facts, file.facts
     changed = {face for pair in _changed(memory, file, lambda edge: max(edge.tolerance, SLACK)) for face in pair}
@@ -240,7 +240,9 @@ def _bodies(memory: _File, file: _File) -> Iterator[Fault]:
             others.append(Fault(FaultKind.AREA, (face,), value, was))
     yield from others
     solids = old.counts.solids and new.counts.solids
-    if solids and (lost or old.counts.solids != new.counts.solids):  # exact volumes are slow, and add nothing otherwise
+    if solids and (
+        lost or old.counts.solids != new.counts.solids
+    ):  # exact volumes are slow, and tell nothing new otherwise
         value, was = new.probe.volume(), old.probe.volume()
         if abs(value - was) > SAME * abs(was):
             yield Fault(FaultKind.VOLUME, tuple(lost), value, was)
@@ -299,7 +301,7 @@ def _seams(base: _File, file: _File, slack: Slack, pairs: Collection[tuple[int, 
 
 
 def _worst(found: list[SeamMeasure], before: list[SeamMeasure], what: str, room: float) -> tuple[float, float]:
-    """The figures of the seam that grew most, comparing the seams found with those before, in order of size."""
+    """The figure of the seam that grew most, now and before; seams are compared in order of size."""
     old, new = (sorted(getattr(m, what) for m in each) for each in (before, found))
     if len(before) != len(found) and what == "gap":
         return new[-1], old[-1]
@@ -310,8 +312,8 @@ def _worst(found: list[SeamMeasure], before: list[SeamMeasure], what: str, room:
 def match(document: Facts, file: Facts, parts: Collection[int] = ()) -> dict[int, int]:
     """The face of the document for each face of a file.
 
-    Faces with the same number in the same place match; the others match the nearest; a face left over that lies within
-    one of the ``parts`` is a part of that.
+    Faces with the same number in the same place match; others match the nearest; a remaining face that lies within one
+    of the ``parts`` is a part of that.
     """
     scale = max(document.diagonal, 1e-300)
     old, new = document.spots, file.spots
@@ -320,7 +322,7 @@ def match(document: Facts, file: Facts, parts: Collection[int] = ()) -> dict[int
     found = [*zip(file.owners[:same][alike].tolist(), document.owners[:same][alike].tolist(), strict=True)]
     rest_old, rest_new = (np.concatenate([np.flatnonzero(~alike), np.arange(same, len(each))]) for each in (old, new))
     if len(rest_old) and len(rest_new):
-        from scipy.optimize import linear_sum_assignment  # a few tenths of a second that most files do without
+        from scipy.optimize import linear_sum_assignment  # takes tenths of a second, which most files need not spend
 
         apart = np.abs(new[rest_new][:, None] - old[rest_old][None]).max(axis=2)
         rows, columns = linear_sum_assignment(np.minimum(apart, scale))

@@ -54,7 +54,8 @@ def turned(uses: Iterable[tuple[int, int, bool]]) -> set[int]:
 
 
 def brep(validity: Validity, inward: Iterable[int] = ()) -> Layer:
-    """The kernel's own check, and faces flipped against their surface in the file, which it turned on reading."""
+    """The kernel's own check, and faces that are flipped against their surface in the file (the kernel corrects
+    them)."""
     findings = tuple(
         Finding(failure.status, () if failure.face is None else (failure.face,), figures={"kind": failure.kind})
         for failure in validity.failures
@@ -90,7 +91,7 @@ class Smoothness:
     ----------
     seams, smooth : int
     next : float or None
-        Least angle of the others, degrees; None if all are smooth.
+        Smallest angle of the others, degrees; None if all are smooth.
     """
 
     seams: int
@@ -105,7 +106,7 @@ class SeamLimits:
     Attributes
     ----------
     kink : float
-        Degrees: a seam with a smaller angle should be smooth.
+        A seam with a smaller angle should be smooth, degrees.
     gap, angle : float or None
         Largest gap, mm; largest angle of seams that should be smooth, degrees.
     expected : int or None

@@ -19,7 +19,7 @@ CLUSTER = 1e-4, 1e-6
 """Knots closer than this, mm, or than this fraction of the surface, count as one."""
 
 BESIDE = 1e-5
-"""Distance from a knot line at which a face is looked for, as a fraction of the span there."""
+"""Distance from a knot line at which faces are searched for, as a fraction of the span there."""
 
 LIMITS: tuple[Side, Side] = "left", "right"
 
@@ -62,7 +62,7 @@ class Crossing:
     axis : {0, 1}
         0 for lines u = const.
     at : ndarray (k, 2)
-        As :func:`lines` gives them.
+        The knot lines, as from :func:`lines`.
     places : ndarray (q,)
         Parameters along the lines.
     seen : ndarray of bool (k, q)
@@ -87,7 +87,7 @@ class Crossing:
 
 
 def crossings(net: Net, faces: Sequence[Face], axis: int, places: Array) -> Crossing | None:
-    """Where tangents of faces may jump across knot lines u = const (axis 0) or v = const, at some places on them."""
+    """Places on knot lines u = const (axis 0) or v = const where tangents of faces may jump; None without any."""
     at = lines(net, axis)
     if not len(at):
         return None

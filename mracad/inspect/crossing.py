@@ -1,4 +1,4 @@
-"""Places where a mesh crosses itself, and where its sides do not pair up."""
+"""Places where a mesh crosses itself, and triangle sides without a partner."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def unpaired(sides: Array) -> Array:
 def crossings(points: Array, corners: Array, parts: Array) -> tuple[Array, Array]:
     """Pairs of triangles of one part that cross, and a point of each crossing.
 
-    Triangles that share a corner are neighbours and left out, and so are those that only touch.
+    Triangles that share a corner, and triangles that only touch, are left out.
 
     Returns
     -------
@@ -61,7 +61,7 @@ def _pierced(start: Array, end: Array, triangle: Array) -> Array:
 
 
 def _near(spots: Array, parts: Array) -> Iterable[Array]:
-    """Pairs of triangles of one part whose boxes meet, in blocks: by a grid of cells."""
+    """Pairs of triangles of one part whose boxes meet, in blocks, found by a grid of cells."""
     low, high = spots.min(axis=1), spots.max(axis=1)
     if not len(spots):
         return

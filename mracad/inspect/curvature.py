@@ -16,11 +16,11 @@ THIN = 1e-6
 """Sine of the angle between S_u and S_v below which a surface counts as degenerate."""
 
 VOID = 1e-40
-"""|S_u × S_v| up to which it does too: powers of smaller numbers underflow."""
+"""|S_u × S_v| up to which a surface counts as degenerate too: powers of smaller numbers underflow."""
 
 
 MANY = 7_000_000
-"""Number of points after which importing a compiler pays."""
+"""Number of points above which it pays to import a compiler."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +42,7 @@ class Forms:
     largest : ndarray (q,)
         max(|κ₁|, |κ₂|).
     shape : ndarray (3, q)
-        The shape operator in the frame of S_u / |S_u| and the tangent normal to it: its 11, 12 and 22 components.
+        Components 11, 12 and 22 of the shape operator in the frame of S_u / |S_u| and the tangent normal to it.
     slope : ndarray (2, q)
         ∇H in that frame.
     regular : ndarray of bool (q,)
@@ -65,14 +65,14 @@ class Forms:
 
     @classmethod
     def joined(cls, parts: Sequence[Forms]) -> Forms:
-        """The forms at the points of all of them."""
+        """The forms at the points of all parts, one after another."""
         if len(parts) == 1:
             return parts[0]
         return cls(*(np.concatenate([getattr(part, each.name) for part in parts], axis=-1) for each in fields(cls)))
 
 
 class _Work:
-    """Points gone through in this process."""
+    """Number of points processed so far in this process."""
 
     done = 0
 
@@ -87,13 +87,13 @@ def forms(jet: Array) -> Forms:
 
 
 def forms_at_once(jet: Array) -> Forms:
-    """As :func:`forms`, by operations on all points."""
+    """The same as :func:`forms`, by array operations on all points."""
     every = _figures(THIN, VOID, jet[1:])
     return Forms(*(np.stack(each) if isinstance(each, tuple) else each for each in every))
 
 
 def forms_one_by_one(jet: Array) -> Forms:
-    """As :func:`forms`, by compiled code."""
+    """The same as :func:`forms`, by compiled code."""
     points = jet.shape[2]
     density, bending, variation, largest = np.empty((4, points))
     regular = np.empty(points, bool)
@@ -105,7 +105,7 @@ def forms_one_by_one(jet: Array) -> Forms:
 
 
 def _figures(thin: Any, void: Any, derivatives: Any) -> Any:
-    """What :class:`Forms` holds, of derivatives (u, v, uu, …, vvv) whose coordinates are numbers or arrays of them.
+    """The fields of :class:`Forms`, from derivatives (u, v, uu, …, vvv) whose coordinates are numbers or arrays.
 
     Notes
     -----

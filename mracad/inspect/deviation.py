@@ -1,7 +1,7 @@
-"""How far an edit moved each surface: the length of the displacement, measured on a grid of the surface.
+"""How far an edit moved each face: the length of the displacement, measured on a grid.
 
-δ(u, v) = Σ R_ij(u, v) δ_ij with the kept weights, so max ‖δ_ij‖ bounds it.  It is evaluated at the Greville
-points of the (refined) net inside each face and along its edges: beyond them, a surface may move farther.
+δ(u, v) = Σ R_ij(u, v) δ_ij with unchanged weights, so max ‖δ_ij‖ bounds it.  It is evaluated at the Greville points of
+the (refined) net inside each face and along its edges; outside the face the surface may move farther.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from mracad.model.displacement import Displacement
 from mracad.model.region import face_region, supported
 
 RIM = 33
-"""Points along each edge."""
+"""Number of points along each edge."""
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class Deviation:
     face : int
         Index in ``Model.faces``.
     largest, mean : float
-        Over the sample of the face.
+        Largest and mean length over the sample of the face.
     bound : float
         Certified bound: the longest offset of a control point.
     where : tuple of float

@@ -44,7 +44,7 @@ class Fault:
     value, was : float
         The figure in the file and in the document: a count, mm, mm², mm³ or degrees.
     status : str
-        The kernel's name of it, for ``INVALID``; the reader's message, for ``UNREAD``.
+        The kernel's name of the failure for ``INVALID``; the reader's message for ``UNREAD``.
     """
 
     reason: FaultKind
@@ -55,7 +55,7 @@ class Fault:
 
     @property
     def key(self) -> tuple[FaultKind, tuple[int, ...], str]:
-        """The key that identifies it in another file."""
+        """The key that identifies the same fault in another file."""
         return self.reason, self.faces, self.status
 
 
@@ -68,17 +68,17 @@ class ReadBack:
     valid : bool
         Whether it passes the kernel's check, and nothing is worse.
     counts : Counts or None
-        None for a mesh.
+        Numbers of solids, shells, faces and free edges; None for a mesh.
     box : ((float, float, float), (float, float, float)) or None
         Lowest and highest corner of the boxes of its faces, mm; never too small.
     volume : (float, float) or None
-        In the document and in the file, mm³; None if no face was replaced, so that it was not measured.
+        Volume in the document and in the file, mm³; None where it was not measured because no face was replaced.
     tolerance : float
-        The largest, mm.
+        Largest tolerance, mm.
     seams : int
-        Seams that lie elsewhere in the file than in the document, so that they were measured.
+        Number of seams that lie elsewhere in the file than in the document, which were measured.
     gap, angle : float
-        The largest of these, mm, and of the smooth ones among them, degrees.
+        Largest gap of these, mm, and largest angle of the smooth ones among them, degrees.
     faults : tuple of Fault
         Faults that neither the document nor the kernel's own copy of the input has.
     forgiven : tuple of Fault

@@ -12,13 +12,14 @@ from mracad.spec.quantity import length
 from mracad.spec.steps import Fitting
 
 LEFT = 0.1
-"""Share of a defect that may be left if it is mended, besides what counts as none."""
+"""Share of a defect that may remain if it counts as mended."""
 
 MOSTLY = 0.3
-"""If its mean falls to this share, it is mended except at the ends of the seam, beside points that stay."""
+"""If its mean falls to this share, a defect counts as mended except at the ends of the seam, beside points that
+stay."""
 
 TANGENT = 0.01
-"""Angle, degrees, that counts as none."""
+"""Largest angle that counts as none, degrees."""
 
 
 @dataclass(frozen=True)
@@ -32,11 +33,11 @@ class Mending:
     least, most : float
         Bounds between which a gap or angle is a defect: mm or degrees.
     defects, left, mostly : int
-        Number of defects; of those not mended; of those among them that are mended except at the ends of their seams.
+        Numbers of defects, of those not mended, and of the latter those that are mended except at the ends of seams.
     edge : int or None
         The edge with the largest remaining defect.
     after : float
-        That defect, mm or degrees.
+        Size of that defect, mm or degrees.
     next : float or None
         If there was no defect: the widest gap, or the least angle above ``most``.
     """
@@ -69,7 +70,7 @@ def unmended(
     movable : collection of int
         Faces that the edit could move: only seams between two of them count.
     before, after : sequence of SeamMeasure
-        In the same order.
+        Seams in the same order.
     """
     pairs = [pair for pair in zip(before, after, strict=True) if set(pair[0].faces) <= set(movable)]
     found: list[Mending | None] = []
@@ -100,7 +101,7 @@ class _Defect:
 
 
 def _became(none: Mending, defects: Sequence[_Defect], other: float | None) -> Mending | None:
-    """The result for defects; None if all are mended, ``other`` if there were none."""
+    """The result for defects; None if all are mended; with ``next`` set to ``other`` if there were none."""
     if not defects:
         return replace(none, next=other)
     left = [defect for defect in defects if defect.after > LEFT * defect.before + none.least]

@@ -1,9 +1,9 @@
 """Roughness place by place: whether an edit made waves where a face was smooth, which no sum over the face shows.
 
 A face is divided into places with sides of half the wavelength of the edit.  Its part beyond the base bends by
-|S − S₀|² and varies by |∇H − ∇H₀|², S the shape operator and ₀ the base: next to the curvature of the base, waves that
-reflections show are small.  A change at one place spreads to its neighbours, so these figures (means over a place) are
-compared with the largest that the place and its eight neighbours had before.
+|S − S₀|² and varies by |∇H − ∇H₀|², with the shape operator S, and ₀ for the base: next to the curvature of the base,
+waves that reflections show are small.  A change at one place spreads to its neighbours, so these figures (means over a
+place) are compared with the largest that the place and its eight neighbours had before.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ SIDES = 2
 """Places per wavelength."""
 
 SLOPE = 1.4e-4
-"""Steepest slope of an invisible wave, radians: as much as an edit may add to an angle between faces."""
+"""Steepest slope of an invisible wave, radians: the amount that an edit may add to an angle between faces."""
 
 SMALL = 0.05
 """Area over that of the largest place up to which a place at the boundary is ignored."""
@@ -46,11 +46,11 @@ class Placed:
     turn : ndarray
         Largest angle between normals before and after, radians.
     opened : ndarray
-        By how much the angle across a knot line grew, where it grew most, radians.
+        Largest growth of the angle across a knot line, radians.
     unsettled : ndarray
-        As for :class:`mracad.inspect.roughness.Change`.
+        See :class:`mracad.inspect.roughness.Change`.
     area : ndarray
-        mm², zero where a place is too small to count.
+        Area, mm²; zero where a place is too small to count.
     ends : (ndarray, ndarray)
         Parameters at which places end, along u and v.
     """
@@ -66,7 +66,7 @@ class Placed:
     ends: tuple[Array, Array]
 
     def at(self, u: Array, v: Array) -> tuple[Array, Array]:
-        """Numbers of the places at parameters, along u and along v."""
+        """Indices of the places at parameters, along u and along v."""
         return _strip(self.ends[0], u), _strip(self.ends[1], v)
 
 
@@ -79,13 +79,13 @@ class Places:
     order : ndarray of int (q,)
         The points of a quadrature, place by place.
     first, filled : ndarray of int (places,)
-        Where each place with points begins among them, and its number.
+        Position at which each place with points begins among them, and index of the place.
     shape : (int, int)
         Places along u and v.
     ends : (ndarray, ndarray)
         Parameters at which they end.
     area : ndarray (nu, nv)
-        mm², zero where a place is too small.
+        Area, mm²; zero where a place is too small.
     base : ndarray (5, q)
         Shape operator and slope of the base, zero by default.
     before : ndarray (2, nu, nv)
@@ -133,9 +133,9 @@ class Places:
         Parameters
         ----------
         form : Forms
-            After the edit.
+            The surface after the edit.
         areas : ndarray (q,)
-            mm², zero at points that do not count.
+            Areas of points, mm²; zero for points that do not count.
         turned, unsettled : ndarray (q,)
             Turns of normals (radians), and changes of singular points.
         opened : iterable of (Crossing, ndarray)
@@ -161,7 +161,7 @@ class Places:
         return found
 
     def _gathered(self, how: np.ufunc, values: Array) -> Array:
-        """Values ``(q,)`` put together place by place, ``(nu, nv)``."""
+        """Values ``(q,)`` reduced to one per place by a ufunc, ``(nu, nv)``."""
         found = np.zeros(self.shape).ravel()
         if len(self.first):
             found[self.filled] = how.reduceat(values[self.order], self.first)

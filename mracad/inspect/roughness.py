@@ -37,7 +37,7 @@ class Roughness:
     Attributes
     ----------
     area : float
-        mm².
+        Area, mm².
     bending : float
         ∫ κ₁² + κ₂² dA.
     variation : float
@@ -67,8 +67,8 @@ class Change:
     opened : float
         Largest growth of the angle across a knot line, degrees.
     turn : float
-        Largest angle between the normals before and after, degrees; where noise is removed, between a normal after and
-        the nearest of those before within a knot span.
+        Largest angle between the normals before and after, degrees; where noise is removed, to the nearest normal
+        before within a knot span.
     deviation : float
         Largest motion along the normal, mm.
     motion : float
@@ -91,7 +91,7 @@ class Change:
 
     @property
     def spread(self) -> float:
-        """Largest relative excess of bending or curvature variation of a place over all that was around it before."""
+        """Largest relative excess of bending or curvature variation of a place over the largest around it before."""
         return 0.0 if self.placed is None else float(self.placed.spread.max(initial=0.0))
 
     @property
@@ -120,15 +120,16 @@ class Growth:
     bending, variation, curvature : float
         Relative growth.
     kink : float
-        By how much an angle across a knot line may grow, degrees.
+        Allowed growth of an angle across a knot line, degrees.
     fold : float
-        By how much a normal may turn, degrees.
+        Allowed turn of a normal, degrees.
     spread : float
-        By how much the figures of a place may exceed all that was around it, relative.
+        Relative excess allowed for the figures of a place over the largest around it before.
     singular : float
         Share by which the curvature at singular points may change.
     each : bool
-        Whether angles across knot lines may nowhere grow; otherwise the largest of a face: noise opens them at random.
+        Whether no angle across a knot line may grow; otherwise only the largest of a face is limited, because noise
+        opens them at random.
     """
 
     bending: float = 0.0
@@ -152,7 +153,7 @@ class Worse:
 
 
 def worse(change: Change, allowed: Growth) -> tuple[Worse, ...]:
-    """The figures in which a change made faces rougher than allowed, in the order of :class:`Rougher`."""
+    """The figures by which a change made faces rougher than allowed, in the order of :class:`Rougher`."""
     before, after, noise = change.before, change.after, change.noise
     found = [
         Worse(what, *(float(getattr(each, what.name.lower())) for each in (before, after)))
@@ -188,7 +189,7 @@ def _most(old: float, share: float) -> float:
 
 
 def places(change: Change, allowed: Growth) -> Array:
-    """The places of a face that got worse than allowed, or that made the whole face worse, ``(nu, nv)``."""
+    """Mask ``(nu, nv)`` of the places of a face that got worse than allowed, or that made the whole face worse."""
     found = change.placed
     assert found is not None
     most = _most(change.before.curvature, allowed.curvature) + change.noise.curvature

@@ -1,4 +1,4 @@
-"""Detail on the faces of a model at a scale, from knots and nets alone: nothing is edited, no seam measured.
+"""Detail on the faces of a model at a scale, from knots and nets alone: no edit is made, no seam is measured.
 
 At a scale s the surface S_f of each face is projected onto the coarse space of its knots at that scale, as in
 smoothing; the difference d = S_f − S_{Pf} is measured in the knot cells that the face touches.
@@ -24,7 +24,7 @@ from mracad.wavelet.project import at_scale
 Array = np.ndarray
 
 LEAST = 1e-7
-"""Least height of detail, mm: the kernel's coincidence tolerance."""
+"""Smallest height that counts as detail, mm: the kernel's coincidence tolerance."""
 
 _POINTS = 2  # places at which a knot cell is sampled in each direction
 
@@ -38,9 +38,9 @@ class FaceScales:
     face : int
         Index in ``Model.faces``.
     spans : (float, float)
-        Least and largest knot span, mm.
+        Smallest and largest knot span, mm.
     finest : float
-        Least wavelength that the knots allow to remove, mm; 0 if there is none.
+        Smallest wavelength that the knots allow to remove, mm; 0 if there is none.
     creases : int
         Crease lines inside the face, which every edit keeps.
     coarser : bool
@@ -48,7 +48,7 @@ class FaceScales:
     detail, rms : float
         Largest and root mean square height of the detail that smoothing would remove if nothing were held, mm.
     free, points : int
-        Control points that can move while all edges stay, and all on which the face depends.
+        Numbers of control points that can move while all edges stay, and of all on which the face depends.
     """
 
     face: int
@@ -73,14 +73,14 @@ def scales(
     scale : float
         Wavelength, mm.
     keep : {"g0", "g1", "g2"}
-        Continuity that edges keep; it decides which control points are free.
+        Continuity that edges keep; it determines which control points are free.
     progress : callable, optional
         Called with surfaces done and surfaces in all.
 
     Returns
     -------
     dict of int to FaceScales
-        By index of the face; faces without a NURBS surface are left out.
+        Figures by face index; faces without a NURBS surface are left out.
     """
     found: dict[int, FaceScales] = {}
     for done, surface in enumerate(model.surfaces):

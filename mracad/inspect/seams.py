@@ -1,9 +1,9 @@
 """Continuity along seams: gap and angle between the two faces that share an edge, measured on the snapshot.
 
-At a sample of the edge let p_a, p_b be the two faces' points, n_a, n_b their outward unit normals and t the edge's
-unit tangent.  The gap is |d − (d·t) t| with d = p_a − p_b (a difference along the edge is one of parameterisation,
-not a gap); the angle is atan2(|n_a × n_b|, n_a·n_b).  With κ_a, κ_b the normal curvatures across the edge, in the
-direction n × t, the curvature jump is |κ_a − κ_b|; relative, it is divided by max(|κ_a|, |κ_b|).
+At a sample of the edge let p_a, p_b be the two faces' points, n_a, n_b their outward unit normals and t the edge's unit
+tangent.  The gap is |d − (d·t) t| with d = p_a − p_b (a difference along the edge is one of parameterisation, not a
+gap).  The angle is atan2(|n_a × n_b|, n_a·n_b).  With κ_a, κ_b the normal curvatures across the edge, in the direction
+n × t, the curvature jump is |κ_a − κ_b|; the relative jump is divided by max(|κ_a|, |κ_b|).
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ Array = np.ndarray
 _Pair = tuple[Edge, bool, tuple[Side, Side]]
 
 SMOOTH = 1.0
-"""Degrees: a seam whose largest angle is below this counts as smooth in summaries."""
+"""A seam whose largest angle is below this counts as smooth in summaries, degrees."""
 
 FLAT = 1e-9
-"""Curvature, 1/mm, below which a face counts as flat: jumps are not divided by less."""
+"""Curvature below which a face counts as flat, 1/mm: jumps are not divided by less."""
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,7 @@ class SeamSummary:
 
 
 def seams(model: Model, every: bool = False) -> list[SeamMeasure]:
-    """Measure every seam that touches a NURBS face (or just every one), in edge order; coinciding free edges last."""
+    """Measure all seams of NURBS faces, or with ``every`` all seams, in edge order; coinciding free edges come last."""
     return _measured(model, _pairs(model, every))
 
 
@@ -96,7 +96,7 @@ def remeasured(model: Model, before: list[SeamMeasure], moved: Collection[int]) 
 
 
 def summary(measures: list[SeamMeasure], smooth: frozenset[tuple[int, tuple[int, int]]] | None = None) -> SeamSummary:
-    """Totals; ``smooth`` names the seams that count as smooth (those of the input, say)."""
+    """Totals over seams; ``smooth`` are the keys of those that count as smooth, by default by their angle."""
     chosen = [m for m in measures if (m.smooth if smooth is None else key(m) in smooth)]
     return SeamSummary(
         seams=len(measures),

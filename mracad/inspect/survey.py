@@ -21,13 +21,13 @@ from mracad.model.cells import Quadrature, quadrature
 Array = np.ndarray
 
 POINTS, FEWEST = 5, 24
-"""Points a span, including its ends, and the least along a face, in either direction: curvature peaks at knots."""
+"""Points per span, including its ends, and least number along a face, in each direction: curvature peaks at knots."""
 
 RIPPLE = 1e-8
 """Amplitude, mm, of a negligible ripple one mean span long: a tenth of a point of the kernel."""
 
 ROUNDING = 16 * float(np.finfo(float).eps)
-"""Error of a point of a surface, relative to its largest coordinate: a ripple as long as the span where it lies."""
+"""Error of a point of a surface relative to its largest coordinate, taken as a ripple as long as the span there."""
 
 NOISY, STEEP = 1.0, 20.0
 """If normals turn by more than the first in the median, degrees, noise is being removed; those that turn by more than
@@ -39,7 +39,7 @@ STEADY = 0.05
 _BLOCK = 50_000
 
 _ENOUGH = 4096
-"""Number of points that is worth processing together."""
+"""Number of points that are processed together."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,20 +52,20 @@ class Survey:
     faces : tuple of Face
     rule : Quadrature
     centre : ndarray (3,)
-        ``points`` are relative to it.
+        Origin of ``points``.
     points, normals : ndarray (3, q)
-        At the points of the rule; normals in single precision.
+        Points and normals at the points of the rule; normals in single precision.
     regular : ndarray of bool (q,)
-        Where the surface is neither degenerate nor singular and knots lie apart: only there curvature counts.
+        Where the surface is neither degenerate nor singular and knots lie apart: curvature counts only there.
     sharp : ndarray (q,)
         Curvature at singular points, 1/mm; 0 elsewhere.
     rounding : ndarray (q,)
-        Curvature that rounding may make, 1/mm.
+        Curvature that rounding can cause, 1/mm.
     crossed : list of (Crossing, ndarray)
-        Where tangents may jump, and the angles by which they do.
+        Places where tangents may jump, and the angles there.
     roughness, noise : Roughness
     places : Places or None
-        If it is measured place by place.
+        The places of the faces, if they are measured place by place.
     """
 
     net: Net
@@ -97,14 +97,14 @@ def surveys(
     surfaces : iterable of (Net, sequence of Face, KnotVector, KnotVector)
         The surface, the faces on it that are measured as one, and the knots that it will have afterwards.
     points : int
-        Points a span of those knots, in either direction.
+        Points per span of those knots, in each direction.
     singular : float
-        Curvature, 1/mm, above which a point is singular: there, figures on a grid depend on where its points lie.
+        Curvature, 1/mm, above which a point is singular: figures there depend on the places of grid points.
     reaches : sequence of (float, float)
-        Distances along u and v within which the edit spreads a change, mm, for each surface: faces are then also
+        Distances along u and v within which the edit spreads a change, mm, for each surface; if given, faces are also
         measured place by place.
     bases : sequence of Net
-        Smooth copies of the surfaces, beside which waves show; planes by default.
+        Smooth copies of the surfaces, against which waves are measured; planes by default.
     """
     ready = [
         (net, tuple(faces), _rule(faces, u, v, points), (u, v), net.poles.mean(axis=(0, 1)))
@@ -171,7 +171,7 @@ def changes(surveyed: Sequence[Survey], nets: Sequence[Net]) -> list[Change]:
 
 
 def _unsettled(survey: Survey, form: Forms) -> Array:
-    """Relative change of curvature, or turn of normals, at singular points that stay so; 0 elsewhere, ``(q,)``."""
+    """Relative change of curvature, or turn of normals, at points that stay singular; 0 elsewhere, ``(q,)``."""
     found, those = np.zeros(len(survey.sharp)), survey.sharp > 0
     if those.any():
         before, after = survey.sharp[those], form.largest[those]
@@ -182,10 +182,10 @@ def _unsettled(survey: Survey, form: Forms) -> Array:
 
 
 def _turned(survey: Survey, normals: Array, counted: Array) -> Array:
-    """How far normals ``(3, q)`` are from those before, as chords, ``(q,)``.
+    """Distances of normals ``(3, q)`` from those before, as chords, ``(q,)``.
 
     If noise is removed all over the face, large turns are measured to the nearest normal within one span: removing
-    noise turns a normal to those beside it, a fold turns it over.
+    noise turns a normal towards its neighbours, whereas a fold turns it over.
     """
     off = np.where(counted, np.linalg.norm(normals - survey.normals, axis=0), 0.0)
     rule, (noisy, most) = survey.rule, 2 * np.sin(np.radians([NOISY / 2, STEEP / 2]))
@@ -209,7 +209,7 @@ def _rule(faces: Sequence[Face], u: KnotVector, v: KnotVector, points: int) -> Q
 
 
 def _seen(surfaces: Sequence[tuple[Net, Quadrature, Array]]) -> Iterator[tuple[Array, Forms]]:
-    """Points and forms of each surface at the points of its rule; small ones are processed together."""
+    """Points and forms of each surface at the points of its rule; small surfaces are processed together."""
     sizes = np.array([int(rule.mask.sum()) for _, rule, _ in surfaces])
     block = (sizes.cumsum() - sizes) // _BLOCK
     for number in np.unique(block):
@@ -225,7 +225,7 @@ def _seen(surfaces: Sequence[tuple[Net, Quadrature, Array]]) -> Iterator[tuple[A
 
 
 def _gathered(parts: Iterable[Array]) -> Iterator[Array]:
-    """Small parts put together."""
+    """Parts, with small ones concatenated."""
     waiting: list[Array] = []
     for part in parts:
         waiting.append(part)
@@ -252,7 +252,7 @@ def _spans(rule: Quadrature, knots: tuple[KnotVector, KnotVector]) -> Array:
 
 
 def _crossed(net: Net, faces: Sequence[Face], rule: Quadrature) -> list[tuple[Crossing, Array]]:
-    """Where tangents of faces may jump, and the angles by which they do."""
+    """Places where tangents of faces may jump, and the angles there."""
     every = [crossings(net, faces, axis, at.ravel()) for axis, at in ((0, rule.v), (1, rule.u))]
     return [(each, each.angles(net)) for each in every if each]
 

@@ -12,12 +12,12 @@ Figure = float | int | str | bool | None
 
 @dataclass(frozen=True)
 class Finding:
-    """One piece of evidence; :func:`mracad.job.words.of_finding` puts it into words.
+    """One piece of evidence; see :func:`mracad.job.words.of_finding` for its wording.
 
     Attributes
     ----------
     rule : str
-        Its kind, as ``"SelfIntersectingWire"`` or ``"deviates"``.
+        Its kind, such as ``"SelfIntersectingWire"`` or ``"deviates"``.
     faces : tuple of int
         Indices of the faces that it concerns.
     edge : int or None
@@ -25,7 +25,7 @@ class Finding:
     where : tuple of float or None
         A point, mm, in the part's frame.
     figures : mapping
-        What was measured, by name; lengths are millimetres, angles degrees, faces of another document indices.
+        Measurements by name; lengths in millimetres, angles in degrees, faces of another document by index.
     """
 
     rule: str
@@ -47,7 +47,7 @@ class Layer:
         The measurement, or why there is none, in one line.
     findings : tuple of Finding
     figures : mapping
-        What was measured, by name; lengths are millimetres, angles degrees.
+        Measurements by name; lengths in millimetres, angles in degrees.
     notes : tuple of Finding
         Remarks that fail nothing.
     """

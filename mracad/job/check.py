@@ -37,10 +37,10 @@ def check(document: Document, options: Check, original: Original | None = None, 
     document : Document
     options : Check
     original : callable, optional
-        Not needed.
+        Not used; steps that judge are all called with it.
     text : bytes, optional
-        The file that the document was read from: then every layer is looked at.  Without it there is no file to be
-        judged, and of the layers that take long only those that ``options.fail_on`` names are.
+        Content of the file that the document was read from: then every layer is checked.  Without it the file itself is
+        not judged, and slow layers are checked only if ``options.fail_on`` names them.
     """
     expected, freeform = expectation(options.expect) if options.expect else (None, False)
 
@@ -63,18 +63,18 @@ def check(document: Document, options: Check, original: Original | None = None, 
 
 
 def expectation(text: str) -> tuple[int, bool]:
-    """How many seams are to be smooth, and whether only those of NURBS faces count.
+    """How many seams should be smooth, and whether only those of NURBS faces count.
 
     Parameters
     ----------
     text : str
-        The number, or the file of a report: of a check, which counts all seams, or of an edit, which counts those of
-        NURBS faces.
+        The number, or the path of a report.  That of a check counts all seams, that of an edit only those of NURBS
+        faces.
 
     Raises
     ------
     FileError
-        When there is no such report, or it says nothing of seams.
+        When the report cannot be read, or does not mention seams.
     """
     if text.isdecimal():
         return int(text), False
@@ -84,12 +84,12 @@ def expectation(text: str) -> tuple[int, bool]:
     except (OSError, ValueError) as error:
         raise FileError(f"cannot read the report '{text}': {error}", hint) from error
     if found is None:
-        raise FileError(f"the report '{text}' says nothing of seams", hint)
+        raise FileError(f"the report '{text}' does not mention seams", hint)
     return found
 
 
 def _smooth(report: object) -> tuple[int, bool] | None:
-    """What :func:`expectation` finds in a report; in that of several steps, what the last one says."""
+    """What :func:`expectation` finds in a report; for several steps, in that of the last one that has it."""
     match report:
         case {"layers": [*layers]}:
             counts = [x["figures"]["smooth"] for x in layers if x["name"] == "seams"]
@@ -113,11 +113,11 @@ class CheckLimits:
     ----------
     seams : SeamLimits
     tolerance : float or None
-        Of edges and vertices.
+        Largest tolerance of edges and vertices.
     wall : float or None
-        Least thickness; not measured when None.
+        Least thickness of walls; they are not measured when None.
     layer_seconds : float or None
-        Time for each layer.
+        Time limit of each layer.
     """
 
     seams: layers.SeamLimits = field(default_factory=layers.SeamLimits)
@@ -127,13 +127,13 @@ class CheckLimits:
 
 
 SLOW = frozenset({"self-intersection", "mesh"})
-"""Layers that take long."""
+"""Slow layers."""
 
 
 def _layered(
     text: bytes | None, document: Document, model: Model, allowed: CheckLimits, slow: Collection[str]
 ) -> Verdict:
-    """Every layer; of those that take long the ``slow`` ones."""
+    """Every layer; the slow ones only if they are in ``slow``."""
     from mracad.occ.check import check as kernel_check
     from mracad.occ.check import looks
     from mracad.occ.stated import stated, unloaded
@@ -170,7 +170,7 @@ def _layered(
 
 
 def _told(file: Stated, document: Document, diagonal: float) -> dict[int, int]:
-    """Which face of the document each one in the file is, as far as its vertices tell."""
+    """For each face of the file, its index in the document, matched by vertices."""
     from scipy.spatial import cKDTree
 
     from mracad.occ.check import centres
@@ -221,7 +221,7 @@ def _file(file: Stated, document: Document) -> Layer:
 
 
 def limited(name: str, make: Callable[[], Layer], limits: CheckLimits, slow: Collection[str] | None = None) -> Layer:
-    """A layer that may take only so long, and whose crash is not the end; skipped when it is not in ``slow``."""
+    """A layer, made in a child process with a time limit, so that a crash is contained; skipped if not in ``slow``."""
     if slow is not None and name not in slow:
         return Layer(name, "skipped", "not asked for")
     if limits.layer_seconds is None:
@@ -244,7 +244,7 @@ def _load(faces: int, stated: int, unseen: str, unloaded: Callable[[], list[str]
 
 
 def _crossed(document: Document, measures: list[SeamMeasure], diagonal: float) -> Layer:
-    """Faces that cross, on a mesh and again on a finer one: what the coarser alone shows is its own error."""
+    """Faces that cross, on a mesh and again on a finer one: crossings on the coarser one alone are its own error."""
     from mracad.occ.triangles import triangles
 
     touching = {frozenset(m.faces) for m in measures if not m.sewn}

@@ -48,7 +48,7 @@ def compare(document: Document, options: Compare, original: Original | None = No
 
 
 def _measured(document: Document, place: bool) -> Subject:
-    """A document, measured; with ``place`` all of its instances where they stand."""
+    """A measured document; with ``place`` all instances at their places in the assembly."""
     from mracad.occ.check import check, lone_faces
     from mracad.occ.contents import contents
     from mracad.occ.measure import KernelGauge, face_masses, mass

@@ -48,9 +48,9 @@ class Report:
         Seams before and after, in the same order.
     valid_before, valid_after : Validity
     tolerances : Tolerances
-        What the edit may be worse in.
+        How much worse the edit may make seams.
     unmended : tuple of Mending
-        What was to be mended and is not.
+        Defects that were to be mended and were not.
     """
 
     model: Model
@@ -75,7 +75,7 @@ class Report:
         return before, after
 
     def gaps(self) -> dict[tuple[int, ...], float]:
-        """How wide seams may gape of faces that moved, each by itself or to a tolerance, mm, by their faces."""
+        """Largest gap (mm) allowed, by pair of faces, at seams whose faces moved separately or to a tolerance."""
         return gaps(self.model, self.before, self.edit, self.tolerances)
 
     def smooth_seams(self) -> frozenset[tuple[int, tuple[int, int]]]:
@@ -101,11 +101,11 @@ def play(
         Changed in place.
     steps : sequence of Step
     original : callable, optional
-        Reads the document again as it was, for a comparison.
+        Reads the document again as it was before any step, for comparisons.
     apply : bool
         False for a dry run, after which the document must not be written: the last step is not put into it.
     spoiled : mapping
-        Faces that no edit may touch, and why.
+        Faces that no edit may change, and why.
     firm : collection of int
         Edges that must not slide.
 
@@ -153,21 +153,21 @@ def run(
     document : Document
         Changed in place unless ``apply`` is false.
     edit : callable
-        ``edit(model, options, *models, scope=…, progress=…) -> Edit``, ``models`` those that the options name.
+        ``edit(model, options, *models, scope=…, progress=…) -> Edit``; the options name the ``models``.
     options : Selection
-        The edit's options, selectors among them.
+        Options of the edit, including its selectors.
     apply : bool
         False for a dry run.
     spoiled : mapping
-        Faces that the edit may not touch, and why.
+        Faces that the edit may not change, and why.
     firm : collection of int
         Edges that must not slide.
 
     Raises
     ------
     EditError
-        When faces were asked for one by one and none can move, or the result would be less valid than the input,
-        whatever faces are left.  The document must then not be written.
+        When faces were named one by one and none can move, or the result would be less valid than the input whichever
+        faces stay unchanged.  The document must then not be written.
     """
     from mracad.job.look import looked_at
     from mracad.occ.check import check
@@ -225,7 +225,7 @@ def run(
 
 
 def tell(progress: Progress | None, name: str, done: int = 0, total: int = 1) -> None:
-    """Say which stage is running."""
+    """Report the stage that is running."""
     note.doing(name)
     if progress:
         progress(name, done, total)
@@ -238,9 +238,9 @@ def _put(
     before: Validity,
     stage: Callable[[str], None],
 ) -> tuple[set[int], Validity]:
-    """Put an edit into a document: faces that would be less valid, for which it is taken out again, and the verdict.
+    """Apply an edit to a document; return the faces that would be less valid and the verdict.
 
-    ``seen`` are the model, the edit and what this may be worse in.
+    If there are such faces, the edit is taken out again.  ``seen`` are the model, the edit and its tolerances.
     """
     from mracad.occ.apply import apply, restore
     from mracad.occ.check import check
@@ -265,7 +265,7 @@ def _put(
 
 
 def _refuse_if_asked(model: Model, result: Edit, named: Collection[int]) -> None:
-    """Raise EditError where faces were asked for one by one and none of them can be done."""
+    """Raise EditError where faces were named one by one and none of them can be edited."""
     asked = [outcome for outcome in result.outcomes if outcome.face in named]
     left = [outcome for outcome in asked if outcome.status == "left"]
     if left and not any(outcome.status == "edited" for outcome in asked):
@@ -277,7 +277,7 @@ def _refuse_if_asked(model: Model, result: Edit, named: Collection[int]) -> None
 
 
 def _named(result: Edit, spoiled: Mapping[int, Spoilt]) -> Edit:
-    """The outcomes with the reasons for which ``spoiled`` faces were left."""
+    """The edit, with the reasons why ``spoiled`` faces stay unchanged."""
     if not spoiled:
         return result
     return replace(
@@ -290,14 +290,14 @@ def _named(result: Edit, spoiled: Mapping[int, Spoilt]) -> Edit:
 
 
 def _worse(before: Validity, after: Validity) -> set[int]:
-    """Faces with a failure that they did not have before (-1 for one that belongs to no face)."""
+    """Faces with a failure that they did not have before (-1 for a failure that belongs to no face)."""
     fresh = Counter(after.failures) - Counter(before.failures)
     lost = {-1} if after.free_edges > before.free_edges else set()
     return lost | {-1 if failure.face is None else failure.face for failure in fresh}
 
 
 def _verdict(before: Validity, moved: Validity, touched: set[int]) -> Validity:
-    """The verdict on the whole after an edit, from the check before it and that of the faces that moved."""
+    """The verdict on the whole model after an edit, from the check before it and the check of the faces that moved."""
     failures = tuple(f for f in before.failures if f.face not in touched) + moved.failures
     return replace(
         before,

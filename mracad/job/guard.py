@@ -1,4 +1,4 @@
-"""Work in a child process, so that a crash or an endless loop in the CAD kernel is an error and not the end."""
+"""Work in a child process, so that a crash or an endless loop in the CAD kernel becomes an error."""
 
 from __future__ import annotations
 
@@ -18,37 +18,37 @@ from mracad.note import Note, noting
 
 Result = TypeVar("Result")
 
-_GRACE = 1.0  # seconds for a child to put its files in order once its time is over
-_ENDING = 10.0  # seconds more for one whose files are already taking their places
+_GRACE = 1.0  # seconds for a child to clean up once its time is over
+_ENDING = 10.0  # seconds more for a child that is already moving its outputs into place
 _DEATH_SIGNAL = 1  # PR_SET_PDEATHSIG
 
 
 class TimeLimitError(LimitError):
-    """Work that took more time than it may."""
+    """Work that exceeded its time limit."""
 
 
-_memory: int | None = None  # that this process may hold, when it is a child with a limit
+_memory: int | None = None  # bytes that this process may hold, when it is a child with a limit
 
 
 def run(
     work: Callable[[], Result], returns: type[Result], seconds: float | None = None, memory: int | None = None
 ) -> Result:
-    """What ``work()`` returns, computed in a child process; a MracadError that it raises is raised here.
+    """The result of ``work()``, computed in a child process; a MracadError that it raises is raised here.
 
     Parameters
     ----------
     work : callable
     returns : type
-        Of the result, which comes as MessagePack.
+        Type of the result, which is sent as MessagePack.
     seconds : float, optional
-        Time that it may take.
+        Time limit.
     memory : int, optional
-        Bytes that it may hold; within such a child by default what that may.
+        Memory limit, bytes; by default that of this process, if it is such a child itself.
 
     Raises
     ------
     MracadError
-        With the code of a limit when one was hit; with that of an internal error when the child crashed, or raised
+        With the code of a limit when one was exceeded, and of an internal error when the child crashed or raised
         anything else.
     """
     global _memory
@@ -95,17 +95,17 @@ _OUT_OF_MEMORY = (
     "failed to map segment", "cannot map zero-fill pages", "Cannot allocate memory", "bad_alloc",
     "error return without exception set", "Unable to create type object",
 )  # fmt: skip
-"""What libraries say that ran out of memory: the loader, and compiled modules while they are loaded."""
+"""Messages of libraries that ran out of memory: the loader, and compiled modules while they are loaded."""
 
 
 def end_with_parent() -> None:
-    """Let this process be killed when the thread that started it ends, where the system can."""
+    """Have this process killed when the thread that started it ends, where the system can do that."""
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_DEATH_SIGNAL, signal.SIGKILL)
 
 
 def _child(work: Callable[[], Any], writer: int, memory: int | None) -> None:
-    """Run the work, send what became of it, and end the process, whatever happens."""
+    """Run the work, send its result or error, and end the process in any case."""
     try:
         end_with_parent()
         signal.signal(signal.SIGTERM, _terminated)
@@ -120,7 +120,7 @@ def _child(work: Callable[[], Any], writer: int, memory: int | None) -> None:
 
 
 def _answer(work: Callable[[], Any], memory: int | None) -> bytes:
-    """What the work came to, packed."""
+    """The packed result or error of the work."""
     if not memory:
         return wire.answer(work)
     import resource
@@ -133,7 +133,7 @@ def _answer(work: Callable[[], Any], memory: int | None) -> bytes:
         try:
             return work()
         except BaseException as error:
-            resource.setrlimit(resource.RLIMIT_DATA, (hard, hard))  # room to say so
+            resource.setrlimit(resource.RLIMIT_DATA, (hard, hard))  # memory to report it
             if _starved(error):
                 raise _out_of_memory(memory) from error
             raise
@@ -142,7 +142,7 @@ def _answer(work: Callable[[], Any], memory: int | None) -> bytes:
 
 
 def _take_buffers() -> None:
-    """Let the BLAS of numpy and that of scipy take their buffers: refused, they would ask for ever, or abort."""
+    """Let the BLAS of numpy and of scipy allocate their buffers: short of memory they would retry for ever or abort."""
     import numpy as np
     from scipy.linalg.lapack import dpbtrf
 
@@ -152,7 +152,7 @@ def _take_buffers() -> None:
 
 
 def _starved(error: BaseException) -> bool:
-    """Whether an error says that memory was refused; a library that cannot be loaded for that says it in words."""
+    """Whether an error means that memory ran out; libraries that cannot be loaded for it only say so in a message."""
     return isinstance(error, MemoryError) or any(words in str(error) for words in _OUT_OF_MEMORY)
 
 
@@ -161,7 +161,7 @@ def _terminated(*_: object) -> None:
 
 
 def _received(reader: int, seconds: float | None, note: Note) -> tuple[bytes, bool]:
-    """All that the child sends, and whether it ended in time."""
+    """Everything that the child sends, and whether it ended in time."""
     late = False
     end = None if seconds is None else time.monotonic() + seconds
     pieces: list[bytes] = []
@@ -180,7 +180,7 @@ def _received(reader: int, seconds: float | None, note: Note) -> tuple[bytes, bo
 
 @contextlib.contextmanager
 def _passing_on(child: int) -> Iterator[list[int]]:
-    """Hand requests to end on to the child; yields those that came."""
+    """Pass requests to end on to the child; yields the list of those that came."""
     asked: list[int] = []
 
     def end(number: int, _: object) -> None:
@@ -199,7 +199,7 @@ def _passing_on(child: int) -> Iterator[list[int]]:
 
 
 def _end(child: int) -> None:
-    """Ask a child to end, and make it."""
+    """Ask a child to end, and kill it if it does not."""
     deadline = time.monotonic() + _GRACE
     with contextlib.suppress(ProcessLookupError):
         os.kill(child, signal.SIGTERM)
@@ -212,7 +212,7 @@ def _end(child: int) -> None:
 
 
 def _peak(value: int) -> int:
-    """Bytes, from the number of the operating system."""
+    """Peak memory in bytes, from the number that the operating system gives."""
     return value if sys.platform == "darwin" else value * 1024
 
 

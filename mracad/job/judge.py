@@ -1,4 +1,4 @@
-"""What the steps that judge have in common."""
+"""What checks and comparisons have in common."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from mracad.occ.document import Document
 
 Original = Callable[[], "Document"]
-"""Reads a document again as it was."""
+"""Reads a document again as it was before any step."""
 
 
 @dataclass(frozen=True)
@@ -29,5 +29,5 @@ class Judged:
 
     @property
     def failures(self) -> list[str]:
-        """What does not hold, one line each; empty when it is passed."""
+        """What failed, one line each; empty when everything passed."""
         return [text for layer in self.failed for text in ([of_finding(f) for f in layer.findings] or [layer.text])]

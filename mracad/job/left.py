@@ -1,4 +1,4 @@
-"""What an edit may not touch any more, because something came out worse."""
+"""Faces that an edit may no longer change, because the result was worse there."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from mracad.inspect.seams import SeamMeasure
 from mracad.job.words import numbers
 
 ROUNDS = 8
-"""How often an edit is done again, each time without the faces that came out worse; then all are left that seams join
-to those, and if that does not help it is refused."""
+"""How often an edit is repeated, each time without the faces that came out worse.  After that all faces that seams join
+to them are left too, and if that does not help the edit is refused."""
 
 
 class Spoilt(Enum):
-    """Why an edit may not touch a face, of which something would come out worse."""
+    """Why an edit may not change a face: what would be worse."""
 
     SEAMS = "its seams would not hold"
     INVALID = "its result would not be valid"
@@ -26,13 +26,12 @@ class Spoilt(Enum):
 
 @dataclass
 class Left:
-    """The faces that an edit may not touch, and why, and the edges that must not slide; they become more with every
-    round.
+    """Faces that an edit may not change, and why, and edges that must not slide; each round adds some.
 
     Attributes
     ----------
     name : str
-        Of the model.
+        Name of the model, for messages.
     """
 
     name: str
@@ -41,7 +40,7 @@ class Left:
     rounds: int = 0
 
     def leave(self, faces: set[int], reason: Spoilt, seams: Sequence[SeamMeasure], edit: Edit) -> None:
-        """Leave some more, for a reason; after enough rounds all edited ones that seams join to any of them."""
+        """Leave more faces, for a reason; after enough rounds also all edited faces that seams join to any of them."""
         self.rounds += 1
         if self.rounds > ROUNDS + 1:
             names = numbers(sorted(faces))
@@ -54,12 +53,12 @@ class Left:
         self.faces |= dict.fromkeys(faces - self.faces.keys(), reason)
 
     def stopped(self, edges: Collection[int]) -> bool:
-        """Let edges not slide; whether there are any."""
+        """Forbid edges to slide; returns whether there are any new ones."""
         self.firm |= set(edges)
         return bool(edges)
 
     def explained(self, error: EditError) -> EditError:
-        """An error of an edit, which cannot know of the faces that were left."""
+        """An error of an edit, explained by the faces that were left, of which the edit does not know."""
         if not self.faces:
             return error
         face, reason = next(iter(self.faces.items()))
@@ -69,7 +68,7 @@ class Left:
 
 
 def _joined(faces: set[int], seams: Sequence[SeamMeasure], edited: set[int]) -> set[int]:
-    """Faces, and the edited ones that seams join to them, directly or through each other."""
+    """Faces, and all edited faces that seams join to them, directly or through others."""
     found, fresh = set(faces), set(faces)
     while fresh:
         fresh = {face for seam in seams if fresh.intersection(seam.faces) for face in seam.faces} & edited - found

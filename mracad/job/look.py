@@ -1,4 +1,4 @@
-"""A document as an edit sees it, and what the edit may move."""
+"""The view of a document that an edit gets, and what the edit may move."""
 
 from __future__ import annotations
 

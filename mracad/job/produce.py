@@ -1,4 +1,4 @@
-"""From a file to files: read, taken through steps, written, read back and judged before anything takes its place."""
+"""From a file to files: read, taken through steps, written, read back and judged before anything is put in place."""
 
 from __future__ import annotations
 
@@ -27,17 +27,17 @@ if TYPE_CHECKING:
     from mracad.spec.recipe import Step
 
 ROUNDS = 8
-"""How often an edit is done again, each time without the faces of which the file would be worse."""
+"""How often the steps are repeated, each time without the faces that would make the file worse."""
 
 
 @dataclass(frozen=True)
 class Target:
-    """A file to be made: its name, and how it is written (see :func:`mracad.occ.files.write`).
+    """An output: its name, and how it is written (see :func:`mracad.occ.files.write`).
 
     Attributes
     ----------
     chord : str
-        Meshes: a length, which may be a share of the diagonal.
+        Meshes: largest distance of triangles from the surface, a length or a share of the diagonal.
     """
 
     name: str
@@ -50,7 +50,7 @@ class Target:
 
 @dataclass(frozen=True)
 class Made:
-    """The content of a file, what it has otherwise than the document, what it is as read back (None: it was not)."""
+    """The content of an output, how it differs from the document, and what it is as read back (None: not read back)."""
 
     target: Target
     data: bytes = field(repr=False)
@@ -60,7 +60,7 @@ class Made:
 
 @dataclass(frozen=True)
 class Production:
-    """What came of a document: what each step did, and the files; none where a check failed or on a dry run."""
+    """The result of each step, and the outputs: none where a check failed, or on a dry run."""
 
     results: tuple[Report | Judged, ...] = ()
     made: tuple[Made, ...] = ()
@@ -82,29 +82,29 @@ def produce(
     verify: bool = True,
     progress: Progress | None = None,
 ) -> Production:
-    """Take a document through steps, and make files of it.
+    """Take a document through steps, and make output files from it.
 
-    Every file is read back and judged by the document.  Where it is worse, and worse than what the kernel alone makes
-    of the input, the steps are done again without the faces that cause it.
+    Every file is read back and compared with the document.  If it is worse, and also worse than the kernel's own read
+    and write of the input, the steps are repeated without the faces that cause it.
 
     Parameters
     ----------
     document : Document
         Changed in place.
     original : callable
-        Reads it again as it was.
+        Reads the document again as it was before any step.
     steps : sequence of Step
     targets : sequence of Target
         None for a dry run.
     title : str
-        What was done, for the header of the files.
+        Description of the steps, for the header of the files.
     verify : bool
-        False to make the files as they come.
+        False to skip reading back.
 
     Raises
     ------
     EditError
-        When a step cannot be done, or a file would be worse whatever is left.
+        When a step cannot be done, or a file would be worse whichever faces stay unchanged.
     """
     spoiled: dict[int, Spoilt] = {}
     firm: set[int] = set()
@@ -150,17 +150,17 @@ def read_back(
     written: Written | None = None,
     original: Original | None = None,
 ) -> ReadBack:
-    """Judge an exact file by the document that was written to it.
+    """Read an exact file back and compare it with the document that was written to it.
 
     Parameters
     ----------
     document : Document
     file : path or binary stream
     written : Written, optional
-        What writing it said: which faces are in parts.
+        The result of writing it, which tells which faces are in parts.
     original : callable, optional
-        Reads the document as it was before it was edited: then what is worse than in the document is forgiven only
-        where the kernel's own copy of that has it, too; otherwise all is forgiven that is no loss of content.
+        Reads the document as it was before it was edited.  Then a fault is forgiven only where the kernel's own read
+        and write of that has it too; without it every fault is forgiven that loses no content.
 
     Raises
     ------
@@ -207,7 +207,7 @@ class _Memory:
 
 
 class _Copies:
-    """What the kernel alone makes of the input: read, written in the same format, read back; made where asked for."""
+    """The kernel's own copy of the input: read, written in the same format and read back, only when asked for."""
 
     def __init__(self, original: Original) -> None:
         self.original = original
@@ -220,11 +220,11 @@ class _Copies:
         return facts(self.original())
 
     def mesh(self, target: Target) -> Written:
-        """How a mesh of the input comes out."""
+        """A mesh of the input."""
         return _made(self.original(), target, "").written
 
     def of(self, target: Target) -> tuple[Facts, Facts]:
-        """Facts of the input and of its copy; where it cannot be read the input, so that nothing is forgiven."""
+        """Facts of the input and of its copy; of the input twice if there is no copy: nothing is forgiven."""
         key = target.format, target.schema
         if key not in self._made:
             data = _made(self.original(), target, "").data
@@ -238,7 +238,7 @@ class _Copies:
 
 
 def _made(document: Document, target: Target, title: str) -> Made:
-    """A file of a document, as it comes."""
+    """A document written to a file, not yet judged."""
     from mracad.occ.files import write
 
     meshed = FORMATS[target.format].kind == "mesh"
@@ -273,12 +273,12 @@ def _read_back(data: bytes, target: Target) -> Facts:
 
 
 def _unreadable(error: Exception) -> bool:
-    """Whether an error says of a file that no document comes of it: those of files, and the kernel's own."""
+    """Whether an error means that a file cannot be read: file errors, and those of the kernel."""
     return isinstance(error, FileError) or type(error).__module__.startswith("OCP")
 
 
 def _judged(made: Made, memory: _Memory, copies: _Copies) -> Made:
-    """A file with what it is, read back."""
+    """An output, read back and judged."""
     if FORMATS[made.target.format].kind == "mesh":
         torn = made.written.open
         before = copies.mesh(made.target).open if torn and memory.edited else torn
@@ -298,7 +298,7 @@ def _judged(made: Made, memory: _Memory, copies: _Copies) -> Made:
 
 
 def _refused(name: str, faults: Sequence[tuple[Target, Fault]]) -> EditError:
-    """The error that names what would be worse, the worst kind first."""
+    """The error for outputs that would be worse; it names the worst fault."""
     target, fault = min(faults, key=lambda each: list(FaultKind).index(each[1].reason))
     more = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
     return EditError(

@@ -1,4 +1,4 @@
-"""What processes of ours say to each other: MessagePack of declared types, so that nothing in it is ever run."""
+"""Messages between our processes: MessagePack of declared types, so that receiving one never runs code."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _KINDS = {
 
 
 class Failure(msgspec.Struct, frozen=True, array_like=True):
-    """An error on its way; see :class:`mracad.errors.MracadError`."""
+    """An error in a message; see :class:`mracad.errors.MracadError`."""
 
     message: str
     hint: str
@@ -33,7 +33,7 @@ class Failure(msgspec.Struct, frozen=True, array_like=True):
 
 
 def answer(work: Callable[[], Any]) -> bytes:
-    """Do some work; its result or error, packed."""
+    """Do some work; return its packed result or error."""
     try:
         return DONE + msgspec.msgpack.encode(work())
     except BaseException as error:
@@ -41,7 +41,7 @@ def answer(work: Callable[[], Any]) -> bytes:
 
 
 def failed(error: BaseException) -> bytes:
-    """An error, packed; one that is not ours is told in words."""
+    """A packed error; an unexpected one becomes an internal error."""
     if not isinstance(error, MracadError):
         error = internal(error)
     message, hint = (text.encode(errors="backslashreplace").decode() for text in (error.message, error.hint))
@@ -49,7 +49,7 @@ def failed(error: BaseException) -> bytes:
 
 
 def internal(error: BaseException) -> MracadError:
-    """The error for one that nobody expected."""
+    """The MracadError for an unexpected exception."""
     if isinstance(error, MemoryError):
         return LimitError("out of memory", "use a smaller model or a machine with more memory")
     text = " ".join(str(error).split())
@@ -57,7 +57,7 @@ def internal(error: BaseException) -> MracadError:
 
 
 def heard(data: bytes, kind: type[Value]) -> Value:
-    """The result in what another process sent; an error in it is raised."""
+    """The result in a message of another process; an error in it is raised."""
     if data[:1] == DONE:
         return msgspec.msgpack.decode(data[1:], type=kind)
     failure = msgspec.msgpack.decode(data[1:], type=Failure)
@@ -68,7 +68,7 @@ def heard(data: bytes, kind: type[Value]) -> Value:
 
 
 def returned(function: Callable[..., Any]) -> Any:
-    """The type that a function says it returns; anything where it says nothing."""
+    """The declared return type of a function; Any where it declares none."""
     if not (inspect.isfunction(function) and "return" in function.__annotations__):
         return Any
     return typing.get_type_hints(function)["return"]

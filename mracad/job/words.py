@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 SHOWN = 6
-"""Most faces named in one line."""
+"""Largest number of faces named in one line."""
 
 
 def numbers(faces: Sequence[int]) -> str:
@@ -23,12 +23,12 @@ def numbers(faces: Sequence[int]) -> str:
 
 
 def of_finding(finding: Finding) -> str:
-    """What was found, in one line."""
+    """A finding in one line."""
     return _SENTENCES.get(finding.rule, _failure)(finding)
 
 
 def placed(finding: Finding) -> str:
-    """The same with its place."""
+    """A finding in one line, with its place."""
     at = "" if finding.where is None else " at " + " ".join(f"{x:.6g}" for x in finding.where)
     return of_finding(finding) + at
 
@@ -38,7 +38,7 @@ def _faces(faces: Sequence[int]) -> str:
 
 
 def _paired(finding: Finding) -> str:
-    """A face of the new document, and its number in the reference where that is another."""
+    """A face of the new document, with its number in the reference where that differs."""
     (face,), was = finding.faces, finding.figures["was_face"]
     assert isinstance(was, int)
     return f"#{face + 1}" if face == was else f"#{face + 1} (was #{was + 1})"
@@ -80,7 +80,7 @@ _SENTENCES: dict[str, Callable[[Finding], str]] = {
         else f"{f.figures['count']} faces could not be loaded"
     ),
     "same-sense": lambda f: f"the same_sense of {_faces(f.faces)} in the file is wrong",
-    "free-edge": lambda f: f"edge#{(f.edge or 0) + 1} of {_faces(f.faces)} is free",
+    "free-edge": lambda f: f"edge#{(f.edge or 0) + 1} of {_faces(f.faces)} is a free edge",
     "flipped-face": lambda f: f"{_faces(f.faces)} faces the opposite way to its neighbours",
     "unsewn": lambda f: f"{_faces(f.faces)} are not sewn, gap {f.figures['gap']:.3g} mm",
     "gap": lambda f: f"gap {f.figures['gap']:.3g} mm {_seam(f)}",
@@ -106,12 +106,12 @@ _SENTENCES: dict[str, Callable[[Finding], str]] = {
         "their edges"
     ),
     # seams
-    "seam-lost": lambda f: f"no seam any more {_seam(f)}",
-    "seam-added": lambda f: f"a new seam, {_seam(f)}",
+    "seam-lost": lambda f: f"seam {_seam(f)} is gone",
+    "seam-added": lambda f: f"seam {_seam(f)} is new",
     "seam-pieces": lambda f: f"{f.figures['now']} edges between {_faces(f.faces)}, were {f.figures['was']}",
     "crease": lambda f: f"{_seam(f)} is no longer smooth: {f.figures['now']:.4g}°, was {f.figures['was']:.4g}°",
     "seam-laid-anew": lambda f: (
-        f"{_seam(f)} measures {f.figures['now']:.4g}°, was {f.figures['was']:.4g}°: its curves lie elsewhere on "
+        f"{_seam(f)} measures {f.figures['now']:.4g}°, was {f.figures['was']:.4g}°: its curves have moved on "
         "the same faces"
     ),
     "gap-growth": lambda f: f"gap {_seam(f)} is {f.figures['now']:.4g} mm, was {f.figures['was']:.4g} mm",
@@ -143,7 +143,7 @@ def _of_product(finding: Finding) -> str:
 
 
 def of_fault(fault: Fault) -> str:
-    """What is worse in a file, in one line."""
+    """A fault of a file in one line."""
     where = _faces(fault.faces[:2]) + (" …" if len(fault.faces) > 2 else "")
     where = where or ("it" if fault.reason is FaultKind.UNREAD else "somewhere")
     change = 100 * abs(fault.value - fault.was) / abs(fault.was) if fault.was else 0.0
@@ -161,7 +161,7 @@ _FAULTS = {
     FaultKind.LOST: "{where} is lost",
     FaultKind.AREA: "the area of {where} changes by {share}",
     FaultKind.VOLUME: "the volume changes by {share}",
-    FaultKind.BOX: "the box changes by {f.value:.3g} mm",
+    FaultKind.BOX: "the bounding box changes by {f.value:.3g} mm",
     FaultKind.TOLERANCE: "a tolerance of {f.value:.3g} mm at {where} (largest {f.was:.3g} mm)",
     FaultKind.SEAM: "no seam between {where}",
     FaultKind.GAP: "a gap of {f.value:.3g} mm between {where} (was {f.was:.3g} mm)",
@@ -171,22 +171,22 @@ _FAULTS = {
 
 
 def notes(report: Report) -> list[str]:
-    """What an edit says of itself beside its figures, a line each."""
+    """The notes of an edit, one line each."""
     reasons = {treatment.edge: str(treatment.reason) for treatment in report.edit.edges if treatment.reason}
     return [_mending(each, reasons.get(-1 if each.edge is None else each.edge, "")) for each in report.unmended]
 
 
 def _mending(mending: Mending, reason: str) -> str:
-    """What became of defects that were to be mended; the edge that is farthest off did not move for a reason."""
+    """How many defects were mended; ``reason`` is why the worst remaining edge did not move."""
     gaps, m = mending.what == "close-gaps", mending
     if not m.defects:
         if gaps:
             text = f"close-gaps: no gap between edited faces is wider than {m.least:g} mm"
             return f"{text} (the widest: {m.next or 0.0:.2g} mm)"
         text = f"fit-g1: no seam between edited faces has an angle of {m.least}° to {m.most:g}°"
-        return text if m.next is None else f"{text} (the least above: {m.next:.3g}°)"
+        return text if m.next is None else f"{text} (the smallest above that: {m.next:.3g}°)"
     text = f"{m.what}: {'closed' if gaps else 'made tangent'} {m.defects - m.left} of {m.defects} "
     text += ("gap" if gaps else "seam") + "s" * (m.defects > 1)
     text += f", {m.mostly} more except at their ends" if m.mostly else ""
-    how = f"open by {m.after:.3g} mm" if gaps else f"bent by {m.after:.3g}°"
-    return f"{text}; edge#{(m.edge or 0) + 1} stays {how}" + (f" ({reason})" if reason else "")
+    rest = f"a gap of {m.after:.3g} mm" if gaps else f"an angle of {m.after:.3g}°"
+    return f"{text}; edge#{(m.edge or 0) + 1} keeps {rest}" + (f" ({reason})" if reason else "")

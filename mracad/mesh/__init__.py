@@ -1,4 +1,4 @@
-"""Triangle meshes out, one module a format; numpy alone."""
+"""Writing triangle meshes: one module per format, with numpy only."""
 
 from collections.abc import Callable
 

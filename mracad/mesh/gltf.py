@@ -1,7 +1,7 @@
-"""glTF 2.0, text or binary: the tree with its names, a primitive with its colour for each face, in metres and Y up.
+"""glTF 2.0, text or binary: the tree with its names, and a primitive with a colour for each face; in metres, Y up.
 
 https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html.  The faces of a body share its points, so that a closed body
-is closed; what draws it makes the normals.
+is closed; viewers compute the normals.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ def _content(scene: Scene) -> tuple[bytes, dict[str, Any]]:
 
 
 def _mesh(body: Body, colours: list[str], data: bytearray, views: list[Any], accessors: list[Any]) -> dict[str, Any]:
-    """A body; its numbers go to the end of the buffer."""
+    """The mesh entry of a body, whose numbers are appended to the buffer."""
     points = body.points.astype("<f4")
     views.append({"buffer": 0, "byteOffset": len(data), "byteLength": points.nbytes, "target": _POINTS})
     data += points.tobytes()
@@ -85,7 +85,7 @@ def _mesh(body: Body, colours: list[str], data: bytearray, views: list[Any], acc
 
 
 def _node(node: Node, nodes: list[dict[str, Any]]) -> int:
-    """Add a node and what is below it; its number."""
+    """Add a node and its children; returns its number."""
     entry: dict[str, Any] = {"name": node.name}
     if not np.array_equal(node.frame, np.eye(4)):
         entry["matrix"] = node.frame.T.ravel().tolist()  # by columns

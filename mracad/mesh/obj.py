@@ -1,6 +1,6 @@
-"""OBJ: an object for each instance, a group for each face, in mm; a colour with each point, as many readers take it.
+"""OBJ: an object for each instance and a group for each face, in mm; points carry colours, which many readers accept.
 
-Materials would need a second file.  Faces share their points, so that a closed body is closed: where two colours meet,
+Materials would need a second file.  Faces share their points, so that a closed body is closed; where two colours meet,
 a point has that of the later face.
 """
 
@@ -30,7 +30,7 @@ def write(scene: Scene) -> bytes:
 
 
 def _looks(scene: Scene) -> dict[str, list[str]]:
-    """What stands behind a point of each colour: red, green and blue, and opacity where anything is transparent."""
+    """The values after the points of each colour: red, green and blue, and opacity if anything is transparent."""
     every = {colour or GREY for body in scene.bodies for colour in body.colours}
     if every <= {GREY}:
         return {GREY: []}
@@ -39,7 +39,7 @@ def _looks(scene: Scene) -> dict[str, list[str]]:
 
 
 def _points(body: Body, looks: dict[str, list[str]]) -> Iterator[tuple[list[float], list[str]]]:
-    """The points of a body, and what stands behind each."""
+    """The points of a body, and the colour values after each."""
     own = [body.colours[0] or GREY] * len(body.points)
     for coloured in (False, True):
         for face, triangles in body.groups():
@@ -50,5 +50,5 @@ def _points(body: Body, looks: dict[str, list[str]]) -> Iterator[tuple[list[floa
 
 
 def _word(name: str) -> str:
-    """A name without what would end it or begin something else."""
+    """A name without characters that would end it or start something else."""
     return "_".join("".join(c if c.isprintable() and c not in "#\\" else " " for c in name).split())

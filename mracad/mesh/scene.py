@@ -1,4 +1,4 @@
-"""Triangles of bodies that stand in a tree, as plain arrays: what every mesh format is written from."""
+"""Triangles of bodies in a tree, as plain arrays: the source of every mesh format."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 Array = np.ndarray
 
 GREY = "#b3b3b3"
-"""What has no colour of its own, where the format wants one."""
+"""Colour of what has none, for formats that need one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,11 +24,11 @@ class Body:
     corners : ndarray of int (m, 3)
         Point numbers, anticlockwise seen from outside; neighbouring triangles share them, across faces too.
     faces : ndarray of int (m,)
-        Which face each triangle belongs to, from 0, ascending.
+        Index of the face of each triangle, from 0, ascending.
     labels : tuple of str
-        For each face its number in the document, as ``"#7"``, and its name.
+        For each face, its number in the document (``"#7"``) and its name.
     colours : tuple of str
-        For each face ``"#rrggbb"``, ``"#rrggbbaa"`` or ``""``.
+        Colour of each face: ``"#rrggbb"``, ``"#rrggbbaa"`` or ``""``.
     """
 
     name: str
@@ -39,7 +39,7 @@ class Body:
     colours: tuple[str, ...]
 
     def groups(self) -> Iterator[tuple[int, slice]]:
-        """The faces that have triangles, and which."""
+        """The faces that have triangles, and the slice of their triangles."""
         present, first = np.unique(self.faces, return_index=True)
         ends = [*first[1:].tolist(), len(self.faces)]
         yield from ((face, slice(*run)) for face, *run in zip(present.tolist(), first.tolist(), ends, strict=True))
@@ -53,9 +53,9 @@ class Node:
     ----------
     name : str
     frame : ndarray (4, 4)
-        Of its content, in the frame of the node above.
+        Placement of its content in the frame of the node above.
     body : int or None
-        Which body stands here.
+        Index of the body here.
     children : tuple of Node
     """
 
@@ -67,7 +67,7 @@ class Node:
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """Bodies and where they stand.
+    """Bodies and the tree of their instances.
 
     Attributes
     ----------
@@ -81,7 +81,7 @@ class Scene:
     roots: tuple[Node, ...]
 
     def placed(self) -> Iterator[Body]:
-        """Every instance of a body, with its points in the frame of the whole."""
+        """Every instance of a body, with its points in the frame of the scene."""
         yield from self._below(self.roots, np.eye(4))
 
     def _below(self, nodes: tuple[Node, ...], above: Array) -> Iterator[Body]:

@@ -1,4 +1,4 @@
-"""STL: all triangles, in mm; nothing else fits into it."""
+"""STL: all triangles, in mm; the format holds nothing else."""
 
 from __future__ import annotations
 

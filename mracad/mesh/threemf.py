@@ -37,11 +37,11 @@ _HEAD = (
     'xmlns:t="http://schemas.microsoft.com/3dmanufacturing/trianglesets/2021/07">'
 )
 _FORBIDDEN = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]")
-_COLOURS = 1  # the number of the resource that holds them
+_COLOURS = 1  # number of the resource with the colours
 
 
 def write(scene: Scene) -> bytes:
-    """A scene as 3MF: the same bytes every time."""
+    """A scene as 3MF, with reproducible bytes."""
     packed = io.BytesIO()
     with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
         for path, text in (
@@ -97,7 +97,7 @@ def _object(number: int, body: Body, place: dict[str, int]) -> Iterator[str]:
 
 
 def _reference(tag: str, node: Node, scene: Scene, groups: list[str]) -> str:
-    """An element that places the content of a node; an object that holds components is added to ``groups``."""
+    """An element that places the content of a node; objects with components are added to ``groups``."""
     if node.body is not None:
         number = _COLOURS + 1 + node.body
     else:

@@ -1,1 +1,1 @@
-"""A CAD document as plain arrays: faces on surfaces, joined by edges; their regions; displacements; facts."""
+"""A CAD document as plain arrays (faces on surfaces, joined by edges), regions of faces, displacements, and facts."""

@@ -1,11 +1,11 @@
 """Free edges that coincide: the seams of a model whose faces were never sewn.
 
-Each edge is known at samples with unit tangents; between two samples it is the cubic Hermite arc, whose error is of
-fourth order in the step.  An edge coincides with another if all of its samples lie on the other's arcs.
+Each edge is known at samples with unit tangents; between two samples it is taken as the cubic Hermite arc, whose error
+is of fourth order in the step.  An edge coincides with another if all of its samples lie on the other's arcs.
 
-The distance for that depends on the model alone, so that its size does not matter: the tolerances of the edges, or a
-share of the edge and of the model, whichever is less (:func:`reach`).  Parts that stand once and in the same place (the
-roots of an IGES file, the products of many STEP files) share one space.
+The distance for that scales with the model: the tolerances of the edges, or a share of the edge and of the model,
+whichever is less (:func:`reach`).  Parts with a single instance in the same place (the roots of an IGES file, the
+products of many STEP files) share one space.
 """
 
 from __future__ import annotations
@@ -82,7 +82,7 @@ def touching(model: Model) -> frozenset[int]:
 
 
 def _placed(edge: Edge, frame: Array) -> Edge:
-    """An edge where an instance of its part stands."""
+    """An edge in the place of an instance of its part."""
     turn = frame[:3, :3].T
     return replace(edge, points=edge.points @ turn + frame[:3, 3], tangents=edge.tangents @ turn)
 

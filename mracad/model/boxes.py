@@ -1,4 +1,4 @@
-"""The box of a trimmed NURBS face itself, which may be far smaller than that of its control points.
+"""The exact box of a trimmed NURBS face, which may be far smaller than that of its control points.
 
 Each coordinate has its extremes on the boundary, or inside where its gradient vanishes.  The boundary is known from
 its edges; inside, the best points of a grid are refined by Newton's method.  Where the box of the control points does
@@ -23,12 +23,12 @@ CLOSE = 1e-6
 """Error allowed of a face's box, as a share of the face's size."""
 
 PER_SPAN, MOST = 2, 64
-"""Grid lines per span, and about the most in all, in either direction."""
+"""Grid lines per span, and roughly the largest number in all, in either direction."""
 
 STEPS = 4
 """Steps of Newton's method."""
 
-_FEW = 16  # most knots of an edge that its samples resolve
+_FEW = 16  # largest number of knots of an edge that its samples resolve
 
 
 def rims(edges: Sequence[Edge]) -> list[Array]:
@@ -71,7 +71,7 @@ def box(face: Face, net: Net, rim: Array, outer: Array, slack: float = 0.0) -> A
     for k, axis in wanted:
         sign = 2 * k - 1
         heights = sign * points[..., axis]
-        if heights.max() <= sign * rim[k, axis]:  # a grid point off the face says as much of what lies between
+        if heights.max() <= sign * rim[k, axis]:  # a grid point outside the face bounds what lies in between as well
             continue
         inside = inside_grid(face, net, us, vs) if inside is None else inside
         if not inside.any():
@@ -135,7 +135,7 @@ def _spread(knots: KnotVector, low: float, high: float) -> Array:
 
 
 def _sharpened(net: Net, us: Array, vs: Array, at: tuple[int, int], direction: Array) -> tuple[float, Array]:
-    """The peak in a direction near a grid point, no further away than the next grid lines: its height and place."""
+    """Height and parameters of the peak in a direction near a grid point, no farther away than the next grid lines."""
     start = np.array([us[at[0]], vs[at[1]]])
     step = np.array([us[1] - us[0], vs[1] - vs[0]])
     ends = np.array([[us[0], vs[0]], [us[-1], vs[-1]]])

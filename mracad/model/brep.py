@@ -18,7 +18,7 @@ from mracad.model.rails import Rails
 Array = np.ndarray
 
 SAME = 9
-"""Decimals in which the numbers of two frames that are the same agree."""
+"""Number of decimals to which equal frames agree."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +34,7 @@ class Surface:
     faces : tuple of int
         Indices of the faces that lie on it.
     origin : str
-        ``"bspline"``, ``"bezier"``, or the analytic kind it would be converted from (``"extrusion"``, …).
+        ``"bspline"``, ``"bezier"``, or the analytic kind from which it is converted (``"extrusion"``, …).
     """
 
     index: int
@@ -61,7 +61,7 @@ class Trim:
 
 @dataclass(frozen=True, eq=False)
 class Face:
-    """One face of one part.  A part that is instanced counts once (``instances`` says how often it stands).
+    """One face of one part.  A part with several instances counts once (see ``instances``).
 
     Attributes
     ----------
@@ -83,10 +83,10 @@ class Face:
     frame : ndarray (4, 4)
         Rigid map from the surface's frame to the part's.
     box : ndarray (2, 3)
-        Lowest and highest corner of its control points' box in the part's frame, mm; ``face_boxes`` of ``occ.boxes``
-        gives that of the face itself.
+        Lowest and highest corner of its control points' box in the part's frame, mm; see ``occ.boxes.face_boxes`` for
+        that of the face itself.
     instances : int
-        How often the part stands in the document.
+        Number of instances of the part in the document.
     """
 
     index: int
@@ -162,7 +162,7 @@ class Edge:
     degenerate : bool
         A pole: the edge is a point in space.
     part : int
-        Which part (shape definition) it belongs to.
+        Index of the part (shape definition) to which it belongs.
     """
 
     index: int
@@ -199,11 +199,11 @@ class Model:
     schema : str
         STEP schema (``"AP203"``, ``"AP214"``, ``"AP242"``).
     products : tuple of str
-        By part.
+        Names of the parts.
     places : tuple of tuple of ndarray (4, 4)
-        By part, the frames in which its instances stand; empty for a model of one part where it stands.
+        Frames of the instances, by part; empty for a model of one part in its place.
     rails : Rails
-        What edges can slide along; empty where nobody asked for it.
+        Surfaces and curves along which edges can slide; empty if not asked for.
     """
 
     name: str
@@ -219,7 +219,7 @@ class Model:
 
     @cached_property
     def spaces(self) -> tuple[int, ...]:
-        """By part, the space of its coordinates: parts that stand once and in the same place share one."""
+        """The coordinate space of each part: parts with a single instance in the same place share one."""
         first: dict[bytes, int] = {}
         bases = [
             first.setdefault((frames[0].round(SAME) + 0.0).tobytes(), part) if len(frames) == 1 else part
@@ -228,5 +228,5 @@ class Model:
         return tuple(bases)
 
     def with_surfaces(self, surfaces: Sequence[Surface]) -> Model:
-        """The model with other surfaces under the same faces (baked sides stay where they are)."""
+        """The model with other surfaces under the same faces (sides with fixed points stay as they are)."""
         return replace(self, surfaces=tuple(surfaces))

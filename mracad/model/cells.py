@@ -17,10 +17,10 @@ from mracad.model.outline import MARGIN, Outline, outline
 Array = np.ndarray
 
 PIECES = 4
-"""Fewest pieces into which the extent of a trimmed face is divided in either direction."""
+"""Least number of pieces into which the extent of a trimmed face is divided in either direction."""
 
 ENOUGH = 16
-"""Fewest quadrature points on a face; pieces are halved until it has so many, up to ``HALVINGS`` times."""
+"""Least number of quadrature points on a face; pieces are halved up to ``HALVINGS`` times to reach it."""
 
 HALVINGS = 5
 
@@ -42,7 +42,7 @@ class Quadrature:
     wu, wv : ndarray (pieces, points)
         Weights, in parameter units.
     mask : ndarray of bool (pieces_u · points_u, pieces_v · points_v)
-        Which of their pairs lie on one of the faces.
+        Whether a pair of them lies on one of the faces.
     """
 
     u: Array
@@ -53,17 +53,17 @@ class Quadrature:
 
     @property
     def weights(self) -> Array:
-        """Weights of all pairs of parameters, zero off the faces, shaped as ``mask``."""
+        """Weights of all pairs of parameters, zero outside the faces, in the shape of ``mask``."""
         return np.asarray(self.wu.reshape(-1, 1) * self.wv.reshape(-1) * self.mask)
 
 
 def inside_grid(face: Face, net: Net, u: Array, v: Array) -> Array:
-    """Which pairs of parameters lie on a face.
+    """Whether pairs of parameters lie on a face.
 
     Parameters
     ----------
     face : Face
-        With its boundary; without one it is the whole surface.
+        The face; without a boundary it is the whole surface.
     net : Net
         Its surface, or a refinement of it.
     u, v : ndarray (nu,), (nv,)
@@ -94,12 +94,12 @@ def quadrature(
         The surface, or a refinement of it.
     faces : sequence of Face
     points : int, optional
-        Points a piece in either direction; the degree + 1 of each direction by default, with which products of two
-        functions of the net are integrated exactly.
+        Points per piece in each direction; by default degree + 1, which integrates products of two functions of the net
+        exactly.
     fewest : int
-        Points along the faces in either direction, at least.
+        Least number of points along the faces in either direction.
     ends : bool
-        Whether the ends of the pieces are among the points, from inside: Gauss–Lobatto.
+        Whether the ends of the pieces, seen from inside, are among the points (Gauss–Lobatto).
 
     Notes
     -----
@@ -122,7 +122,7 @@ def quadrature(
 
 
 def _within(kv: KnotVector, x: Array) -> Array:
-    """Which parameters lie in the domain."""
+    """Whether parameters lie in the domain."""
     if kv.periodic:
         return np.ones(len(x), dtype=bool)
     margin, (low, high) = MARGIN * kv.period, kv.domain
@@ -146,7 +146,7 @@ def _covered(chords: Array, box: Array, knots: tuple[KnotVector, KnotVector], u:
 
 
 def _beside(kv: KnotVector, limits: Array, x: Array) -> Array:
-    """Parameters, those on the limits of the face (of any period) moved to lie just between them."""
+    """Parameters; those on the limits of the face (in any period) are moved just inside."""
     margin, period = MARGIN * kv.period, kv.period if kv.periodic else np.inf
     for limit, step in zip(limits, (2 * margin, -2 * margin), strict=True):
         away = x - limit
@@ -244,6 +244,6 @@ def lobatto(points: int) -> tuple[Array, Array]:
 
 
 def _drawn_in(x: Array) -> Array:
-    """Points of pieces, in one row, where it is asked whether they are inside: never on the pieces' ends."""
+    """Points of pieces, in one row, moved off the pieces' ends for inside tests."""
     middle = x.mean(axis=1, keepdims=True)
     return np.asarray((middle + (1 - ASIDE) * (x - middle)).ravel())

@@ -1,4 +1,4 @@
-"""What an edit does to a model: offsets of the control points of its surfaces."""
+"""The displacement of a model by an edit: offsets of the control points of its surfaces."""
 
 from __future__ import annotations
 
@@ -18,13 +18,14 @@ Array = np.ndarray
 
 @dataclass(frozen=True, eq=False)
 class Offset:
-    """Pole offsets of one surface, in its own spline space or one that holds it exactly: of higher degree, finer.
+    """Offsets of the control points of one surface, in its own spline space or a larger one (higher degree, more
+    knots).
 
     Attributes
     ----------
     poles : ndarray (nu, nv, 3)
-        Offsets of the Euclidean control points of the net that ``over`` gives, mm; weights are kept.
-        Rows that are exactly zero are left bit-identical.
+        Offsets of the Euclidean control points of the net from ``over``, mm; weights are kept.
+        Control points with a zero offset stay bit-identical.
     u_knots, v_knots : ndarray
         Knots to insert first (with repetition), beyond those the (elevated) surface has; empty for none.
     degrees : (int, int)
@@ -58,7 +59,7 @@ class Offset:
 
 @dataclass(frozen=True, eq=False)
 class Displacement:
-    """The result of an edit: offsets of control points by surface index.  Surfaces that are not named do not move.
+    """The result of an edit: offsets of control points by surface index.  Surfaces without an entry do not move.
 
     Attributes
     ----------
@@ -71,7 +72,7 @@ class Displacement:
     slid: dict[int, int] = field(default_factory=dict)
 
     def scaled(self, factor: float) -> Displacement:
-        """The same displacement times ``factor``."""
+        """The displacement multiplied by ``factor``."""
         return Displacement({i: replace(o, poles=factor * o.poles) for i, o in self.offsets.items()}, self.slid)
 
     def around(self, model: Model) -> set[int]:
@@ -82,7 +83,7 @@ class Displacement:
         return {side.face for edge in edges for side in edge.sides}
 
     def slid_at(self, model: Model, faces: Collection[int]) -> set[int]:
-        """The edges that slid and meet some faces; all of them if none of these is known (−1)."""
+        """The edges that slid and meet some faces; all that slid if no face is known (−1)."""
         known = {face for face in faces if face >= 0}
         if not self.slid or not known:
             return set(self.slid)
@@ -92,7 +93,8 @@ class Displacement:
         return {edge for edge in self.slid if not met.isdisjoint(ends[edge])}
 
     def applied(self, model: Model) -> Model:
-        """The model with its surfaces displaced, and edges that slid (other baked sides stay where they are)."""
+        """The model with its surfaces displaced, and edges that slid (other sides with fixed points stay as they
+        are)."""
         surfaces = list(model.surfaces)
         for index, offset in self.offsets.items():
             net = offset.over(surfaces[index].net)
@@ -110,7 +112,7 @@ def lifted(own: Net, fine: Net, offset: Array) -> Array:
 
 
 def _slid(model: Model, edge: Edge, face: Face) -> Edge:
-    """An edge where its face that moved has it, with the nearest points of its neighbour."""
+    """An edge moved onto its face that moved, with the nearest points of its neighbour."""
     assert face.surface is not None
     trim = next(trim for trim in face.trims if trim.edge == edge.index)
     first, last = trim.curve.knots.domain
@@ -122,7 +124,7 @@ def _slid(model: Model, edge: Edge, face: Face) -> Edge:
 
 
 def _beside(model: Model, side: Side, points: Array, tangents: Array) -> Side:
-    """A face that stays, at the points nearest to an edge."""
+    """The side of a face that stays, at its points nearest to an edge."""
     face = model.faces[side.face]
     if face.surface is not None:
         assert side.uv is not None

@@ -1,4 +1,4 @@
-"""Facts about a document, in numbers and words: the kernel room makes them, and all others judge by them."""
+"""Facts about a document as plain data: made in ``mracad.occ``, used by all other rooms."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Failure:
     kind : str
         ``"face"``, ``"wire"``, ``"edge"``, ``"vertex"``, ``"shell"`` or ``"solid"``.
     status : str
-        The kernel's name for it, as ``"SelfIntersectingWire"``.
+        The kernel's name for it, such as ``"SelfIntersectingWire"``.
     face : int or None
         Index of the face in which it was found; None for shells and solids.
     """
@@ -37,18 +37,18 @@ class Failure:
 
 @dataclass(frozen=True)
 class Validity:
-    """The kernel's verdict on a document; a part that is instanced counts once.
+    """The kernel's verdict on a document; a part with several instances counts once.
 
     Attributes
     ----------
     valid : bool
     failures : tuple of Failure
     solids, shells, faces, open_shells : int
-        Of the whole document.
+        Numbers in the whole document.
     free_edges : int
-        Edges that one face uses once.
+        Number of edges that a single face uses once.
     edge_tolerance, vertex_tolerance : float
-        The largest among the faces that were checked, mm.
+        Largest tolerances of the faces that were checked, mm.
     curve_distance : float or None
         Largest distance between an edge's 3D curve and its curve on a face that was checked, at equal parameters, mm.
     """
@@ -67,7 +67,7 @@ class Validity:
 
 @dataclass(frozen=True)
 class Occurrence:
-    """One part, assembly or instance in its place in the document.
+    """One part, assembly or instance with its placement in the document.
 
     Attributes
     ----------
@@ -111,16 +111,16 @@ class Contents:
     ----------
     unit : str
     products : tuple of str
-        Of every part and assembly.
+        Names of all parts and assemblies.
     usages : int
         Number of uses of products in assembly definitions.
     tree : tuple of Occurrence
     colours : tuple of (Carrier, str, str)
-        Where, of what, ``"#rrggbb"`` or ``"#rrggbbaa"``; sorted.
+        Carrier, what is coloured, and ``"#rrggbb"`` or ``"#rrggbbaa"``; sorted.
     layers : tuple of (Carrier, str)
-        Where, and the layer; sorted.
+        Carrier and layer; sorted.
     materials : tuple of (Carrier, float)
-        Where, and the density as the kernel gives it; sorted.
+        Carrier and density as the kernel gives it; sorted.
     annotations : dict of str to int
         Number of ``"dimensions"``, ``"tolerances"`` and ``"datums"``.
     """
@@ -137,16 +137,16 @@ class Contents:
 
 @dataclass(frozen=True)
 class Mass:
-    """Size of something: all placed instances of a document, or one face in its part's frame.
+    """Volume, area and centre of all placed instances of a document, or of one face in its part's frame.
 
     Attributes
     ----------
     volume : float
-        Of the solids, mm³; 0 for a face.
+        Volume of the solids, mm³; 0 for a face.
     area : float
-        Of the faces, mm².
+        Area of the faces, mm².
     centre : (float, float, float)
-        Of the solids or, where there are none, of the faces, mm.
+        Centre of the solids or, if there are none, of the faces, mm.
     """
 
     volume: float
@@ -165,7 +165,7 @@ class Triangles:
     corners : ndarray of int (m, 3)
         Point numbers, anticlockwise seen from outside.
     faces, parts : ndarray of int (m,)
-        Which face and which part each triangle belongs to.
+        Indices of the face and of the part of each triangle.
     missing : tuple of int
         Faces that the kernel could not mesh.
     """
@@ -190,12 +190,12 @@ class Stated:
     ----------
     entities : int
     faces : int
-        Of all shells, each once.
+        Number of faces in all shells, each counted once.
     uses : tuple of (int, int, bool)
-        Every use of an edge: a number for the edge, the position of the face among all, and whether the face's
-        boundary runs along the edge.
+        Every use of an edge by a face: number of the edge, index of the face, and whether the face's boundary runs in
+        the direction of the edge.
     centres : tuple of (float, float, float)
-        Of the vertices of each face, in the file's unit.
+        Middle of the vertices of each face, in the file's unit.
     senses : tuple of (bool or None)
         Whether each face has the orientation of its surface; None if that is not stated.
     broken : tuple of str
@@ -264,15 +264,15 @@ class Facts:
         mm.
     counts : Counts
     spots : ndarray (p, 9)
-        Where each placed face is: corners of its box, middle of its vertices, mm.
+        Position of each placed face: corners of its box, and middle of its vertices, mm.
     owners : ndarray of int (p,)
         The face of each spot.
     closing : frozenset of int
-        Faces on closed surfaces without a closing edge: their edges do not tell which side of them is meant.
+        Faces on closed surfaces without a closing edge, whose edges do not tell on which side of them the face lies.
     vertices : ndarray (f,)
         The largest tolerance among the vertices of each face, mm.
     edges : tuple of Line
-        All edges, except degenerate ones that have faces.
+        All edges, without degenerate ones.
     probe : Probe
     """
 
@@ -292,5 +292,5 @@ class Facts:
 
     @property
     def tolerance(self) -> float:
-        """The largest, mm."""
+        """The largest tolerance, mm."""
         return max([*(edge.tolerance for edge in self.edges), float(self.vertices.max(initial=0.0))])

@@ -23,7 +23,7 @@ FLAT = 2e-4
 """Largest distance between a curve and its polygon, as a fraction of a mean knot span and of the face's extent."""
 
 LONGEST = 4096
-"""Most chords of one polynomial piece of a curve."""
+"""Largest number of chords for one polynomial piece of a curve."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,11 +33,11 @@ class Outline:
     Attributes
     ----------
     chords : ndarray (q, 2, 2)
-        Sides of closed polygons, first and last point each, in ``u, v``.  In periodic directions the loops are
-        continuous; they may lie outside the domain, and a loop that goes round the surface ends a period away from
-        where it began.
+        First and last point of each side of closed polygons, in ``u, v``.  In periodic directions the loops are
+        continuous; they may lie outside the domain, and a loop that goes round the surface ends a period away from its
+        start.
     natural : bool
-        The face is the whole surface; ``chords`` is empty.
+        Whether the face is the whole surface; then ``chords`` is empty.
     around : (bool, bool)
         Whether a loop goes round the surface along u, along v.
     """
@@ -53,7 +53,8 @@ class Outline:
         return np.array([points.min(axis=0), points.max(axis=0)])
 
     def lines(self, axis: int) -> Array:
-        """Places where a large part of the boundary is a line ``u = const`` (axis 0) or ``v = const`` (axis 1)."""
+        """Parameters at which a large part of the boundary is a line ``u = const`` (axis 0) or ``v = const`` (axis
+        1)."""
         low, high = self.box
         steps = np.abs(self.chords[:, 1] - self.chords[:, 0])
         straight = steps[:, axis] <= MARGIN * (high - low)[axis]
@@ -97,7 +98,7 @@ def _natural(u: KnotVector, v: KnotVector, curves: Sequence[Curve]) -> bool:
 
 
 def _flattened(curves: Sequence[Curve], spans: Array) -> tuple[Array, Array]:
-    """Chords ``(q, 2, 2)`` of the curves, in any order, and whose they are ``(q,)``."""
+    """Chords ``(q, 2, 2)`` of the curves, in any order, and the index of each one's curve ``(q,)``."""
     boxes = np.array([(curve.poles.min(axis=0), curve.poles.max(axis=0)) for curve in curves])
     extent = boxes[:, 1].max(axis=0) - boxes[:, 0].min(axis=0)
     tolerance = FLAT * np.minimum(spans, np.where(extent > 0, extent, spans))
@@ -111,7 +112,7 @@ def _flattened(curves: Sequence[Curve], spans: Array) -> tuple[Array, Array]:
 
 
 def _chord_counts(points: Array, tolerance: Array) -> Array:
-    """How many chords keep homogeneous Bézier pieces ``(q, p + 1, 3)`` within the tolerance.
+    """Number of chords that keep homogeneous Bézier pieces ``(q, p + 1, 3)`` within the tolerance.
 
     Wang's bound ``max |Δ²P| p (p − 1) / 8 n²``; for rational pieces, around the middle of their control points, that of
     Zheng and Sederberg.
@@ -198,7 +199,7 @@ def _closed(ends: Array, loops: list[list[int]], periods: Array) -> tuple[Array,
     closing : ndarray (n, 2, 2)
         Chord from the end of each curve of each loop to the beginning of the next.
     around : (bool, bool)
-        Whether a loop ends a period away from where it began, along u and along v.
+        Whether a loop ends a period away from its start, along u and along v.
     """
     shifts, closing, around = np.zeros((len(ends), 2)), np.empty((len(ends), 2, 2)), np.zeros(2, bool)
     finite = np.isfinite(periods)

@@ -1,7 +1,7 @@
-"""What edges can slide along: elementary surfaces in closed form, and the edges that end on them.
+"""Surfaces and curves along which edges can slide: elementary surfaces in closed form, and the edges that end on them.
 
-A point p lies off an elementary surface by the signed distance d(p), whose gradient n is the normal at the foot
-p − d n.  With ρ the distance from the axis and z the height along it,
+The signed distance of a point p from an elementary surface is d(p), whose gradient n is the normal at the foot p − d n.
+With ρ the distance from the axis and z the height along it,
 
     plane     d = z                          cylinder  d = ρ − R
     cone      d = (ρ − R) cos α − z sin α    sphere    d = |p| − R
@@ -27,11 +27,11 @@ class Elementary:
     kind : str
         ``"plane"``, ``"cylinder"``, ``"cone"``, ``"sphere"`` or ``"torus"``.
     frame : ndarray (4, 4)
-        From its own frame, z along the axis, to that of the part; x, y, z may be left-handed.
+        Map from its own frame, with z along the axis, to that of the part; x, y, z may be left-handed.
     outward : {1, −1}
-        Whether outward normals of the face are the gradient of the distance.
+        1 if outward normals of the face are the gradient of the distance, −1 if they are opposite.
     radius : float
-        R, mm; of a cone at z = 0.
+        R, mm; for a cone that at z = 0.
     minor : float
         r of a torus, mm.
     slope : float
@@ -142,11 +142,11 @@ class Path:
     Attributes
     ----------
     frame : ndarray (4, 4)
-        Of a line: a point of it, and x along it; of a circle: its middle, and z along its axis.
+        For a line, a point of it, with x along it; for a circle, its centre, with z along its axis.
     radius : float
-        Of a circle, mm; 0 for a line.
+        Radius of a circle, mm; 0 for a line.
     length : float
-        Of the edge, mm.
+        Length of the edge, mm.
     """
 
     frame: Array
@@ -169,14 +169,14 @@ class Path:
 
 @dataclass(frozen=True, eq=False)
 class Rails:
-    """What edges can slide along, of a whole model.
+    """The surfaces and curves of a model along which edges can slide.
 
     Attributes
     ----------
     grounds : mapping of int to Elementary
         Faces on elementary surfaces, by index.
     ends : mapping of int to (int, int)
-        The vertices at which edges begin and end, by index of the edge; vertices are numbered over the whole model.
+        Start and end vertex of each edge, by edge index; vertices are numbered over the whole model.
     paths : mapping of int to Path
         Edges that may get longer or shorter.
     """

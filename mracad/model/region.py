@@ -1,4 +1,4 @@
-"""Where a trimmed face lies in the knot grid of its surface, and which control points each cell depends on."""
+"""The cells of a surface's knot grid that a trimmed face covers, and the control points on which cells depend."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ MARGIN = 1e-9
 """Fraction of the domain within which a curve counts as lying on a knot line."""
 
 DEPTH = 24
-"""Most halvings of one Bézier piece in the walk over the knot grid."""
+"""Largest number of halvings of one Bézier piece in the walk over the knot grid."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +32,7 @@ class Region:
     inside : ndarray of bool (cells_u, cells_v)
         Cells that overlap the face, including those that its boundary crosses.
     crossed : tuple of ndarray of bool (cells_u, cells_v)
-        Per boundary curve, all cells that it may pass through; both sides of a knot line it lies on.
+        For each boundary curve, all cells that it may pass through, on both sides of a knot line on which it lies.
     """
 
     inside: Array
@@ -91,7 +91,7 @@ def _crossed(u: KnotVector, v: KnotVector, curves: tuple[Curve, ...]) -> tuple[A
 
 
 def _short(grid: tuple[KnotVector, KnotVector], points: Array, owners: Array) -> Iterator[tuple[Array, Array]]:
-    """Boxes ``(q, 2, 2)`` and owners of Bézier pieces, halved as :func:`_crossed` says."""
+    """Boxes ``(q, 2, 2)`` and owners of Bézier pieces, halved as in :func:`_crossed`."""
     smallest = np.array([np.diff(knots.breaks).min() for knots in grid]) / 64
     for depth in range(DEPTH):
         plane = points[..., :2] / points[..., 2:]

@@ -1,1 +1,1 @@
-"""The only room that talks to the CAD kernel: documents in, models and facts out, edits applied, files written."""
+"""The only room that uses the CAD kernel: it reads documents, gives models and facts, applies edits, writes files."""

@@ -26,21 +26,21 @@ from mracad.occ.slide import Sliding
 from mracad.occ.topology import edge_uses
 
 Array = np.ndarray
-_STILL = 1e-9, 0.01  # mm, or of its tolerance: an edge that moves by less keeps its curve
+_STILL = 1e-9, 0.01  # mm, and share of its tolerance: an edge that moves by less keeps its curve
 
 
 def apply(document: Document, model: Model, displacement: Displacement) -> Sliding | None:
     """Displace the surfaces of a document, in place.
 
-    Degrees are raised and knots inserted exactly; then only those control points move whose offset is not zero, all
-    others keep every bit.  Faces that were seen as NURBS by ``view(document, convert=…)`` are put on their new surfaces
-    first.  Edges that move get new 3D curves and vertices.  Triangulations are dropped.
+    Degrees are raised and knots inserted exactly; then only control points with a non-zero offset move, and all others
+    keep every bit.  Faces that ``view(document, convert=…)`` showed as NURBS are put on their new surfaces first.
+    Edges that move get new 3D curves and vertices.  Triangulations are dropped.
 
     Parameters
     ----------
     document : Document
     model : Model
-        The view of the document that the displacement was made for.
+        The view of the document for which the displacement was made.
     displacement : Displacement
 
     Returns
@@ -57,7 +57,7 @@ def apply(document: Document, model: Model, displacement: Displacement) -> Slidi
         return None
     highest, most = max(max(o.degrees) for o in displacement.offsets.values()), Geom_BSplineSurface.MaxDegree_s()
     if highest > most:
-        raise UsageError(f"a surface of degree {highest} is beyond the kernel", f"ask for {most} at most")
+        raise UsageError(f"a surface of degree {highest} is beyond the kernel", f"use at most {most}")
     edges = _moved_edges(model, displacement)
     sliding = _sliding(document, model, displacement, edges) if displacement.slid else None
     with quiet(), following(document, edges, _moved_faces(model, displacement), sliding):
@@ -70,9 +70,9 @@ def apply(document: Document, model: Model, displacement: Displacement) -> Slidi
 
 
 def restore(document: Document, model: Model, displacement: Displacement, sliding: Sliding | None = None) -> None:
-    """Undo :func:`apply`: every control point gets its old bits, refined surfaces give way to the old ones.
+    """Undo :func:`apply`: every control point gets its old bits, and refined surfaces are replaced by the old ones.
 
-    Faces that were converted stay on their (undisplaced) NURBS surfaces.  ``sliding`` is what it returned.
+    Faces that were converted stay on their (undisplaced) NURBS surfaces.  ``sliding`` is the result of :func:`apply`.
     """
     edges = {e: face for e, face in _moved_edges(model, displacement).items() if e not in displacement.slid}
     with quiet(), following(document, edges, _moved_faces(model, displacement)):
@@ -90,10 +90,10 @@ def restore(document: Document, model: Model, displacement: Displacement, slidin
 
 
 def _handle(document: Document, surface: Surface, offset: Offset) -> Geom_BSplineSurface | Geom_BezierSurface:
-    """The kernel's surface to be moved, refined as the offset asks, put on its faces where it is new to them.
+    """The kernel's surface to be moved, refined as the offset requires; a new one is put on its faces.
 
-    The kernel cannot be asked to raise the degree: it gives other surfaces where they are periodic with uneven
-    multiplicities, and none where their ends are not clamped.
+    The kernel cannot raise the degree: its results are wrong for periodic surfaces with uneven multiplicities, and it
+    fails where ends are not clamped.
     """
     fine, first = offset.over(surface.net), surface.faces[0]
     if first in document.conversions:
@@ -119,7 +119,7 @@ def _lay_all(document: Document, surface: Surface, handle: Geom_BSplineSurface) 
         ranges = [BRep_Tool.Range_s(edge, face) for edge in edges]
         lay(face, handle, pcurves, [BRep_Tool.Tolerance_s(edge) for edge in edges])
         for edge, (first, last) in zip(edges, ranges, strict=True):
-            BRep_Builder().Range(edge, face, first, last)  # of one without a 3D curve the kernel makes the pcurve's
+            BRep_Builder().Range(edge, face, first, last)  # without a 3D curve the kernel takes the range of the pcurve
 
 
 def _refine(surface: Geom_BSplineSurface, offset: Offset) -> None:
@@ -179,7 +179,7 @@ def _sliding(document: Document, model: Model, displacement: Displacement, moved
 
 
 def _forget(document: Document) -> None:
-    """Drop what is no longer true: triangulations, curves on replaced surfaces."""
+    """Drop what is out of date: triangulations, and curves on replaced surfaces."""
     for part in document.parts:
         BRepTools.Clean_s(part.shape)
         BRepTools.RemoveUnusedPCurves_s(part.shape)

@@ -1,4 +1,4 @@
-"""Boxes of faces themselves, where the kernel's fast ones are of control points; and the size of a document."""
+"""Bounding boxes of faces (the kernel's fast ones are those of control points), and the size of a document."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ MISSED = 1e-4
 """Share of a document's size that its box may miss on each side."""
 
 SIMPLE = ("plane", "cylinder", "cone", "sphere")
-"""Kinds of faces of which the kernel has the box itself soon; of others it takes longer than reading them."""
+"""Kinds of faces for which the kernel finds the exact box quickly; for others that takes longer than reading them."""
 
 ANGLE = 1.0
-"""By how much a mesh for the box of a face may turn from facet to facet, radians."""
+"""Largest turn from facet to facet of a mesh that is made for a box, radians."""
 
 COARSE = 1e-3
 """Share of a face's size that the box of a face of another kind may miss."""
@@ -38,7 +38,7 @@ def face_boxes(document: Document, model: Model) -> list[Array]:
 
 
 def diagonal(document: Document, model: Model) -> float:
-    """Diagonal of the box around all placed faces, mm: no face that decides it is taken for larger than it is."""
+    """Diagonal of the box around all placed faces, mm; boxes of the faces that determine it are exact."""
     fitter, boxes = _Fitter(document, model), [face.box for face in model.faces]
     owner, places = _placed(model, document)
     corners = np.array([_corners(boxes[face], frame) for face, frame in zip(owner.tolist(), places, strict=True)])
@@ -78,7 +78,7 @@ class _Fitter:
         own = rims([self.model.edges[k] for k in sorted(self.edges.get(face.index, ()))])
         every = np.concatenate([*own, corners.reshape(-1, 3)])
         rim = np.array([every.min(axis=0), every.max(axis=0)]) if len(every) else face.box
-        if face.surface is None:  # a line on the surface through any of its points ends on the boundary
+        if face.surface is None:  # parameter lines through any of its points end on the boundary
             return rim
         return nurbs_box(face, self.model.surfaces[face.surface].net, rim, face.box, slack)
 
@@ -95,7 +95,7 @@ def _meshed(shape: TopoDS_Face, chord: float, outer: Array) -> Array:
 
 
 def _placed(model: Model, document: Document) -> tuple[Array, list[Array]]:
-    """A face and a frame for each place in which a face stands."""
+    """A face and a frame for each instance of a face."""
     pairs = [
         (face, frame)
         for part, frames in zip(document.parts, model.places, strict=True)

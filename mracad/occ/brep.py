@@ -1,4 +1,5 @@
-"""The kernel's own formats, BREP (text) and BinBREP: exact shapes, instances shared; no names, no colours, no units."""
+"""The kernel's own formats, BREP (text) and BinBREP: exact shapes and shared instances, but no names, colours,
+units."""
 
 from __future__ import annotations
 
@@ -64,7 +65,7 @@ def brep(document: Document, binary: bool = False) -> bytes:
 
 
 def _is_assembly(shape: TopoDS_Shape) -> bool:
-    """Whether a shape is a compound of solids, on one level or several: then they become parts."""
+    """Whether a shape is a compound of solids, nested or not: then they become parts."""
     if shape.ShapeType() != TopAbs_COMPOUND:
         return False
     children = TopoDS_Iterator(shape)

@@ -1,10 +1,10 @@
-"""Which character set some texts are in, told from their bytes.
+"""The character set of some texts, detected from their bytes.
 
-Names are short: a file has a few words beyond ASCII.  So each set that decodes all of them is judged by how likely it
-is that somebody wrote these signs: by the frequency of the classes of signs that its own standard makes (first and
-second level, syllables, kana), by the signs that names of parts are made of, and for alphabets by what stands beside
-them.  Costs are -log of a probability, so
-those of independent signs add up, and sets whose signs take one, two or four bytes compare.
+Names are short: a file has only a few words beyond ASCII.  So each set that decodes all of them is judged by how likely
+its characters are: by the frequency of the character classes of its own standard (first and second level, syllables,
+kana), by the characters that are common in names of parts, and for alphabets by their neighbours.  Costs are -log of a
+probability, so costs of independent characters add up, and sets whose characters take one, two or four bytes can be
+compared.
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from math import inf, log
 
-_ASCII = log(60)  # what a sign of ASCII costs in every set; some take such bytes as the second half of a sign
-_ENOUGH = 4096  # signs that are judged
-_BESIDE, _TURN = 2.5, 3.0  # cost of neighbours, and of capitals within words, that the set does not expect
+_ASCII = log(60)  # cost of an ASCII character in every set; some use such bytes as the second half of a character
+_ENOUGH = 4096  # number of characters that are judged
+_BESIDE, _TURN = 2.5, 3.0  # cost of unexpected neighbours, and of unexpected capitals within words
 _WEST = "äöüßÄÖÜéèàçêâîôûëïùœÉÈÀÇñóíáúÑøåæØÅÆãõòìÊÂÔ"
 _EAST = "ěščřžýáíéúůťďňóąęłńśźżćőűöüĚŠČŘŽÝÁÍÉÚŮŤĎŇÓĄĘŁŃŚŹŻĆŐŰÖÜäÄđĐăâîşţ"
 _CYRILLIC = "абвгдежзийклмнопрстуфхцчшщъыьэюяё"
@@ -35,7 +35,7 @@ _SIGNS = "°±²³µ–—§·×“”„’‘½¼¾®©«»…"
 
 
 def detect(texts: Collection[bytes]) -> str:
-    """The most likely character set of texts that are not ASCII, as Python names it; latin-1 where none fits."""
+    """The most likely character set of texts that are not ASCII, by its name in Python; latin-1 where none fits."""
     whole = b" ".join(texts)
     found = {"latin-1": inf}
     for charset in _CHARSETS:
@@ -48,8 +48,8 @@ def detect(texts: Collection[bytes]) -> str:
 
 @dataclass(frozen=True)
 class _Charset:
-    """A character set: what it costs to meet it at all, and each of its signs; whether they stand among
-    letters of ASCII."""
+    """A character set: the cost of the set itself and of each character, and whether its characters occur among ASCII
+    letters."""
 
     name: str
     rarity: float
@@ -57,7 +57,7 @@ class _Charset:
     latin: bool = False
 
     def judged(self, text: str) -> float:
-        """How unlikely a text is."""
+        """The cost of a text: how unlikely it is."""
         return self.rarity + sum(map(self._one, " " + text, text))
 
     def _one(self, before: str, sign: str) -> float:
@@ -69,7 +69,7 @@ class _Charset:
 
 
 def _of(share: float, signs: int) -> float:
-    """The cost of one of some signs that make up a share of all texts."""
+    """The cost of one of ``signs`` characters that together make up a share of all text."""
     return -log(share / signs)
 
 
@@ -79,7 +79,7 @@ def _chinese(sign: str) -> float:
     code = sign.encode("gb18030")
     if len(code) == 4 or code[1] < 0xA1:
         return _of(0.002, 20000)
-    if 0xB0 <= code[0] <= 0xD7:  # the first level, of which all but rare texts are made
+    if 0xB0 <= code[0] <= 0xD7:  # the first level, which nearly all texts use
         return _of(0.47, 3755)
     if code[0] > 0xD7:
         return _of(0.02, 3008)

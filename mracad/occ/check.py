@@ -30,10 +30,10 @@ def check(document: Document, faces: Iterable[int] | None = None, distances: boo
     ----------
     document : Document
     faces : iterable of int, optional
-        Check only these (with their edges and vertices): what an edit in place can have spoiled.  By default all, and
-        shells and solids too.
+        Check only these, with their edges and vertices: those that an edit in place can have made invalid.  By default
+        all, and also shells and solids.
     distances : bool
-        Measure ``curve_distance``, too.
+        Also measure ``curve_distance``.
     """
     chosen = range(len(document.faces)) if faces is None else sorted(set(faces))
     members = [document.faces[index] for index in chosen]
@@ -58,7 +58,7 @@ def check(document: Document, faces: Iterable[int] | None = None, distances: boo
 
 
 def lone_faces(document: Document) -> int:
-    """Open shells of one face: what STEP makes of a face that is in no shell."""
+    """Number of open shells of one face: STEP puts a face without a shell into one."""
     shells = (shell for part in document.parts for shell in inside(part.shape, TopAbs_SHELL))
     return sum(not BRep_Tool.IsClosed_s(shell) and len(list(inside(shell, TopAbs_FACE))) == 1 for shell in shells)
 
@@ -66,7 +66,7 @@ def lone_faces(document: Document) -> int:
 def _failures(
     analyzer: BRepCheck_Analyzer, subject: TopoDS_Shape, chosen: Iterable[int], members: list[TopoDS_Face]
 ) -> Iterator[Failure]:
-    """Everything that the analyzer holds against the subject."""
+    """All failures that the analyzer finds in the subject."""
     for kind in (TopAbs_SOLID, TopAbs_SHELL):
         for shape in inside(subject, kind):
             for status in _statuses(analyzer, shape, shape):
@@ -81,7 +81,7 @@ def _failures(
 
 
 def _statuses(analyzer: BRepCheck_Analyzer, shape: TopoDS_Shape, context: TopoDS_Shape) -> list[str]:
-    """What is wrong with a shape by itself and within another, by name."""
+    """Names of the failures of a shape, by itself and in the context of another."""
     result = analyzer.Result(shape)
     found = list(result.Status())
     result.InitContextIterator()

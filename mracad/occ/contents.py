@@ -1,4 +1,5 @@
-"""What a document says beyond geometry, as plain data: structure, names, colours, layers, materials, annotations."""
+"""The content of a document beyond geometry, as plain data: structure, names, colours, layers, materials,
+annotations."""
 
 from __future__ import annotations
 
@@ -29,7 +30,7 @@ _COLOURS = {
 
 
 def contents(document: Document) -> Contents:
-    """Collect it from the kernel's document."""
+    """Collect the content of a document."""
     main = document.xcaf.Main()
     layer_tool = XCAFDoc_DocumentTool.LayerTool_s(main)
     pmi = XCAFDoc_DocumentTool.DimTolTool_s(main)
@@ -67,7 +68,7 @@ def contents(document: Document) -> Contents:
 
 
 def _places(document: Document, products: list[TDF_Label]) -> Iterator[tuple[TDF_Label, Carrier]]:
-    """Everything that can be coloured or put on a layer."""
+    """All labels that can have a colour or a layer, and what they stand for."""
     parts = {label_key(part.label): part for part in document.parts}
     for label in products:
         product = label_name(label)

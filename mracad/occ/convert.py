@@ -18,26 +18,26 @@ from mracad.errors import EditError
 from mracad.occ.document import Conversion, Document
 from mracad.occ.topology import edge_uses
 
-_LEAST = 3  # degree in both directions: a straight one would be edited as facets
-_SLACK = 1e-4  # memory units by which an edge's tolerance may grow in any conversion: offsets are approximated
+_LEAST = 3  # degree in both directions: with a lower one, edits would make facets
+_SLACK = 1e-4  # memory units by which an edge's tolerance may grow in a conversion: offsets are approximated
 
 
 def conversion(document: Document, index: int) -> Conversion:
     """The NURBS form of a face: made once, kept with the document, not yet put on the face.
 
-    A copy of the face is laid on the surface that the kernel's conversion finds, and the new pcurves are re-timed to
-    the edges' own 3D curves, which stay as they are.
+    A copy of the face is put on the surface that the kernel's conversion finds, and the new pcurves are reparameterised
+    to the edges' own 3D curves, which stay unchanged.
 
     Parameters
     ----------
     document : Document
     index : int
-        A face whose surface is not NURBS.
+        Index of a face whose surface is not NURBS.
 
     Raises
     ------
     EditError
-        When the kernel cannot convert it, or only to something invalid or less accurate.
+        When the kernel cannot convert it, or the result is invalid or less accurate.
     """
     if index not in document.conversions:
         bare = document.faces[index].Located(TopLoc_Location()).Oriented(TopAbs_FORWARD)
@@ -73,13 +73,13 @@ def lay(face: TopoDS_Face, surface: Geom_Surface, pcurves: Sequence[Geom2d_Curve
     Parameters
     ----------
     face : TopoDS_Face
-        Forward.
+        The face, forward.
     surface : Geom_Surface
-        In the frame of the face's present surface.
+        The new surface, in the frame of the present one.
     pcurves : sequence of Geom2d_Curve
         For each edge use of the face, in its own order, the curve on ``surface``.
     tolerances : sequence of float
-        Of those curves.
+        Tolerances of those curves.
     """
     location = TopLoc_Location()
     BRep_Tool.Surface_s(face, location)

@@ -27,13 +27,13 @@ from mracad.occ.units import Units, metres
 
 @dataclass(eq=False)
 class Part:
-    """One shape definition, however often it is instanced.
+    """One shape definition, which may have several instances.
 
     Attributes
     ----------
     label : TDF_Label
     shape : TopoDS_Shape
-        In the part's own frame.
+        Its shape, in the part's own frame.
     product : str
     first : int
         Document-wide index of its first face.
@@ -44,13 +44,13 @@ class Part:
     edges : TopTools_IndexedMapOfShape
         The edges of its faces, from 1.
     placements : list of TopLoc_Location
-        Where its instances stand.
+        Placements of its instances.
     colour : str
-        Of the whole part, ``"#rrggbb"``, ``"#rrggbbaa"`` or ``""``.
+        Colour of the whole part, ``"#rrggbb"``, ``"#rrggbbaa"`` or ``""``.
     tint : str
-        That of its first coloured instance.
+        Colour of its first coloured instance.
     face_names, face_colours, body_colours : dict
-        By position in the part, from 0, where the document says something of the face, or of the body it belongs to.
+        By position in the part, from 0, if the document states something about the face or its body.
     """
 
     label: TDF_Label
@@ -81,13 +81,13 @@ class Part:
         return self.first_edge + self.edges.FindIndex(edge) - 1
 
     def face_colour(self, position: int, tint: str = "") -> str:
-        """The colour of a face by its position, where an instance has that of ``tint``: its own goes before that."""
+        """The colour of a face by its position, in an instance with the colour ``tint``: its own takes precedence."""
         return self.face_colours.get(position) or tint or self.body_colours.get(position) or self.colour
 
 
 @dataclass(eq=False)
 class Conversion:
-    """A NURBS surface that stands ready to replace the analytic one of a face (see ``convert``).
+    """A NURBS surface that can replace the analytic one of a face (see ``convert``).
 
     Attributes
     ----------
@@ -95,7 +95,7 @@ class Conversion:
     pcurves : list of Geom2d_Curve
         For each edge use of the face, in its own order, the curve on ``surface``, over the edge's own range.
     tolerances : list of float
-        What each edge needs at least, memory units.
+        Least tolerance of each edge, memory units.
     """
 
     surface: Geom_BSplineSurface
@@ -117,11 +117,11 @@ class Document:
     schema : str
         ``"AP203"``, ``"AP214"``, ``"AP242"``, ``"IGES"``, ``"BREP"``, ``"BinBREP"`` or ``""``.
     annotations : dict
-        The names of the dimensions, tolerances, datums and notes that the file states, by these words.
+        Names of the annotations in the file, by kind: ``"dimensions"``, ``"tolerances"``, ``"datums"``, ``"notes"``.
     warnings : tuple of str
-        What had to be guessed or is lost of the file.
+        What had to be guessed about the file, or was lost.
     titles : dict
-        What a STEP file says of products and instances, by label (its key).
+        Titles of products and instances in a STEP file, by label (its key).
     conversions : dict
         Surfaces made by ``view(document, convert=…)``, by face index, for ``apply``.
     moved : set of str
@@ -165,7 +165,7 @@ class Document:
         return self.shape_tool.GetOneShape()
 
     def changed(self) -> None:
-        """Look again for parts, faces and edges: what the kernel's document is made of is no longer the same."""
+        """Find parts, faces and edges anew, after a change of the kernel's document."""
         for name in ("parts", "faces", "edges"):
             vars(self).pop(name, None)
 
@@ -224,17 +224,17 @@ def empty() -> TDocStd_Document:
 
 
 def set_unit(xcaf: TDocStd_Document, mm: float) -> None:
-    """Tell a document of the kernel what its numbers are."""
+    """Set the length unit of a document of the kernel."""
     XCAFDoc_DocumentTool.SetLengthUnit_s(xcaf, metres(mm))
 
 
 def no_faces(name: str) -> FileError:
-    """The error for a file in which there is nothing to work with."""
+    """The error for a file without faces."""
     return FileError(f"'{name}' holds no faces", "the file needs surfaces or solids, not only curves or meshes")
 
 
 def named_labels(document: Document) -> Iterator[TDF_Label]:
-    """Whatever may have a name: products, instances, faces."""
+    """All labels that may have a name: products, instances, faces."""
     every = TDF_ChildIterator(document.shape_tool.Label(), True)
     while every.More():
         label = every.Value()
@@ -244,7 +244,7 @@ def named_labels(document: Document) -> Iterator[TDF_Label]:
 
 
 def nested_colours(document: Document) -> Iterator[tuple[tuple[str, ...], str]]:
-    """Colours of single instances inside an assembly that is itself one of several: the path of labels, and which."""
+    """Colours of instances inside one instance of an assembly: the path of labels, and the colour."""
     for product in labels(document.shape_tool.GetShapes):
         for component in components(product):
             found = TDF_AttributeSequence()
@@ -263,7 +263,7 @@ def nested_colours(document: Document) -> Iterator[tuple[tuple[str, ...], str]]:
 def _described(
     label: TDF_Label, faces: TopTools_IndexedMapOfShape
 ) -> tuple[dict[int, str], dict[int, str], dict[int, str]]:
-    """Names and colours that the sub-shape labels of a part give its faces, and colours that they give its bodies."""
+    """Names and colours of the faces of a part, and colours of its bodies, from its sub-shape labels."""
     names: dict[int, str] = {}
     colours: dict[int, str] = {}
     inherited: dict[int, str] = {}
@@ -274,7 +274,7 @@ def _described(
             position = faces.FindIndex(shape) - 1
             if position >= 0:
                 name = label_name(sub)
-                if name and name != "NONE":  # what some systems write for no name
+                if name and name != "NONE":  # some systems write this for no name
                     names[position] = name
                 if colour:
                     colours[position] = colour

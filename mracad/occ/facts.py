@@ -1,4 +1,4 @@
-"""What the kernel says of a document, for :mod:`mracad.inspect.accept`: a little of everything, the rest when asked."""
+"""Facts about a document for :mod:`mracad.inspect.accept`: quick ones at once, slow ones when needed."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _PLACES = (0.04, 0.46, 0.91)  # of the range of an edge
 
 @dataclass(frozen=True, eq=False)
 class KernelProbe:
-    """Measures of a document that take long, taken when asked for."""
+    """Slow measurements of a document, made when needed."""
 
     document: Document
 
@@ -45,22 +45,22 @@ class KernelProbe:
         return self._validity
 
     def along(self, edges: Collection[int]) -> Model:
-        """The document with samples along some edges alone."""
+        """The view of the document with samples along some edges only."""
         return view(self.document, edges=frozenset(edges))
 
     def area(self, face: int, exact: bool) -> float:
-        """Of a face, mm², by a quadrature that is the same for the same face, or exactly."""
+        """Area of a face, mm², exactly or by a fast quadrature that gives the same for the same face."""
         surface = GProp_GProps()
         with quiet():
             BRepGProp.SurfaceProperties_s(self.document.faces[face], surface, *((_EXACT,) if exact else ()))
         return surface.Mass()
 
     def volume(self) -> float:
-        """Of all solids, placed, mm³."""
+        """Volume of all placed solids, mm³."""
         return self._volume
 
     def box(self) -> Array:
-        """Lowest and highest corner of everything, placed, ``(2, 3)``, mm."""
+        """Lowest and highest corner of all placed shapes, ``(2, 3)``, mm."""
         bounds = Bnd_Box()
         with quiet():
             BRepBndLib.AddOptimal_s(self.document.shape, bounds, False, False)
@@ -76,7 +76,7 @@ class KernelProbe:
 
 
 def facts(document: Document) -> Facts:
-    """What a file is judged by."""
+    """The facts by which a file is judged."""
     with quiet():
         lines, closing = _lines(document)
         places = list(_places(document))
@@ -90,7 +90,7 @@ def facts(document: Document) -> Facts:
 
 
 def _counts(document: Document, lines: list[Line]) -> Counts:
-    """What there is, placed."""
+    """Numbers of placed solids, shells, faces and free edges."""
     times = [max(len(part.placements), 1) for part in document.parts]
     free: Counter[int] = Counter()
     for number, part in enumerate(document.parts):
@@ -106,7 +106,7 @@ def _counts(document: Document, lines: list[Line]) -> Counts:
 
 
 def _lines(document: Document) -> tuple[list[Line], list[int]]:
-    """Every edge at a few places, and the faces on closed surfaces that have no closing edge."""
+    """Samples of every edge at a few places, and the faces on closed surfaces that have no closing edge."""
     owners: list[list[int]] = [[] for _ in document.edges]
     sides: list[list[Array]] = [[] for _ in document.edges]
     whole = [BRep_Tool.Degenerated_s(edge) for edge in document.edges]
@@ -136,7 +136,7 @@ def _lines(document: Document) -> tuple[list[Line], list[int]]:
 
 
 def _along(edge: TopoDS_Edge) -> Array:
-    """Points of an edge, each with nothing for a normal."""
+    """Points of an edge, with NaN for normals."""
     curve = BRepAdaptor_Curve(edge)
     first, last = curve.FirstParameter(), curve.LastParameter()
     return np.array([(*curve.Value(first + share * (last - first)).Coord(), 0.0, 0.0, 0.0) for share in _PLACES])
@@ -169,7 +169,7 @@ def _onto(points: Array, origin: Array, normal: Array) -> Array:
 
 
 def _places(document: Document) -> Iterator[tuple[Array, int, float]]:
-    """Where every placed face is, which face that is, and the largest tolerance of its vertices."""
+    """Position, index and largest vertex tolerance of every placed face."""
     for part in document.parts:
         for index in part.numbers:
             face = document.faces[index]
@@ -182,7 +182,7 @@ def _places(document: Document) -> Iterator[tuple[Array, int, float]]:
 
 
 def _middle(points: Array, placement: TopLoc_Location, corners: Array) -> Array:
-    """The middle of points that are placed; of the box where there are none."""
+    """The middle of placed points; of a box if there are none."""
     if not len(points):
         return (corners[:3] + corners[3:]) / 2
     return placed(points.mean(axis=0), matrix(placement))

@@ -1,4 +1,4 @@
-"""Documents in and out, in every format: one function each way."""
+"""Reading and writing documents in every format."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ class Lost:
         ``"faces"``, which the kernel could not mesh; ``"names"``, ``"transparencies"``, ``"dimensions"``,
         ``"tolerances"``, ``"datums"`` or ``"notes"``.
     stated, written : int
-        How many there were, and are.
+        Their numbers in the document and in the file.
     names : tuple of str
-        Of the faces that are missing; of all such annotations, since the kernel does not keep their names.
+        Names of the missing faces; of all such annotations, because the kernel does not keep their names.
     """
 
     what: str
@@ -47,16 +47,16 @@ class Lost:
 
 @dataclass(frozen=True)
 class Written:
-    """What a written file has otherwise than the document.
+    """How a written file differs from the document.
 
     Attributes
     ----------
     lost : tuple of Lost
         What it lacks.
     cut : tuple of CutFace
-        The faces that it holds on NURBS or in several parts, because a reader would mistake them as they are.
+        Faces that are written as NURBS or in several parts, because readers would misinterpret them as they are.
     open : tuple of int
-        The faces of closed bodies that a mesh leaves open.
+        Faces of closed bodies that a mesh leaves open.
     """
 
     lost: tuple[Lost, ...] = ()
@@ -65,15 +65,15 @@ class Written:
 
 
 def read(source: str | os.PathLike | BinaryIO, input_unit: str | None = None, encoding: str | None = None) -> Document:
-    """Read a STEP, IGES, BREP or BinBREP file, which it is by its content.
+    """Read a STEP, IGES, BREP or BinBREP file; the format is detected from the content.
 
     Parameters
     ----------
     source : path or binary stream
     input_unit : str, optional
-        The length unit that the file's numbers are in, whatever it says itself; also that of the output.
+        The length unit of the file's numbers, instead of the one that it states; also the unit of the output.
     encoding : str, optional
-        The character set of its texts; by default UTF-8 where that fits, otherwise the most likely one.
+        The character set of its texts; by default UTF-8 if that fits, else the most likely one.
 
     Raises
     ------
@@ -113,13 +113,13 @@ class FileOptions:
     Attributes
     ----------
     schema : str
-        STEP: see ``write_step``.
+        Of STEP files; see ``write_step``.
     chord, angle : float, optional
-        Meshes: see ``scene``.
+        Of meshes; see ``scene``.
     ascii : bool
-        STL: text rather than binary.
+        Write STL as text instead of binary.
     options_text : str
-        What was done, for the header of STEP and IGES files.
+        Description of the steps, for the header of STEP and IGES files.
     """
 
     schema: str = ""
@@ -137,7 +137,7 @@ def write(document: Document, target: str | os.PathLike | BinaryIO, format: str 
     document : Document
     target : path or binary stream
     format : str
-        A key of ``mracad.formats.FORMATS``; by default what the ending of the path means, STEP for a stream.
+        A key of ``mracad.formats.FORMATS``; by default that of the file extension, STEP for a stream.
     **how
         The fields of :class:`FileOptions`.
 
@@ -145,18 +145,18 @@ def write(document: Document, target: str | os.PathLike | BinaryIO, format: str 
     -------
     Written
         What could not be written (faces of a mesh, annotations of an exact model, names beyond ASCII in IGES, in STEP
-        the transparency of single instances inside assemblies), and what only in another way.
+        the transparency of single instances inside assemblies), and what was written in another form.
 
     Raises
     ------
     EditError
-        For a face that a reader of that format would not find again.
+        For a face that readers of that format would misinterpret.
     EditError
         When the kernel's writer fails on the document, though another format may hold it.
     FileError
         When the document cannot be expressed in that format, or the target cannot be written.
     UsageError
-        For an unknown format or schema, or settings that make no sense.
+        For an unknown format or schema, or invalid settings.
     """
     wanted, name = FileOptions(**how), document.name
     if isinstance(target, str | os.PathLike):
@@ -213,7 +213,7 @@ _MAKERS = {"step": _step, "iges": _iges, "brep": _brep, "binbrep": _brep}
 
 @contextlib.contextmanager
 def _expressing(name: str, format: str) -> Iterator[None]:
-    """Say of a failure of the kernel's writer that it is one: the input need not be at fault."""
+    """Raise failures of the kernel's writer as such: the input need not be at fault."""
     try:
         yield
     except Exception as error:
@@ -226,13 +226,13 @@ def _expressing(name: str, format: str) -> Iterator[None]:
 
 
 def _opaque(document: Document) -> tuple[Lost, ...]:
-    """The instances inside one use of an assembly that are transparent there: the kernel writes their colour alone."""
+    """Instances that are transparent only inside one instance of an assembly: the kernel writes just their colour."""
     count = sum(len(colour) > len("#rrggbb") for _, colour in nested_colours(document))
     return (Lost("transparencies", count, 0, ()),) if count else ()
 
 
 def _unwritten(document: Document) -> tuple[Lost, ...]:
-    """The names that IGES, which is ASCII, does not take."""
+    """Names that are not ASCII, which IGES cannot hold."""
     names = [name for name in map(label_name, named_labels(document)) if name]
     beyond = tuple(name for name in names if not name.isascii())
     return (Lost("names", len(names), len(names) - len(beyond), beyond),) if beyond else ()

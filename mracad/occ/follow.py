@@ -19,22 +19,23 @@ from mracad.occ.slide import Sliding
 from mracad.occ.topology import edge_uses, validated
 
 _TOLERANCE = 1e-7  # memory units
-_ABOVE = 1 + 1e-6  # so much more than the kernel finds is a tolerance that it takes
+_ABOVE = 1 + 1e-6  # factor on the distance that the kernel finds, for a tolerance that it accepts
 
 
 @contextmanager
 def following(
     document: Document, edges: Mapping[int, int], faces: Collection[int], sliding: Sliding | None = None
 ) -> Iterator[None]:
-    """Let edges follow faces that are moved inside the block: new 3D curves on the faces, and vertices that move as the
-    ends of the edges' curves on the faces do.
+    """Let edges follow faces that move inside the block: they get new 3D curves on the faces, and vertices move by as
+    much as the ends of the edges' curves on the faces.
 
-    A stale curve must never be left to the kernel, which would hide it in a large tolerance.  The faces of an edge
-    must move together: its curves on them stay; one that slid gets a new curve on its face that stays, and edges on
-    which its vertices moved end there.  A vertex stays as far from the ends of its edges as it was: those that
-    do not move get no gap there that a reader would close.  Nor does an edge get a smaller tolerance than it had: files
-    state the mean of all, and by that a reader heals edges that nothing touched.  One that stays may get a larger one:
-    kernels state it as close as can be, and evaluate surfaces of high degree that moved a little otherwise.
+    A stale curve must never be left to the kernel, which would hide it in a large tolerance.  The faces of an edge must
+    move together: its curves on them stay.  An edge that slid gets a new curve on its face that stays, and edges along
+    which its vertices moved end there.  A vertex stays as far from the ends of its edges as it was, so that edges that
+    do not move get no gap there that a reader would close.  An edge never gets a smaller tolerance than it had: files
+    state the mean of all, by which a reader would heal edges that did not change.  An edge that stays may get a larger
+    one: kernels state tolerances as tightly as possible, and evaluate moved surfaces of high degree slightly
+    differently.
 
     Parameters
     ----------
@@ -42,9 +43,9 @@ def following(
     edges : mapping of int to int
         Indices of edges, none of them degenerate, each with a face that it bounds.
     faces : collection of int
-        The faces that move.
+        Indices of the faces that move.
     sliding : Sliding, optional
-        Those of the edges that slide, and the edges that end on them.
+        Edges that slide, and edges that end on them.
     """
     builder = BRep_Builder()
     chosen = [
@@ -84,7 +85,7 @@ def following(
 
 
 def _uses(document: Document, faces: Collection[int]) -> Iterator[tuple[TopoDS_Edge, TopoDS_Face]]:
-    """The edges of faces as these use them, degenerate ones left out."""
+    """The edges of faces as the faces use them, without degenerate ones."""
     for face in (TopoDS.Face_s(document.faces[index].Oriented(TopAbs_FORWARD)) for index in faces):
         yield from ((edge, face) for edge in edge_uses(face) if not BRep_Tool.Degenerated_s(edge))
 
@@ -94,6 +95,6 @@ def _own(edge: TopoDS_Edge) -> float:
 
 
 def _ends(edge: TopoDS_Edge, face: TopoDS_Face) -> tuple[gp_Pnt, gp_Pnt]:
-    """Where the curve of an edge on a face begins and ends."""
+    """Start and end point of the curve of an edge on a face."""
     curve = BRepAdaptor_Curve(edge, face)
     return curve.Value(curve.FirstParameter()), curve.Value(curve.LastParameter())

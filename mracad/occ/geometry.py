@@ -1,7 +1,7 @@
-"""Curves and surfaces out of the kernel in bulk.
+"""Bulk conversion of curves and surfaces between the kernel and numpy.
 
-Asking for poles one at a time costs a microsecond each, setting them several; the kernel's binary writer and reader
-hand over the same numbers at a fraction of that, and numpy reads and writes them where they lie.
+Getting control points one at a time costs a microsecond each, setting them several.  The kernel's binary writer and
+reader transfer the same numbers at a fraction of that, and numpy reads and writes them in place.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def nets(surfaces: Sequence[Geom_Surface]) -> list[Net]:
     Parameters
     ----------
     surfaces : sequence of Geom_BSplineSurface or Geom_BezierSurface
-        All different.
+        Distinct surfaces.
     """
     collection = BinTools_SurfaceSet()
     for surface in surfaces:
@@ -111,7 +111,7 @@ def curves(pieces: Sequence[tuple[Geom2d_Curve, float, float]]) -> list[Curve]:
     Parameters
     ----------
     pieces : sequence of (curve, first, last)
-        A conic keeps its trace and its ends, but inside the range its parameter runs differently.
+        A conic keeps its shape and its ends, but its parameter differs inside the range.
     """
     splines: list[Geom2d_BSplineCurve | None] = [_spline(*piece) for piece in pieces]
     collection = BinTools_Curve2dSet()
@@ -130,7 +130,7 @@ def plane_spline(curve: Curve) -> Geom2d_BSplineCurve:
 
 
 class _Stream:
-    """What the kernel's binary writer wrote, read from the front: little-endian on every machine."""
+    """The output of the kernel's binary writer, read from the front; little-endian on every machine."""
 
     def __init__(self, collection: BinTools_SurfaceSet | BinTools_Curve2dSet) -> None:
         buffer = io.BytesIO()
@@ -185,7 +185,7 @@ def _knots(stream: _Stream, count: int, degree: int, periodic: bool) -> KnotVect
 
 
 def _spline(curve: Geom2d_Curve, first: float, last: float) -> Geom2d_BSplineCurve | None:
-    """A plane curve over its range as a B-spline; None for a line, which needs none."""
+    """A plane curve over its range as a B-spline; None for a line."""
     if isinstance(curve, Geom2d_Line):
         return None
     slack = _SAME_RANGE * (last - first)

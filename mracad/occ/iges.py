@@ -1,4 +1,4 @@
-"""IGES in and out: bodies and surfaces with their names, colours and levels; the kernel flattens assemblies."""
+"""Reading and writing IGES: bodies and surfaces with names, colours and levels; the kernel flattens assemblies."""
 
 from __future__ import annotations
 
@@ -73,15 +73,15 @@ def _put_names(document: Document, names: dict[str, str]) -> None:
 
 
 def iges(document: Document, name: str, options_text: str = "") -> tuple[bytes, tuple[CutFace, ...]]:
-    """A document as IGES 5.3 in its own unit, solids as such; and the faces that it holds in parts.
+    """A document as IGES 5.3 in its own unit, with solids, and the faces that are written in parts.
 
     Parameters
     ----------
     document : Document
     name : str
-        Of the file, for its header.
+        Name of the file, for its header.
     options_text : str
-        What was done, for the header.
+        Description of the steps, for the header.
 
     Raises
     ------
@@ -115,7 +115,7 @@ def _print(model: IGESData_IGESModel, stream: BinaryIO) -> None:
 
 
 def _copy(shape: TopoDS_Shape) -> TopoDS_Shape:
-    """A bare shape as it is read from the file that it is written to."""
+    """A bare shape, written to IGES and read back."""
     writer = IGESControl_Writer()
     writer.AddShape(shape)
     writer.ComputeModel()
@@ -130,7 +130,7 @@ def _copy(shape: TopoDS_Shape) -> TopoDS_Shape:
 
 
 def _refuse_torn(text: bytes, name: str) -> None:
-    """Raise FileError where the sections of a file do not have the lines that its last line states."""
+    """Raise FileError if the sections of a file do not have as many lines as its last line states."""
     lines = text.splitlines()
     counts = Counter(line[72:73] for line in lines)
     last = next((line for line in reversed(lines) if line.strip()), b"")
@@ -140,7 +140,7 @@ def _refuse_torn(text: bytes, name: str) -> None:
 
 
 def _names_in_order(model: IGESData_IGESModel) -> None:
-    """Let names come in the order of what they name: the kernel adds them by address, another order in each process."""
+    """Sort names by the entities that they name: the kernel adds them by address, in a different order every time."""
     owners: dict[IGESBasic_Name, list[IGESData_IGESEntity]] = {}
     names = []
     for number in range(1, model.NbEntities() + 1):
@@ -163,7 +163,7 @@ def _names_in_order(model: IGESData_IGESModel) -> None:
 
 
 def _head(model: IGESData_IGESModel, name: str, options_text: str) -> None:
-    """Fill the start and global sections: nothing in them depends on where, when or how often it is written."""
+    """Fill the start and global sections so that they are the same every time."""
     section = model.GlobalSection()
     date = TCollection_HAsciiString(moment().strftime("%Y%m%d.%H%M%S"))
     section.SetDate(date)

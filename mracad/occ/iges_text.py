@@ -1,4 +1,4 @@
-"""The text of IGES files made ready for the kernel: names in ASCII, limits of surfaces and curves that state none."""
+"""Preparing the text of IGES files for the kernel: names in ASCII, and missing limits of surfaces and curves."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Prepared:
     ----------
     text : bytes
     names : dict
-        What the names are that the kernel reads marks for.
+        The names that the kernel reads as marks, by mark.
     warnings : tuple of str
     """
 
@@ -37,23 +37,23 @@ class Prepared:
 
 
 def prepared(text: bytes, name: str, encoding: str | None) -> Prepared:
-    """Put marks of the same length in the place of names beyond ASCII, and the range of the knots where a B-spline
-    surface or curve has no limits.
+    """Replace names beyond ASCII by marks of the same length, and give B-spline surfaces and curves without limits the
+    range of their knots.
 
     Parameters
     ----------
     text : bytes
-        With all its lines.
+        The whole file.
     name : str
-        Of the file, for warnings.
+        Name of the file, for warnings.
     encoding : str, optional
-        The character set of its names; by default UTF-8 where that fits, otherwise the most likely one.
+        The character set of its names; by default UTF-8 if that fits, else the most likely one.
     """
     try:
         file = _File(text)
         marks = {} if text.isascii() else file.mark()
         limited = file.limit()
-    except (ValueError, IndexError):  # it is up to the kernel to say what is wrong
+    except (ValueError, IndexError):  # the kernel will report what is wrong
         return Prepared(text, {}, ())
     said = ""
     if marks:
@@ -79,14 +79,14 @@ class _File:
             self.data.setdefault(int(line[_WIDTH:72]), []).append(line[:_WIDTH])
 
     def _delimiters(self) -> tuple[bytes, bytes]:
-        """What stands between parameters, and after the last."""
+        """The delimiters between parameters and after the last one."""
         head = b"".join(line[:72] for line in self.lines[b"G"])
         comma = head[2:3] if head.startswith(b"1H") else b","
         rest = head[4:] if head.startswith(b"1H") else head[1:]
         return comma, rest[2:3] if rest.startswith(b"1H") else b";"
 
     def mark(self) -> dict[bytes, bytes]:
-        """Put marks in the place of names beyond ASCII; returns the names by their marks."""
+        """Replace names beyond ASCII by marks; returns the names by mark."""
         marks: dict[bytes, bytes] = {}
         fresh = _marks(b"".join(itertools.chain.from_iterable(self.data.values())))
 
@@ -124,7 +124,7 @@ class _File:
             at = stop
 
     def limit(self) -> int:
-        """Give surfaces and curves without limits the range of their knots; returns how many those were."""
+        """Give surfaces and curves without limits the range of their knots; returns their number."""
         count = 0
         for entry, lines in self.data.items():
             directions = _POLES.get(lines[0].split(self.comma, 1)[0].strip())
@@ -139,7 +139,7 @@ class _File:
         return count
 
     def text(self) -> bytes:
-        """The file, its lines numbered anew."""
+        """The file with its lines renumbered."""
         entries = list(self.lines[b"D"])
         parameters: list[bytes] = []
         for entry, lines in self.data.items():
@@ -155,7 +155,7 @@ class _File:
 
 
 def _limited(values: list[bytes], directions: int) -> list[bytes] | None:
-    """The parameters of a B-spline with the limits that it lacks; None where it states them."""
+    """The parameters of a B-spline with the limits that it lacks; None if it states them."""
     sums = [int(value) for value in values[1 : 1 + directions]]
     degrees = [int(value) for value in values[1 + directions : 1 + 2 * directions]]
     start = 6 + 3 * (directions - 1) + 1
@@ -175,7 +175,7 @@ def _limited(values: list[bytes], directions: int) -> list[bytes] | None:
 
 
 def _within(given: list[bytes], ranges: list[bytes]) -> bool:
-    """Whether limits are some, and not what comes after them in a file that lacks them: numbers of other entities."""
+    """Whether values are limits, and not the numbers of other entities that follow in a file without limits."""
     (low, high), (first, last) = (
         np.array([value.upper().replace(b"D", b"E") for value in values]).astype(float).reshape(-1, 2).T
         for values in (given, ranges)
@@ -185,7 +185,7 @@ def _within(given: list[bytes], ranges: list[bytes]) -> bool:
 
 
 def _broken(values: list[bytes], comma: bytes, end: bytes) -> Iterator[bytes]:
-    """Parameters in lines."""
+    """Parameters broken into lines."""
     line = b""
     for value in [*(value + comma for value in values[:-1]), values[-1] + end]:
         if len(line) + len(value) > _WIDTH:
@@ -196,7 +196,7 @@ def _broken(values: list[bytes], comma: bytes, end: bytes) -> Iterator[bytes]:
 
 
 def _marks(taken: bytes):
-    """Makes marks of a given length that do not stand in the text, if there are any."""
+    """Makes marks of a given length that do not occur in the text, if there are any."""
 
     def of(length: int) -> Iterator[bytes]:
         every = (bytes(mark) for mark in itertools.product(_DIGITS, repeat=length))

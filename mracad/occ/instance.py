@@ -1,4 +1,4 @@
-"""One instance of a shared part made a part of its own, so that an edit of it leaves the others."""
+"""Making one instance of a shared part a separate part, so that an edit of it does not change the others."""
 
 from __future__ import annotations
 
@@ -28,17 +28,17 @@ _VALUES = (TDataStd_Name, TDataStd_NamedData, XCAFDoc_Area, XCAFDoc_Volume, XCAF
 
 
 def instances(document: Document) -> dict[str, list[TDF_Label]]:
-    """The parts where they stand, and the labels from the top down to each.
+    """All instances of parts by path, with the labels from the top down to each.
 
-    A path is made of the names of the instances (of their products, where those have none) with slashes between; the
-    second among neighbours of the same name has ``#2`` behind it.
+    A path consists of the names of the instances (or of their products, if those have none), separated by slashes; the
+    second neighbour of the same name ends in ``#2``.
     """
     return dict(_below(document.shape_tool.GetFreeShapes, "", []))
 
 
 @dataclass(frozen=True)
 class Own:
-    """The faces and edges of an instance, by their own numbers and those of the part that they were copied from."""
+    """The faces and edges of an instance, by their own indices, with those of the part that they were copied from."""
 
     faces: dict[int, int]
     edges: dict[int, int]
@@ -50,16 +50,16 @@ class Own:
 
 
 def isolate(document: Document, path: str) -> Own:
-    """Make one instance a part of its own, with all that was said of the part.
+    """Make one instance a separate part, with the names, colours and other attributes of the part.
 
-    What lies above it in the assembly is copied, too, where that is used elsewhere.
+    Assemblies above it that are also used elsewhere are copied too.
 
     Parameters
     ----------
     document : Document
-        Changed in place, unless the part has no other instance; a copy's faces come after all others.
+        Changed in place, unless the part has no other instance; the copy's faces come after all others.
     path : str
-        Of the instance, or the end of that.
+        Path of the instance, or the end of it.
 
     Returns
     -------
@@ -121,7 +121,7 @@ def _own(document: Document, product: TDF_Label) -> Own:
 
 
 def _copied(document: Document, product: TDF_Label) -> TDF_Label:
-    """A part with a geometry of its own, or an assembly of the same products."""
+    """A copy: a part with its own geometry, or an assembly of the same products."""
     tool = document.shape_tool
     if XCAFDoc_ShapeTool.IsAssembly_s(product):
         copy = tool.NewShape()
@@ -142,7 +142,7 @@ def _copied(document: Document, product: TDF_Label) -> TDF_Label:
 
 
 def say(document: Document, old: TDF_Label, new: TDF_Label) -> None:
-    """Say of a label what is said of another: name, properties, colours, material, layers."""
+    """Copy the attributes of a label to another: name, properties, colours, material, layers."""
     link = XCAFDoc.ShapeRefGUID_s()
     for kind in _VALUES:
         new.ForgetAttribute(kind.GetID_s())

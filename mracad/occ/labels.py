@@ -1,4 +1,4 @@
-"""Labels of the kernel's documents: their names and colours, and how products are made of each other."""
+"""Labels of the kernel's documents: names, colours, and the structure of assemblies."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from OCP.XCAFDoc import XCAFDoc_ColorTool, XCAFDoc_ColorType, XCAFDoc_ShapeTool
 
 @dataclass(frozen=True)
 class Title:
-    """What a file says of a product or an instance; an identifier of None is a number that is free."""
+    """Identifier, name and description of a product or an instance; without an identifier it gets a free number."""
 
     identifier: str | None
     name: str
@@ -28,7 +28,7 @@ class Title:
 
 
 def label_key(label: TDF_Label) -> str:
-    """A text that names a label within its document."""
+    """A text that identifies a label within its document."""
     tags = []
     while not label.IsRoot():
         tags.append(label.Tag())
@@ -51,7 +51,7 @@ def name_label(label: TDF_Label, name: str) -> None:
 
 
 def label_colour(label: TDF_Label) -> str:
-    """The surface (or general) colour on a label as :func:`colour_text` has it, or ``""``."""
+    """The surface (or general) colour of a label in the form of :func:`colour_text`, or ``""``."""
     colour = Quantity_ColorRGBA()
     for kind in (XCAFDoc_ColorType.XCAFDoc_ColorSurf, XCAFDoc_ColorType.XCAFDoc_ColorGen):
         if XCAFDoc_ColorTool.GetColor_s(label, kind, colour):
@@ -60,13 +60,13 @@ def label_colour(label: TDF_Label) -> str:
 
 
 def colour_text(colour: Quantity_ColorRGBA) -> str:
-    """``"#rrggbb"``, or ``"#rrggbbaa"`` where it is transparent."""
+    """A colour as ``"#rrggbb"``, or ``"#rrggbbaa"`` if it is transparent."""
     text = Quantity_ColorRGBA.ColorToHex_s(colour).ToCString().lower()
     return text[:7] if colour.Alpha() > 1 - 1e-3 else text
 
 
 def labels(fill) -> Iterator[TDF_Label]:
-    """The labels that a kernel function puts in the sequence it is given."""
+    """The labels that a kernel function puts into the sequence that it is given."""
     sequence = TDF_LabelSequence()
     fill(sequence)
     for i in range(1, sequence.Length() + 1):
@@ -74,7 +74,7 @@ def labels(fill) -> Iterator[TDF_Label]:
 
 
 def referred(label: TDF_Label) -> TDF_Label:
-    """The product that an instance is one of; a product itself."""
+    """The product of an instance; a product itself."""
     if not XCAFDoc_ShapeTool.IsReference_s(label):
         return label
     product = TDF_Label()
@@ -83,22 +83,22 @@ def referred(label: TDF_Label) -> TDF_Label:
 
 
 def components(label: TDF_Label) -> Iterator[TDF_Label]:
-    """The instances that an assembly is made of; none for a part."""
+    """The instances in an assembly; none for a part."""
     return labels(lambda found: XCAFDoc_ShapeTool.GetComponents_s(label, found, False))
 
 
 @dataclass(frozen=True)
 class Usage:
-    """Something in the tree of a document.
+    """A free shape or an instance in the tree of a document.
 
     Attributes
     ----------
     chain : tuple of TDF_Label
-        The free shape that it is in, and the instances from there down to it.
+        The free shape at the top, and the instances from there down to this one.
     product : TDF_Label
-        What it is.
+        Its product.
     frame : TopLoc_Location
-        Where it stands in the whole.
+        Its placement in the document.
     """
 
     chain: tuple[TDF_Label, ...]
@@ -107,7 +107,7 @@ class Usage:
 
 
 def usages(shapes: XCAFDoc_ShapeTool) -> Iterator[Usage]:
-    """Everything in a document: free shapes and instances, each before what it is made of."""
+    """All free shapes and instances of a document, each before its components."""
 
     def below(label: TDF_Label, above: tuple[TDF_Label, ...], frame: TopLoc_Location) -> Iterator[Usage]:
         usage = Usage((*above, label), referred(label), frame * XCAFDoc_ShapeTool.GetLocation_s(label))

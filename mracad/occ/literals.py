@@ -1,4 +1,4 @@
-"""Texts in STEP files: any character set in, what ISO 10303-21 asks for out."""
+"""Texts in STEP files: read in any character set, written as ISO 10303-21 requires."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ _DIRECTIVE = re.compile(
 
 
 def conforming(text: bytes, name: str, encoding: str | None = None) -> tuple[bytes, str]:
-    """A STEP file with its strings in ASCII, and what is to be said of that.
+    """A STEP file with its strings in ASCII, and a warning, or ``""``.
 
     Parameters
     ----------
     text : bytes
     name : str
-        Of the file, for the message.
+        Name of the file, for the message.
     encoding : str, optional
-        The character set of its strings; by default UTF-8 where that fits, otherwise the most likely one.
+        The character set of its strings; by default UTF-8 if that fits, else the most likely one.
 
     Raises
     ------
@@ -53,19 +53,19 @@ def conforming(text: bytes, name: str, encoding: str | None = None) -> tuple[byt
 
 
 def chosen(strings: set[bytes], name: str, encoding: str | None) -> tuple[str, str]:
-    """The character set of the texts of a file that are not ASCII: ``encoding``, where it is given; and a warning."""
+    """The character set of the texts of a file that are not ASCII (``encoding`` if given), and a warning or ``""``."""
     if encoding is None:
         if all(_is(string, "utf-8") for string in strings):
             return "utf-8", ""
         guess = detect(strings)
         count = f"{len(strings)} text{'s are' if len(strings) > 1 else ' is'}"
-        return guess, f"{name}: {count} neither ASCII nor UTF-8, read as {guess}; --encoding NAME says otherwise"
+        return guess, f"{name}: {count} neither ASCII nor UTF-8, read as {guess}; --encoding NAME overrides this"
     bad = sum(not _is(string, encoding) for string in strings)
-    return encoding, f"{name}: {bad} of {len(strings)} texts are not {encoding}: signs are lost" if bad else ""
+    return encoding, f"{name}: {bad} of {len(strings)} texts are not {encoding}: characters are lost" if bad else ""
 
 
 def known(encoding: str) -> str:
-    """A character set by the name that Python has for it; raises UsageError where it cannot be one of STEP files."""
+    """The name in Python of a character set; raises UsageError if it cannot be that of a model file."""
     try:
         found = codecs.lookup(encoding).name
         if b"'A\\".decode(found) == "'A\\":
@@ -73,22 +73,24 @@ def known(encoding: str) -> str:
     except (LookupError, UnicodeError, TypeError):
         pass
     raise UsageError(
-        f"encoding: {encoding!r} is no character set of model files", "name one, as utf-8, gb18030, cp932 or latin-1"
+        f"encoding: {encoding!r} is not a character set of model files",
+        "give one, such as utf-8, gb18030, cp932 or latin-1",
     )
 
 
 def escaped(content: str) -> bytes:
-    """What stands between quotes in ASCII: all else as ``\\X2\\…\\X0\\``, or ``\\X4\\…\\X0\\`` beyond 16 bits."""
+    """The content of a quoted string in ASCII: other characters as ``\\X2\\…\\X0\\``, or ``\\X4\\…\\X0\\`` beyond 16
+    bits."""
     return _BEYOND.sub(_hexadecimal, content).encode()
 
 
 def encoded(text: str) -> bytes:
-    """A text as it stands between quotes in a STEP file."""
+    """A text as the content of a quoted string in a STEP file."""
     return escaped(text.replace("\\", "\\\\").replace("'", "''"))
 
 
 def decoded(content: bytes) -> str:
-    """The text that stands between quotes in a STEP file."""
+    """The text of the content of a quoted string in a STEP file."""
     page = "1"
 
     def sign(found: re.Match[str]) -> str:
@@ -114,7 +116,7 @@ def _hexadecimal(run: re.Match[str]) -> str:
 
 
 def _joined(string: bytes) -> bytes:
-    """A string without the breaks of lines in it, which do not belong to it, and may part a sign in two."""
+    """A string without its line breaks, which are not part of it and may split a character."""
     return string.replace(b"\r", b"").replace(b"\n", b"")
 
 

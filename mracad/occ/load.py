@@ -16,7 +16,7 @@ class Text(io.BytesIO):
     Attributes
     ----------
     name : str
-        Of the file, without folder; signs that are not Unicode, which the kernel does not take, are replaced.
+        Name of the file, without its folder; bytes that are not Unicode, which the kernel rejects, are replaced.
     """
 
     def __init__(self, data: bytes, name: str) -> None:
@@ -25,7 +25,7 @@ class Text(io.BytesIO):
 
 
 def load(source: str | os.PathLike | BinaryIO) -> Text:
-    """Read a file or stream as a whole; raises FileError where that is not possible."""
+    """Read a whole file or stream; raises FileError if that is not possible."""
     if isinstance(source, Text):
         return source
     if not isinstance(source, str | os.PathLike):

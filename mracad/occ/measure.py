@@ -30,12 +30,12 @@ from mracad.occ.topology import compound, inside, matrix
 
 Array = np.ndarray
 Point = tuple[float, float, float]
-_EXACT = 1e-6  # relative error of volumes and areas; the kernel's default is off by a hundredth on NURBS faces
-_LEAST = 9  # sample lines across a face in each direction
+_EXACT = 1e-6  # relative error of volumes and areas; the kernel's default has errors of 1 % on NURBS faces
+_LEAST = 9  # least number of sample lines across a face in each direction
 
 
 def mass(document: Document) -> Mass:
-    """Volume, area and centre of everything, placed."""
+    """Volume, area and centre of all placed shapes."""
     return mass_of(document.shape)
 
 
@@ -53,7 +53,7 @@ def mass_of(shape: TopoDS_Shape) -> Mass:
 
 
 def face_masses(document: Document) -> list[Mass]:
-    """Area and centre of every face, in its part's frame: good enough to tell faces apart."""
+    """Area and centre of every face, in its part's frame, exact enough to tell faces apart."""
     found = []
     with quiet():
         for face in document.faces:
@@ -70,7 +70,7 @@ class KernelGauge:
     document: Document
 
     def sample(self, index: int, lines: tuple[int, int]) -> Array:
-        """Points inside a face, ``(q, 3)``: of a grid in its parameter plane, ``lines`` (at least nine) each way."""
+        """Points inside a face, ``(q, 3)``, on a grid of ``lines`` (at least nine) each way in its parameter plane."""
         face = TopoDS.Face_s(self.document.faces[index].Oriented(TopAbs_FORWARD))
         bounds = BRepTools.UVBounds_s(face)
         within = BRepTopAdaptor_FClass2d(face, 1e-9)
@@ -96,9 +96,9 @@ class KernelGauge:
             return np.fromiter(_off(surface, (points - frame[:3, 3]) @ frame[:3, :3]), float, len(points))
 
     def facing(self, index: int) -> Array:
-        """Which way a face looks, ``(4,)``: its mean outward normal, and how far it looks away from its own middle.
+        """The orientation of a face, ``(4,)``: its mean outward normal, and how far that points away from its centre.
 
-        Two faces that coincide and look in opposite directions have opposite ones.
+        Two faces that coincide with opposite orientations have opposite ones.
         """
         face = self.document.faces[index]
         surface = BRepAdaptor_Surface(face, False)
@@ -158,7 +158,7 @@ def _apart(points: Array, target: TopoDS_Shape) -> Array:
 
 
 def _off(surface: Geom_Surface, points: Array) -> Iterator[float]:
-    """Orthogonal distances; where a point has no foot on the surface, that from its border."""
+    """Orthogonal distances; the distance from the border for a point without a foot on the surface."""
     project = GeomAPI_ProjectPointOnSurf()
     project.Init(surface, *surface.Bounds(), 1e-9)
     analysis = ShapeAnalysis_Surface(surface)

@@ -1,4 +1,4 @@
-"""The text of STEP files: as the kernel writes it, made shorter and the same in every process; annotations in it."""
+"""The text of STEP files: the kernel's output made shorter and reproducible, and annotations in it."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from mracad.occ.literals import decoded, encoded, escaped
 
 _STYLES = b" = MECHANICAL_DESIGN_GEOMETRIC_PRESENTATION_REPRESENTATION("
 _ENTITY = re.compile(rb"#(\d+) = (?:[^';]|'[^']*')*;\n")
-_COUNTED = re.compile(rb" = (?:PRODUCT|NEXT_ASSEMBLY_USAGE_OCCURRENCE)\([^;]*;")  # broken where the count was long
+_COUNTED = re.compile(rb" = (?:PRODUCT|NEXT_ASSEMBLY_USAGE_OCCURRENCE)\([^;]*;")  # broken if the number is long
 _REFERENCE = re.compile(rb"'[^']*'|#(\d+)")
-_PMI = {  # each begins with a word, for which the text is searched fast
+_PMI = {  # each begins with a word, so that the search is fast
     "dimensions": (rb"DIMENSIONAL_(?:SIZE|LOCATION)\w*\s*\(", rb"ANGULAR_(?:SIZE|LOCATION)\w*\s*\("),
     "tolerances": (rb"_TOLERANCE\s*\((?=\s*')",),
     "datums": (rb"DATUM\s*\(",),
@@ -24,7 +24,7 @@ _TEXTS = re.compile(rb"'((?:[^']|'')*)'")
 
 
 def pmi(text: bytes) -> dict[str, tuple[str, ...]]:
-    """The names of the dimensions, tolerances, datums and notes in a STEP file; ``""`` where one has none."""
+    """The names of the dimensions, tolerances, datums and notes in a STEP file; ``""`` for one without a name."""
     found = {}
     for kind, patterns in _PMI.items():
         names = []
@@ -37,17 +37,17 @@ def pmi(text: bytes) -> dict[str, tuple[str, ...]]:
 
 
 def tidy(text: bytes, titles: Mapping[bytes, Title] | None = None) -> bytes:
-    """Take out of a STEP file what differs from process to process, and what says nothing; put in the titles.
+    """Remove from a STEP file what differs from process to process and what is redundant, and put in the titles.
 
-    Groups of styles come in the order of the parts they colour, reals have no trailing zeros, points and strings no
-    line breaks, strings nothing beyond ASCII.
+    Groups of styles are sorted by the parts that they colour, reals have no trailing zeros, points and strings no line
+    breaks, and strings are ASCII.
 
     Parameters
     ----------
     text : bytes
-        As the kernel writes it.
+        The output of the kernel.
     titles : mapping, optional
-        By the marks that stand for the names of products and instances.
+        Titles of products and instances, by the marks that the kernel wrote for their names.
     """
     pieces = text.split(b"'")  # every second one is within quotes
     for i in range(1, len(pieces), 2):
@@ -61,7 +61,7 @@ def tidy(text: bytes, titles: Mapping[bytes, Title] | None = None) -> bytes:
 
 
 def _entitle(pieces: list[bytes], titles: Mapping[bytes, Title]) -> None:
-    """Put titles in the place of marks: the name of a product is its identifier, too, that of an instance not."""
+    """Replace marks by titles: the mark of a product is also its identifier, that of an instance is not."""
     known = {title.identifier for title in titles.values()}
     unused = (number for number in map(str, itertools.count(1)) if number not in known)
     for i in range(1, len(pieces), 2):
@@ -77,9 +77,9 @@ def _entitle(pieces: list[bytes], titles: Mapping[bytes, Title]) -> None:
 
 
 def _styles_in_order(text: bytes) -> bytes:
-    """Put the groups of styles in the order of what they colour, and number everything from the first of them anew.
+    """Sort the groups of styles by what they colour, and renumber all entities from the first of them.
 
-    The kernel writes them in the order of addresses in memory, another one in each process.
+    The kernel writes them in the order of addresses in memory, which differs from process to process.
     """
     if text.count(_STYLES) < 2:
         return text
@@ -89,7 +89,7 @@ def _styles_in_order(text: bytes) -> bytes:
     groups = [number for number, entity in entities.items() if _STYLES in entity]
 
     def below(number: int, seen: set[int]) -> Iterator[int]:
-        """An entity and all that it refers to, depth first: of these, what comes before the styles is settled."""
+        """An entity and all that it refers to, depth first, without those before the styles."""
         if number in seen:
             return
         seen.add(number)

@@ -1,4 +1,4 @@
-"""A document as one part: every instance where it stands, for formats that do not know of products."""
+"""A document as one part with every instance in its place, for formats without products."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from mracad.occ.topology import compound
 
 @dataclass(frozen=True, eq=False)
 class OnePart:
-    """A document with one part, and where its shapes come from.
+    """A document with one part, and the origin of its shapes.
 
     Attributes
     ----------
     document : Document
     faces, edges : tuple of int
-        For each face and edge of it, the one of the original document.
+        For each face and edge, its index in the original document.
     colours : tuple of str
-        What colour each face has where it stands: its own, that of the instance, or that of the part; ``""`` for none.
+        Colour of each face: its own, that of the instance, or that of the part; ``""`` for none.
     """
 
     document: Document
@@ -33,7 +33,7 @@ class OnePart:
 
 
 def placed(document: Document) -> OnePart:
-    """Put every instance of a document into one part, in its place."""
+    """Put all instances of a document, in their places, into one part."""
     stands = list(_stands(document))
     xcaf = empty()
     shape = compound(part.shape.Moved(frame) for part, frame, _ in stands)
@@ -53,7 +53,7 @@ def placed(document: Document) -> OnePart:
 
 
 def _stands(document: Document) -> Iterator[tuple[Part, TopLoc_Location, str]]:
-    """Every part where it stands, and the colour that its instances give it there."""
+    """Every instance of a part: its placement, and the colour that the instance gives it."""
     parts = {label_key(part.label): part for part in document.parts}
     for usage in usages(document.shape_tool):
         if label_key(usage.product) in parts:

@@ -1,4 +1,4 @@
-"""Validation properties: the volumes, areas and centroids that a file states, kept true."""
+"""Validation properties: the volumes, areas and centroids that a file states are kept up to date."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ _KINDS = (XCAFDoc_Area, XCAFDoc_Volume, XCAFDoc_Centroid)
 
 @contextmanager
 def restated(document: Document) -> Iterator[None]:
-    """Measure again what a file stated of what has moved since; for the duration, as the kernel writes it.
+    """Update the stated properties of everything that has moved, inside the block in the form that the kernel writes.
 
-    The kernel reads areas and volumes as bare numbers whatever their unit, and writes them as those of millimetres, so
-    all are measured where the unit is another one; and it writes centroids without converting them.
+    The kernel reads areas and volumes as bare numbers whatever their unit, and writes them as millimetres, so all are
+    measured again if the unit is a different one.  It writes centroids without converting them.
     """
     written: list[tuple[TDF_Label, gp_Pnt]] = []
     labels = TDF_ChildIterator(document.shape_tool.Label(), True)
@@ -48,6 +48,6 @@ def restated(document: Document) -> Iterator[None]:
 
 
 def _moved(document: Document, label: TDF_Label) -> bool:
-    """Whether a part, anything in an assembly, or the part of a face has moved."""
+    """Whether a part, any part of an assembly, or the part of a face has moved."""
     product = label.Father() if XCAFDoc_ShapeTool.IsSubShape_s(label) else referred(label)
     return label_key(product) in document.moved or any(_moved(document, part) for part in components(product))

@@ -1,4 +1,4 @@
-"""What the edges of a document can slide along."""
+"""Surfaces and curves along which the edges of a document can slide."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ Array = np.ndarray
 
 
 def railed(document: Document, model: Model) -> Model:
-    """The view of a document, with what its edges can slide along."""
+    """The view of a document, with the surfaces and curves along which its edges can slide."""
     with quiet():
         grounds = {
             face.index: ground
@@ -93,7 +93,7 @@ def _ends(document: Document) -> dict[int, tuple[int, int]]:
 
 
 def _path(edge: TopoDS_Edge, faces: list[TopoDS_Face]) -> Path | None:
-    """The line or circle of an edge between elementary faces; None where its curves cannot get longer."""
+    """The line or circle of an edge between elementary faces; None if its curves cannot get longer."""
     if len(faces) == 2 and faces[0].IsSame(faces[1]) and not _straight(edge, faces[0]):
         return None
     curve = BRepAdaptor_Curve(edge)

@@ -22,13 +22,13 @@ from mracad.occ.triangles import triangles
 def scene(
     document: Document, chord: float | None = None, angle: float | None = None
 ) -> tuple[Scene, tuple[int, ...], tuple[int, ...]]:
-    """Mesh a document, as finely as :func:`mracad.occ.triangles.triangles` is told.
+    """Mesh a document; parameters as for :func:`mracad.occ.triangles.triangles`.
 
     Returns
     -------
     Scene
     tuple of int
-        Faces that the kernel could not mesh: the mesh has holes there.
+        Faces that the kernel could not mesh, where the mesh has holes.
     tuple of int
         Faces of closed bodies that their mesh leaves open.
 
@@ -43,7 +43,7 @@ def scene(
         raise UsageError("chord and angle of a mesh must be positive", "leave them out for the defaults")
     mesh = triangles(document, chord, angle)
     if not len(mesh.corners):
-        raise FileError(f"'{document.name}' gives no triangles", "check its geometry")
+        raise FileError(f"'{document.name}' cannot be meshed", "check its geometry")
     bodies = _Bodies(document, mesh)
     nodes = [bodies.node(label) for label in labels(document.shape_tool.GetFreeShapes)]
     return (
@@ -69,9 +69,9 @@ class _Bodies:
         self.place: dict[tuple[int, tuple[str, ...]], int] = {}
 
     def node(self, label: TDF_Label, above: tuple[str, ...] = (), tint: str = "") -> Node | None:
-        """The tree from a label down; None where it holds no triangles.
+        """The tree from a label down; None if it has no triangles.
 
-        ``above`` are the instances (their keys) that it belongs to, ``tint`` the colour that these give it.
+        ``above`` are the keys of the instances that contain it, ``tint`` is the colour that they give it.
         """
         frame, name = matrix(XCAFDoc_ShapeTool.GetLocation_s(label)), label_name(label)
         product = referred(label)
@@ -84,7 +84,7 @@ class _Bodies:
         return Node(name, frame, body, children) if children or body is not None else None
 
     def body(self, key: str, tint: str) -> int | None:
-        """The position of the mesh of a part in a colour; None for what has no triangles."""
+        """The position of the mesh of a part in a colour; None if it has no triangles."""
         number, part = self.parts.get(key, (-1, None))
         own = self.mesh.parts == number
         if part is None or not own.any():
@@ -108,7 +108,7 @@ class _Bodies:
 
 
 def _open(document: Document, mesh: Triangles) -> tuple[int, ...]:
-    """Faces of closed solids at which a side of a triangle is not met by one the other way round."""
+    """Faces of closed solids with a triangle side that has no opposite one."""
     sides = mesh.sides
     keys = sides.min(axis=1) * len(mesh.points) + sides.max(axis=1)
     _, place = np.unique(keys, return_inverse=True)
@@ -118,7 +118,7 @@ def _open(document: Document, mesh: Triangles) -> tuple[int, ...]:
 
 
 def _enclosing(document: Document) -> Iterator[int]:
-    """The faces of solids of which every shell is closed."""
+    """The faces of solids whose shells are all closed."""
     for part in document.parts:
         for solid in inside(part.shape, TopAbs_SOLID):
             if all(BRep_Tool.IsClosed_s(shell) for shell in inside(solid, TopAbs_SHELL)):

@@ -9,7 +9,7 @@ from mracad.occ.document import Document
 def select_cq(document: Document, expression: str) -> set[int]:
     """The faces that a CadQuery string selector such as ``">Z"`` picks among all placed faces.
 
-    A face of an instanced part is picked when any of its instances is.
+    A face is picked if any of its instances is.
 
     Parameters
     ----------

@@ -1,6 +1,6 @@
 """The kernel's process-wide state: its printers and its exchange settings, changed only inside a ``with``.
 
-And how files are written: with all digits, and the same whenever that is.
+Also how files are written: with all digits, and reproducibly.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ from mracad.errors import UsageError
 _libc = ctypes.CDLL("ucrtbase" if sys.platform == "win32" else None)
 
 
-_threaded = 0  # the process whose kernel has started threads
+_threaded = 0  # process id whose kernel has started threads
 
 
 def threads() -> bool:
-    """Whether the kernel may use its threads: not in a child of a process where it has, which would wait for those."""
+    """Whether the kernel may use threads: not in a forked child of a process that did, where it would wait for them."""
     global _threaded
     _threaded = _threaded or os.getpid()
     return _threaded == os.getpid()
@@ -33,10 +33,10 @@ def threads() -> bool:
 
 @contextmanager
 def quiet() -> Iterator[None]:
-    """Keep whatever the kernel prints away from standard output.
+    """Keep everything that the kernel prints away from standard output.
 
-    Its message printers are taken out, and file descriptor 1, which parts of it write to directly, leads nowhere
-    for the duration.  May be nested; Python's own ``sys.stdout`` must not be written to inside.
+    Its message printers are removed, and file descriptor 1, to which parts of it write directly, is redirected to null
+    inside the block.  May be nested; Python's own ``sys.stdout`` must not be written to inside.
     """
     printers = Message.DefaultMessenger_s().ChangePrinters()
     removed = [printers.Value(i) for i in range(1, printers.Length() + 1)]
@@ -59,12 +59,12 @@ def quiet() -> Iterator[None]:
 
 @contextmanager
 def exchange(values: Mapping[str, str | int]) -> Iterator[None]:
-    """Set the kernel's exchange parameters, and put the old ones back.
+    """Set the kernel's exchange parameters, and restore the old ones at the end.
 
     Parameters
     ----------
     values : mapping
-        Name (as ``"write.step.unit"``) to value: text, or a number for those that are numbers.
+        Values by name, such as ``"write.step.unit"``: text, or a number for numeric settings.
 
     Notes
     -----
@@ -83,16 +83,16 @@ def exchange(values: Mapping[str, str | int]) -> Iterator[None]:
 
 
 def all_digits(writer: Interface_FloatWriter) -> None:
-    """Let a writer of reals give 17 significant digits and always the point, which STEP and IGES need.
+    """Make a writer of reals give 17 significant digits and always the decimal point, which STEP and IGES need.
 
-    What is nearest to zero would not fit the kernel's buffer with an exponent of three digits: it is cut to two.
+    Tiny numbers with an exponent of three digits would not fit the kernel's buffer: they are cut to two.
     """
     writer.SetFormat("%#.2G")
     writer.SetFormatForRange("%#.17G", 1e-99, 1e99)
 
 
 def moment() -> datetime:
-    """The time that a file's header states: SOURCE_DATE_EPOCH, else 1970; raises UsageError."""
+    """The time for the header of a file: SOURCE_DATE_EPOCH, else 1970; raises UsageError."""
     epoch = os.environ.get("SOURCE_DATE_EPOCH", "0")
     try:
         return datetime.fromtimestamp(int(epoch), UTC)

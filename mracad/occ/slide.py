@@ -28,14 +28,14 @@ from mracad.occ.topology import matrix
 
 Array = np.ndarray
 
-_CLOSE = 1e-8  # memory units by which a curve on a surface may miss its edge, if more knots help
+_CLOSE = 1e-8  # memory units by which a curve on a surface may miss its edge; knots are inserted up to then
 _HALVINGS, _PIECES, _DEGREE = 5, 8, 3
-_STILL = 1e-9  # memory units: a vertex that moved by less did not
+_STILL = 1e-9  # memory units: a vertex that moved by less counts as still
 
 
 @dataclass(eq=False)
 class Laid:
-    """The curve of an edge on a face, taken away until there is another one.
+    """The curve of an edge on a face, removed until there is a new one.
 
     Attributes
     ----------
@@ -56,7 +56,7 @@ class Laid:
 
     @classmethod
     def bare(cls, edge: TopoDS_Edge, face: TopoDS_Face) -> Laid:
-        """Take it away."""
+        """Remove the curve."""
         surface, span = BRep_Tool.Surface_s(face, TopLoc_Location()), BRep_Tool.Range_s(edge, face)
         curve = BRep_Tool.CurveOnSurface_s(edge, face, 0.0, 0.0)
         if any(each.IsCurveOnSurface() and each.Surface() == surface for each in edge.TShape().Curves()):
@@ -96,7 +96,7 @@ class Laid:
         return np.asarray(uv + turn * np.round((near - uv) / np.where(turn > 0, turn, 1.0)))
 
     def _missed(self, t: Array, uv: Array) -> Array:
-        """Distances of places on the face from the edge, ``(q,)``."""
+        """Distances between places on the face and the edge, ``(q,)``."""
         surface = BRepAdaptor_Surface(self.face, False)
         on = np.array([surface.Value(*place).Coord() for place in uv.tolist()])
         return np.asarray(np.linalg.norm(on - _points(self.edge, t), axis=1))
@@ -104,20 +104,20 @@ class Laid:
 
 @dataclass(eq=False)
 class Sliding:
-    """Edges that slide, and those that end on them, as they were.
+    """Edges that slide and edges that end on them, in their state before.
 
     Attributes
     ----------
     slid : dict of int to (TopoDS_Edge, TopoDS_Face)
-        By number, each with the face that stays, both forward.
+        Edges that slide by index, each with the face that stays, both forward.
     ending : dict of int to (TopoDS_Edge, list of TopoDS_Face)
-        Edges on lines and circles, by number, with their faces, all forward.
+        Edges on lines and circles that end on them, by index, with their faces, all forward.
     curves : list of (TopoDS_Edge, list of BRep_CurveRepresentation, float)
         The curves and tolerances of all of them, without curves on faces that move.
     grounds : list of Geom_Surface
         The surfaces of faces that stay.
     vertices : dict of TopoDS_TShape to (gp_Pnt, float)
-        Places, in their own frames, and tolerances of the vertices at their ends.
+        Points, in their own frames, and tolerances of the vertices at their ends.
     """
 
     slid: dict[int, tuple[TopoDS_Edge, TopoDS_Face]]
@@ -143,11 +143,11 @@ class Sliding:
         yield from (face for _, faces in self.ending.values() for face in faces)
 
     def bare(self) -> list[Laid]:
-        """Take the curves of edges that slide on faces that stay away."""
+        """Remove the curves of edges that slide from the faces that stay."""
         return [Laid.bare(*each) for each in self.slid.values()]
 
     def again(self, bare: Iterable[Laid]) -> list[tuple[TopoDS_Edge, TopoDS_Face]]:
-        """Give them new ones, and let edges end at vertices that moved; whatever has new curves, by face."""
+        """Make new curves, and let edges end at vertices that moved; returns edges with new curves and their faces."""
         for each in bare:
             each.again()
         trimmed = [(edge, faces) for edge, faces in self.ending.values() if self._retrimmed(edge, faces)]
@@ -159,7 +159,7 @@ class Sliding:
         return {number for number, (edge, _, was) in both if BRep_Tool.Tolerance_s(edge) > max(was, limit)}
 
     def restore(self) -> None:
-        """Make all of them what they were."""
+        """Restore the state before."""
         for edge, curves, tolerance in self.curves:
             shape = edge.TShape()
             again = _held(edge, self.grounds)
@@ -174,7 +174,7 @@ class Sliding:
             shape.Tolerance(tolerance)
 
     def _retrimmed(self, edge: TopoDS_Edge, faces: Iterable[TopoDS_Face]) -> bool:
-        """Let an edge end at its vertices where these moved; whether they did."""
+        """Let an edge end at vertices that moved; returns whether any did."""
         span = BRep_Tool.Range_s(edge)
         where = [
             (self.vertices[each.TShape()][0].Transformed(each.Location().Transformation()), BRep_Tool.Pnt_s(each))
@@ -214,7 +214,7 @@ def ends(edge: TopoDS_Edge) -> tuple[TopoDS_Vertex, TopoDS_Vertex]:
 
 
 def _advance(edge: TopoDS_Edge, old: gp_Pnt, new: gp_Pnt) -> float:
-    """How much farther along the line or circle of an edge a point has got, as a parameter."""
+    """How far a point moved along the line or circle of an edge, as a parameter."""
     curve = BRepAdaptor_Curve(edge)
     if curve.GetType() == GeomAbs_CurveType.GeomAbs_Line:
         return float(ElCLib.Parameter_s(curve.Line(), new) - ElCLib.Parameter_s(curve.Line(), old))
@@ -229,7 +229,7 @@ def _points(edge: TopoDS_Edge, t: Array) -> Array:
 
 
 def _knots(edge: TopoDS_Edge) -> KnotVector:
-    """Knots that suit an edge."""
+    """Initial knots for the curve of an edge."""
     curve, (first, last) = BRep_Tool.Curve_s(edge, 0.0, 0.0), BRep_Tool.Range_s(edge)
     if not isinstance(curve, Geom_BSplineCurve):
         return KnotVector.clamped(np.linspace(first, last, _PIECES + 1), _DEGREE)
@@ -241,12 +241,12 @@ def _knots(edge: TopoDS_Edge) -> KnotVector:
 
 
 def _fitted(knots: KnotVector, place: Callable[[Array], Array], missed: Callable[[Array, Array], Array]) -> Curve:
-    """The curve in a parameter plane through places at parameters, with knots until it misses nothing.
+    """The curve in a parameter plane through places at parameters; knots are inserted until it is close enough.
 
     Parameters
     ----------
     knots : KnotVector
-        To begin with.
+        The initial knots.
     place : callable
         ``place(t)``, places ``(q, 2)``.
     missed : callable

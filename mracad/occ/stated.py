@@ -1,4 +1,4 @@
-"""What a STEP file states, before the kernel makes (and heals) shapes of it."""
+"""The content of a STEP file as stated, before the kernel makes (and heals) shapes of it."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def stated(text: bytes, name: str) -> Stated:
     Raises
     ------
     FileError
-        When it is not one.
+        When it cannot be parsed.
     """
     with quiet(), exchange({}):
         reader = STEPControl_Reader()
@@ -57,7 +57,7 @@ def stated(text: bytes, name: str) -> Stated:
 
 
 def _centre(face) -> tuple[float, float, float]:
-    """The middle of the vertices of a face; far away where it has none."""
+    """The middle of the vertices of a face; far away if it has none."""
     vertices = {vertex for edge, _ in _uses(face) for vertex in (edge.EdgeStart(), edge.EdgeEnd())}
     points = [vertex.VertexGeometry() for vertex in vertices if hasattr(vertex, "VertexGeometry")]
     if not points or not all(hasattr(point, "CoordinatesValue") for point in points):
@@ -67,7 +67,7 @@ def _centre(face) -> tuple[float, float, float]:
 
 
 def unloaded(text: bytes, name: str) -> list[str]:
-    """The faces of a STEP file of which the kernel makes none, and why: ``"#243: Surface has not been created"``."""
+    """The faces of a STEP file that the kernel cannot load, and why: ``"#243: Surface has not been created"``."""
     with quiet(), exchange({}):
         reader = STEPControl_Reader()
         reader.ReadStream(name, io.BytesIO(text))
@@ -84,7 +84,7 @@ def unloaded(text: bytes, name: str) -> list[str]:
                 f"#{numbers[place[entity]].decode()}" if len(numbers) == len(place) else f"entity {place[entity] + 1}"
             )
             cause = checks.get(entity.FaceGeometry(), check) if hasattr(entity, "FaceGeometry") else check
-            reason = cause.CFail(1) if cause.NbFails() else "the kernel makes nothing of it"
+            reason = cause.CFail(1) if cause.NbFails() else "the kernel gives no reason"
             found.append(f"{label}: {reason.strip()}")
     return found
 

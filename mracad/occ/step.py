@@ -1,4 +1,4 @@
-"""STEP in and out: every digit kept, the same bytes every time."""
+"""Reading and writing STEP, with all digits and reproducible bytes."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ _SCHEMAS = {"AP203": "AP203", "AP214": "AP214IS", "AP242": "AP242DIS"}
 def read_step(
     source: str | os.PathLike | BinaryIO, input_unit: str | None = None, encoding: str | None = None
 ) -> Document:
-    """Read a STEP file with all that it says of its shapes; see :func:`mracad.occ.files.read`."""
+    """Read a STEP file with all attributes of its shapes; see :func:`mracad.occ.files.read`."""
     file = load(source)
     text, name = file.getvalue(), file.name
     if by_content(text, name).name != "step":
@@ -67,7 +67,7 @@ def read_step(
 
 
 def _schema(text: bytes) -> str:
-    """Which application protocol the header names."""
+    """The application protocol that the header names."""
     match = re.search(rb"FILE_SCHEMA\s*\(\s*\(\s*'([^']*)'", text[:65536])
     schema = match[1].upper() if match else b""
     known = {b"AP242": "AP242", b"AUTOMOTIVE_DESIGN": "AP214", b"CONFIG_CONTROL_DESIGN": "AP203", b"AP203": "AP203"}
@@ -85,10 +85,10 @@ def write_step(
     target : path or binary stream
         A path is replaced only once the whole file is written.
     schema : str
-        ``"AP203"``, ``"AP214"`` or ``"AP242"``.  By default AP242 for a document that was, otherwise AP214: written
-        as AP203, which the kernel takes to hold one body per product, a document of several loses its structure.
+        ``"AP203"``, ``"AP214"`` or ``"AP242"``.  By default AP242 for a document that was read as such, else AP214: in
+        AP203 the kernel writes one body per product, so that documents with several lose their structure.
     options_text : str
-        What was done, for the header.
+        Description of the steps, for the header.
 
     Raises
     ------
@@ -97,16 +97,16 @@ def write_step(
     FileError
         When the target cannot be written.
     UsageError
-        For an unknown schema, or a SOURCE_DATE_EPOCH that is no number.
+        For an unknown schema, or a SOURCE_DATE_EPOCH that is not a number.
     """
     name = Path(target).name if isinstance(target, str | os.PathLike) else document.name
     put(step(document, name, schema, options_text)[0], target)
 
 
 def step(document: Document, name: str, schema: str = "", options_text: str = "") -> tuple[bytes, tuple[CutFace, ...]]:
-    """The whole STEP file, and the faces that it holds in parts.
+    """The whole STEP file, and the faces that are written in parts.
 
-    ``name`` is that in its header, the rest is as for :func:`write_step`.
+    ``name`` is the file name in its header; all else is as for :func:`write_step`.
     """
     schema = schema or ("AP242" if document.schema == "AP242" else "AP214")
     if schema not in _SCHEMAS:
@@ -145,7 +145,7 @@ def _print(writer: STEPControl_Writer, stream: BinaryIO) -> None:
 
 
 def _copy(shape: TopoDS_Shape) -> TopoDS_Shape:
-    """A bare shape as it is read from the file that it is written to."""
+    """A bare shape, written to STEP and read back."""
     stream = io.BytesIO()
     writer = STEPControl_Writer()
     writer.Transfer(shape, STEPControl_AsIs)
@@ -157,7 +157,7 @@ def _copy(shape: TopoDS_Shape) -> TopoDS_Shape:
 
 
 def _head(model: StepData_StepModel, name: str, options_text: str) -> None:
-    """Fill the header: nothing in it depends on where, when or how often it is written."""
+    """Fill the header so that it is the same every time."""
     header = APIHeaderSection_MakeHeader(model)
     name, options_text = (text.encode(errors="backslashreplace").decode() for text in (name, options_text))
     header.SetName(TCollection_HAsciiString(name))

@@ -1,7 +1,7 @@
-"""Products and their instances under the identifiers, names and descriptions that a STEP file gives them.
+"""Identifiers, names and descriptions of products and instances in STEP files.
 
-The kernel keeps one name of each: it takes the identifier where the name has no letter of ASCII, and writes the name
-as the identifier, too.  So it gets marks instead of names, both ways; the names are put in here.
+The kernel keeps only one name of each: it takes the identifier if the name has no ASCII letter, and writes the name as
+the identifier too.  So it gets marks instead of names, both on reading and on writing; the names are put in here.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from mracad.occ.labels import Title, components, label_key, label_name, labels, 
 from mracad.occ.literals import decoded
 
 _STRING = rb"'([^']*+(?:''[^']*+)*+)'"
-_STATED = tuple(  # each begins with its word, for which the text is searched fast
+_STATED = tuple(  # each begins with its word, so that the search is fast
     re.compile(word + rb"(\s*\(\s*)" + _STRING + rb"(\s*,\s*)" + _STRING + rb"\s*,\s*(?:" + _STRING + rb"|\$)")
     for word in (b"PRODUCT", b"NEXT_ASSEMBLY_USAGE_OCCURRENCE")
 )
@@ -28,12 +28,12 @@ _MARK = "mracad title "
 
 
 def marked(text: bytes) -> tuple[bytes, list[Title]]:
-    """A STEP file in which marks are the names of products and instances, and what these stand for."""
+    """A STEP file with marks for the names of products and instances, and the title of each mark."""
     titles: list[Title] = []
 
     def mark(found: re.Match[bytes]) -> bytes:
         start = found.start()
-        if text[start - 1 : start] in (b"_", b"'"):  # the end of another word, or text
+        if text[start - 1 : start] in (b"_", b"'"):  # the end of another word, or part of a text
             return found[0]
         opening, identifier, comma, name, description = found.groups()
         titles.append(Title(*map(decoded, (identifier, name, description or b""))))
@@ -46,7 +46,7 @@ def marked(text: bytes) -> tuple[bytes, list[Title]]:
 
 
 def put_names(document: Document, titles: list[Title]) -> None:
-    """Put names in the place of the marks that the kernel has read; the document keeps the titles."""
+    """Replace the marks that the kernel has read by names; the document keeps the titles."""
     for label in _labels(document):
         name = label_name(label)
         if name.startswith(_MARK):
@@ -57,9 +57,9 @@ def put_names(document: Document, titles: list[Title]) -> None:
 
 @contextmanager
 def marking(document: Document) -> Iterator[Mapping[bytes, Title]]:
-    """Let marks be the names of products and instances, as the kernel writes them; yields what they stand for.
+    """Give products and instances marks for names inside the block; yields the title of each mark.
 
-    What no file has named is called after its label, or by a number.
+    Products that no file has named are named by their label, or by a number.
     """
     tool = document.shape_tool
     unnamed = (f"part {count}" for count in itertools.count(1))
@@ -91,7 +91,7 @@ def _mark(number: int) -> bytes:
 
 
 def _labels(document: Document) -> Iterator[TDF_Label]:
-    """The products of a document, each with the instances in it."""
+    """The labels of the products of a document, each followed by those of the instances in it."""
     for label in list(labels(document.shape_tool.GetShapes)):
         yield label
         yield from components(label)

@@ -1,4 +1,4 @@
-"""Small walks over shapes, and their places and boxes as arrays."""
+"""Traversal of shapes, and their placements and boxes as arrays."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ Array = np.ndarray
 
 
 def edge_uses(face: TopoDS_Face) -> Iterator[TopoDS_Edge]:
-    """The edges of a forward face as it uses them; a closing edge comes twice."""
+    """The edges of a forward face as the face uses them; a closing edge comes twice."""
     explorer = TopExp_Explorer(face, TopAbs_EDGE)
     while explorer.More():
         yield TopoDS.Edge_s(explorer.Current())
@@ -30,7 +30,7 @@ def edge_uses(face: TopoDS_Face) -> Iterator[TopoDS_Edge]:
 
 
 def validated(edge: TopoDS_Edge, face: TopoDS_Face, together: bool) -> BRepLib_ValidateEdge:
-    """How far an edge and its curve on a face are apart, as the kernel sees it; at equal parameters if ``together``."""
+    """The kernel's distance between an edge and its curve on a face, at equal parameters if ``together``."""
     on_face = Adaptor3d_CurveOnSurface(BRepAdaptor_Curve2d(edge, face), BRepAdaptor_Surface(face, False))
     found = BRepLib_ValidateEdge(BRepAdaptor_Curve(edge), on_face, together)
     found.Process()
@@ -45,7 +45,7 @@ def inside(shape: TopoDS_Shape, kind) -> Iterator[TopoDS_Shape]:
 
 
 def compound(shapes: Iterable[TopoDS_Shape]) -> TopoDS_Compound:
-    """Several shapes as one."""
+    """A compound of shapes."""
     whole = TopoDS_Compound()
     builder = BRep_Builder()
     builder.MakeCompound(whole)
@@ -69,13 +69,13 @@ def nodes(mesh: Poly_Triangulation, location: TopLoc_Location) -> Array:
 
 
 def placed(points: Array, frame: Array) -> Array:
-    """Points ``(…, 3)`` where a frame puts them."""
+    """Points ``(…, 3)`` transformed by a frame."""
     return np.asarray(points @ frame[:3, :3].T + frame[:3, 3])
 
 
 def box(shape: TopoDS_Shape, tight: bool = False) -> Array:
-    """Lowest and highest corner of a shape, ``(2, 3)``, memory units: never too small, at most that of its poles;
-    ``tight`` ones take long on NURBS."""
+    """Lowest and highest corner of a shape, ``(2, 3)``, memory units: never too small, at most that of its control
+    points; ``tight`` ones are slow on NURBS."""
     bounds = Bnd_Box()
     if tight:
         BRepBndLib.AddOptimal_s(shape, bounds, False, False)
@@ -85,5 +85,5 @@ def box(shape: TopoDS_Shape, tight: bool = False) -> Array:
 
 
 def has_solids(shape: TopoDS_Shape) -> bool:
-    """Whether there is a solid in a shape."""
+    """Whether a shape contains a solid."""
     return TopExp_Explorer(shape, TopAbs_SOLID).More()

@@ -36,14 +36,14 @@ def triangles(document: Document, chord: float | None = None, angle: float | Non
     ----------
     document : Document
     chord : float, optional
-        How far the mesh may be from the surface, mm; by default 1/5000 of the model's diagonal.
+        Largest distance of the mesh from the surface, mm; by default 1/5000 of the model's diagonal.
     angle : float, optional
-        How far neighbouring triangles may turn along a curve, degrees; by default 12.
+        Largest turn between neighbouring triangles along a curve, degrees; by default 12.
 
     Raises
     ------
     UsageError
-        For a chord or an angle of which no mesh would come to an end.
+        For a chord or an angle that is too small.
     """
     if angle is not None and not SMALLEST[1] <= angle <= 180:
         raise UsageError(f"angle: {angle:g} is not between {SMALLEST[1]:g} and 180 degrees", "give --angle 12")
@@ -73,8 +73,8 @@ def triangles(document: Document, chord: float | None = None, angle: float | Non
 
 
 def _folds(mesh: Triangles) -> int:
-    """How many sides of triangles are there more than once in one direction: the kernel's default now and then folds a
-    mesh over itself."""
+    """Number of triangle sides that occur more than once in one direction: the kernel's default sometimes folds a mesh
+    over itself."""
     sides = mesh.sides
     return len(sides) - len(np.unique(sides[:, 0] * len(mesh.points) + sides[:, 1]))
 
@@ -115,11 +115,11 @@ def _collected(document: Document) -> Triangles:
 
 
 def _weld(points: Array) -> Array:
-    """For each point the first of those that coincide with it.
+    """For each point, the first of the points that coincide with it.
 
     The kernel evaluates both sides of a closing edge, and rounds them differently.
     """
-    from scipy.sparse import coo_array  # a few tenths of a second that reading and writing STEP can do without
+    from scipy.sparse import coo_array  # takes tenths of a second, which reading and writing STEP need not spend
     from scipy.sparse.csgraph import connected_components
     from scipy.spatial import cKDTree
 

@@ -1,4 +1,4 @@
-"""Faces on surfaces that close both ways, laid anew as two tubes: their seams run where no hole is."""
+"""Faces on surfaces that close both ways, rebuilt as two tubes whose closing edges avoid holes."""
 
 from __future__ import annotations
 
@@ -23,17 +23,17 @@ _TOLERANCE = 1e-7
 
 
 def tubes(face: TopoDS_Face) -> TopoDS_Shell | None:
-    """Two faces that are tubes, in the place of one that goes round both ways.
+    """Two tubes in place of a face that goes round both ways.
 
     Parameters
     ----------
     face : TopoDS_Face
-        Forward.
+        The face, forward.
 
     Returns
     -------
     TopoDS_Shell or None
-        None where the surface does not close both ways, or holes leave no place for the seams.
+        None if the surface does not close both ways, or holes leave no place for the closing edges.
     """
     location = TopLoc_Location()
     surface = BRep_Tool.Surface_s(face, location)
@@ -92,7 +92,7 @@ def along(edge: TopoDS_Edge, face: TopoDS_Face) -> Array:
 
 
 def _gaps(values: list[Array], period: float) -> list[float]:
-    """The middles of the stretches of a circle that no run of values enters, the widest first."""
+    """The middles of the parts of a circle that no run of values enters, the widest first."""
     runs = sorted((run.min() % period, np.ptp(run)) for run in values)
     found, reached = [], max(low + length for low, length in runs) - period
     for low, length in runs:
@@ -123,7 +123,7 @@ def _edge(curve, start: TopoDS_Vertex, end: TopoDS_Vertex, first: float, last: f
 
 
 def _line(u: float, v: float, axis: int) -> Geom2d_Line:
-    """A line in the parameter plane along u (axis 1) or v (axis 0), timed by that parameter."""
+    """A line in the parameter plane along u (axis 1) or v (axis 0), parameterised by u or v."""
     return Geom2d_Line(gp_Pnt2d(u, v), gp_Dir2d(axis, 1 - axis))
 
 
@@ -143,7 +143,7 @@ def _wire(edges: list[TopoDS_Edge]) -> TopoDS_Wire:
 
 
 def _loops(edges: list[TopoDS_Edge]) -> Iterator[list[TopoDS_Edge]]:
-    """Edges by the loops that they make, each in order."""
+    """Edges grouped into loops, each in order."""
     left = list(edges)
     while left:
         loop = [left.pop()]

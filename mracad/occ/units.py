@@ -1,9 +1,9 @@
 """Length units of files.
 
-The kernel works in millimetres: it multiplies every length that it reads by the file's unit and divides by it on
-writing.  With x = fl(a f) in memory, fl(fl(x / f) f) = x for every a and f in double precision (where the quotients are
-spaced closer than x asks for, the product rounds back to x; where they are not, a is the nearest quotient), so numbers
-that nothing moved read back bit-identical.
+The kernel works in millimetres: it multiplies every length that it reads by the file's unit, and divides by it on
+writing.  With x = fl(a f) in memory, fl(fl(x / f) f) = x for every a and f in double precision (where quotients are
+spaced more closely than x requires, the product rounds back to x; where they are not, a is the nearest quotient).  So
+numbers that were not changed read back bit-identical.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ UNITS = {
     "uin": (2.54e-5, "UIN"),
 }
 _ALIASES = {"inch": "in", "foot": "ft", "feet": "ft", "metre": "m", "meter": "m", "micron": "um", "µm": "um"}
-# dimensions and tolerances, which the kernel writes as it holds them in memory, whatever the unit of the output is
+# dimensions and tolerances, which the kernel writes in memory units whatever the unit of the output
 _TOLERANCES = re.compile(rb"\b(GEOMETRIC_TOLERANCE|DIMENSIONAL_SIZE|DIMENSIONAL_LOCATION)\b")
 _SAME = 1e-9  # relative difference below which two factors are the same unit
 
@@ -40,7 +40,7 @@ _SAME = 1e-9  # relative difference below which two factors are the same unit
 class Units:
     """The length unit of a file.
 
-    The default, millimetres, serves files that mix units, use one that cannot be written, or hold dimensions and
+    The default, millimetres, is used for files that mix units, use one that cannot be written, or hold dimensions and
     tolerances.
 
     Attributes
@@ -50,8 +50,8 @@ class Units:
     mm : float
         Millimetres in one unit, as the kernel computes them.
     kernel_mm : float
-        What the kernel must be told on reading that its own unit is, mm; differs from 1 only where the file states a
-        wrong unit.
+        Millimetres in the unit that the kernel must use on reading; differs from 1 only if the file states the wrong
+        unit.
     """
 
     name: str = "mm"
@@ -60,7 +60,7 @@ class Units:
 
 
 def named(unit: str) -> str:
-    """The key of ``UNITS`` that ``unit`` means; raises UsageError."""
+    """The key of ``UNITS`` for the name of a unit; raises UsageError."""
     key = unit.strip().lower()
     key = _ALIASES.get(key, key)
     if key not in UNITS:
@@ -78,7 +78,7 @@ def of_file(model: StepData_StepModel, text: bytes, override: str | None = None)
     text : bytes
         Its text.
     override : str, optional
-        The unit that its numbers are in whatever the file says.
+        The unit of its numbers, instead of the one that the file states.
 
     Raises
     ------
@@ -102,7 +102,7 @@ def of_file(model: StepData_StepModel, text: bytes, override: str | None = None)
 
 
 def metres(mm: float) -> float:
-    """The number that the kernel, which stores its unit in metres, turns into exactly ``mm`` (or the next to it)."""
+    """The number of metres that the kernel, which stores its unit in metres, converts to exactly ``mm`` (or nearly)."""
     near = mm / 1000.0
     return min((near, math.nextafter(near, 0.0), math.nextafter(near, math.inf)), key=lambda m: abs(m * 1000.0 - mm))
 

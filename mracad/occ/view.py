@@ -78,11 +78,11 @@ def view(document: Document, convert: Iterable[int] = (), edges: Container[int] 
     ----------
     document : Document
     convert : iterable of int
-        Faces on analytic, swept or offset surfaces that are to be seen as NURBS faces as well.  Their surfaces are
-        put on them only by ``apply``, where they move.
+        Faces on analytic, swept or offset surfaces to show as NURBS faces too.  ``apply`` puts the NURBS surfaces on
+        those that move.
     edges : container of int, optional
-        Edges that are sampled, and whose faces have trims; by default all.  With some alone the diagonal is that of the
-        boxes of the parts' control points.
+        Edges to sample, whose faces get trims; by default all.  With only some edges, the diagonal is that of the boxes
+        of the parts' control points.
 
     Raises
     ------
@@ -91,7 +91,7 @@ def view(document: Document, convert: Iterable[int] = (), edges: Container[int] 
     EditError
         For a face that the kernel cannot convert.
     FileError
-        For a face whose numbers no model can have.
+        For a face with absurd coordinates or weights.
     """
     chosen = frozenset(convert)
     for face in sorted(chosen):
@@ -129,13 +129,13 @@ def view(document: Document, convert: Iterable[int] = (), edges: Container[int] 
 
 
 def _boxed(boxes: list[Array]) -> float:
-    """The diagonal of boxes, as if every part stood in its own frame."""
+    """The diagonal of all boxes together, each in its part's frame."""
     low, high = np.min(boxes, axis=0)[0], np.max(boxes, axis=0)[1]
     return float(np.linalg.norm(high - low))
 
 
 def _refuse_absurd(name: str, numbers: Iterable[tuple[int, Array | float]]) -> None:
-    """Raise FileError where numbers of a face are infinite, undefined or astronomic: nothing comes of them."""
+    """Raise FileError if numbers of a face are infinite, undefined or astronomical."""
     for face, values in numbers:
         if not (np.abs(values) < _ABSURD).all():
             raise FileError(
@@ -144,7 +144,7 @@ def _refuse_absurd(name: str, numbers: Iterable[tuple[int, Array | float]]) -> N
 
 
 def _stored(boxes: list[Array], surfaces: Iterable[tuple[list[int], Net]]) -> Iterator[tuple[int, Array]]:
-    """What the file says of each face."""
+    """The numbers of each face that the file states."""
     yield from enumerate(boxes)
     for members, net in surfaces:
         yield members[0], net.poles
@@ -153,7 +153,7 @@ def _stored(boxes: list[Array], surfaces: Iterable[tuple[list[int], Net]]) -> It
 
 
 def _seen(edges: tuple[Edge, ...], found: _Found) -> Iterator[tuple[int, Array | float]]:
-    """What was evaluated of each face, and where it stands."""
+    """The evaluated numbers of each face, and its placement."""
     yield from enumerate(found.frames)
     for edge in edges:
         for side in edge.sides:
@@ -164,7 +164,7 @@ def _seen(edges: tuple[Edge, ...], found: _Found) -> Iterator[tuple[int, Array |
 
 
 def _walk(document: Document, chosen: frozenset[int]) -> _Found:
-    """Go through all faces and their edges."""
+    """Collect all faces and their edges."""
     found = _Found(document.faces)
     for part in document.parts:
         for index in part.numbers:
@@ -186,7 +186,7 @@ def _walk(document: Document, chosen: frozenset[int]) -> _Found:
 
 
 def pcurve(edge: TopoDS_Edge, face: TopoDS_Face) -> Geom2d_Curve:
-    """The edge's curve in the parameter plane of a face; made by projection where the file lacks it."""
+    """The edge's curve in the parameter plane of a face, made by projection if the file lacks it."""
     curve = BRep_Tool.CurveOnSurface_s(edge, face, 0.0, 0.0)
     if curve is None:
         ShapeFix_Edge().FixAddPCurve(edge, face, False)
@@ -205,7 +205,7 @@ def _trims(found: _Found, edges: Container[int] | None) -> dict[int, tuple[Trim,
 
 
 def _edges(document: Document, found: _Found, edges: Container[int] | None) -> Iterator[Edge]:
-    """All edges, those that are meant with their samples."""
+    """All edges, the chosen ones with samples."""
     part_of = np.repeat(np.arange(len(document.parts)), [part.edges.Extent() for part in document.parts]).tolist()
     by_edge: list[list[_Use]] = [[] for _ in document.edges]
     for use in found.uses:
@@ -284,7 +284,7 @@ def _beside(
 
 
 def _jets(surface: BRepAdaptor_Surface, uv: Array) -> Array:
-    """Points and derivatives u, v, uu, uv, vv of a surface that is no plane, ``(k, 6, 3)``."""
+    """Points and derivatives u, v, uu, uv, vv of a surface that is not a plane, ``(k, 6, 3)``."""
     round_about = _profile(surface, uv[:, 1])
     if round_about is not None:
         position, rho, zeta = round_about
@@ -305,8 +305,8 @@ def _jets(surface: BRepAdaptor_Surface, uv: Array) -> Array:
 
 
 def _profile(surface: BRepAdaptor_Surface, v: Array) -> tuple[gp_Ax3, Array, Array] | None:
-    """The frame of a surface that a line or circle draws round an axis, and that one's distance from the axis and its
-    height, with two derivatives each, ``(3, k)``; None for other surfaces."""
+    """The frame of a surface of revolution of a line or circle, and the profile's distance from the axis and height,
+    with two derivatives each, ``(3, k)``; None for other surfaces."""
     zero, one = np.zeros_like(v), np.ones_like(v)
     cos, sin = np.cos(v), np.sin(v)
     match surface.GetType():

@@ -1,9 +1,9 @@
-"""What a format cannot express as it is: faces that a reader would mistake are written on NURBS or in parts.
+"""Faces that a format cannot express as they are: readers would misinterpret them, so they become NURBS or parts.
 
-A face that goes right round its surface has a closing edge.  STEP and IGES leave out what closes it at poles, and a
-reader guesses; where the face has other boundaries, too, it may guess wrong and keep the hole for the face.  Cut along
-a parameter line, the parts close one way less, and there is nothing to guess.  A surface of revolution is written
-without its limits, and whole it may touch its axis where the face does not: as NURBS it ends where the face ends.
+A face that goes right round its surface has a closing edge.  STEP and IGES omit the edges that close it at poles, and a
+reader has to guess; if the face has other boundaries too, it may guess wrong and take the hole for the face.  When the
+face is cut along a parameter line, its parts close in one direction less, and readers need not guess.  A surface of
+revolution is written without its limits, and may touch its axis beyond the face: as NURBS it ends where the face ends.
 """
 
 from __future__ import annotations
@@ -51,25 +51,25 @@ Copier = Callable[[TopoDS_Shape], TopoDS_Shape]
 """Writes a bare shape in some format and reads it back."""
 
 _NURBS = Geom_BSplineSurface, Geom_BezierSurface
-_NATURAL = 4  # edge uses of a face that is bounded by nothing but parameter lines
-_SAME = 2e-4  # relative difference of areas, and of centres to size, of one face: the kernel measures no better
-_OTHER = 1e-2  # that of faces of which one is surely mistaken for another
-_EXACT = 1e-7  # relative error of areas; those of the kernel's quick way are off by up to a hundredth on NURBS faces
-_LOOSER = 2.0, 1e-5  # a face read back may have so many times the tolerance, or so much (memory units)
+_NATURAL = 4  # edge uses of a face that is bounded only by parameter lines
+_SAME = 2e-4  # largest relative difference of areas, and of centres to size, of the same face: the kernel's accuracy
+_OTHER = 1e-2  # difference above which the face read back is surely another one
+_EXACT = 1e-7  # relative error of areas; the kernel's fast method has errors of up to 1 % on NURBS faces
+_LOOSER = 2.0, 1e-5  # allowed factor on the tolerance of a face read back, or allowed tolerance (memory units)
 _ALL_THE_WAY = 0.9  # share of the whole range of a parameter
 _PRECISION = 1e-7
 
 
 @dataclass(frozen=True)
 class CutFace:
-    """A face that a file holds in another way.
+    """A face that a file holds in another form.
 
     Attributes
     ----------
     face : int
         Its index.
     parts : int
-        In how many parts; 1 where it is on a NURBS surface instead of its own.
+        Number of its parts; 1 if it is on a NURBS surface instead of its own.
     """
 
     face: int
@@ -81,24 +81,24 @@ class CutFace:
 
 @contextmanager
 def writable(document: Document, copier: Copier) -> Iterator[tuple[CutFace, ...]]:
-    """Let a document hold, inside the block, only faces that a format can express.
+    """Make a document hold, inside the block, only faces that a format can express.
 
     Parameters
     ----------
     document : Document
-        Its parts, and the labels in them, are put back when the block ends.
+        Its parts and their labels are restored when the block ends.
     copier : callable
-        How a reader of that format sees a bare shape.
+        Writes a bare shape in that format and reads it back.
 
     Yields
     ------
     tuple of CutFace
-        The faces that are on NURBS or in several parts, which have their name, colour and layers.
+        The faces that are on NURBS or in several parts, which keep their name, colour and layers.
 
     Raises
     ------
     EditError
-        For a face that would not come back whole so either.
+        For a face that would not be read back correctly in that form either.
     """
     wrong: dict[int, list[int]] = {}
     for number, part in enumerate(document.parts):
@@ -123,7 +123,7 @@ def writable(document: Document, copier: Copier) -> Iterator[tuple[CutFace, ...]
 
 
 def _closes(face: TopoDS_Face) -> bool:
-    """Whether a face goes right round a surface that is no plain one, and a reader has to guess how."""
+    """Whether a face goes right round a surface that is not elementary, so that a reader has to guess how."""
     forward = TopoDS.Face_s(face.Oriented(TopAbs_FORWARD))
     basis = untrimmed(BRep_Tool.Surface_s(forward, TopLoc_Location()))
     if isinstance(basis, Geom_ElementarySurface):
@@ -136,7 +136,7 @@ def _closes(face: TopoDS_Face) -> bool:
 
 
 def _kept(face: TopoDS_Shape, copy: TopoDS_Shape) -> bool:
-    """Whether what was read back is what was written."""
+    """Whether a face was read back as it was written."""
     loose, looser = _LOOSER
     return (
         _alike(face, copy, _SAME)
@@ -152,7 +152,7 @@ def _alike(face: TopoDS_Shape, copy: TopoDS_Shape, slack: float) -> bool:
 
 
 def _as_large(face: TopoDS_Shape, copy: TopoDS_Shape, slack: float, *exact: float) -> bool:
-    """Whether two faces have the same area and centre; quickly, what says no to some that have, or exactly."""
+    """Whether two faces have the same area and centre, by a quick measurement that rejects some that do, or exactly."""
     old, new = GProp_GProps(), GProp_GProps()
     for shape, found in ((face, old), (copy, new)):
         BRepGProp.SurfaceProperties_s(shape, found, *exact)
@@ -165,7 +165,7 @@ def _tolerance(shape: TopoDS_Shape) -> float:
 
 
 def _rewrite(document: Document, part: Part, faces: Sequence[int], copier: Copier) -> Iterator[CutFace]:
-    """Put a part with some faces on NURBS or in parts in its own place in the document."""
+    """Replace a part in the document by one with some faces on NURBS or in parts."""
     twins = BRepBuilderAPI_Copy(part.shape, False, False)
     context = ShapeBuild_ReShape()
     for index in faces:
@@ -191,7 +191,7 @@ def _rewrite(document: Document, part: Part, faces: Sequence[int], copier: Copie
 
 
 def _mended(document: Document, index: int, twin: TopoDS_Shape, copier: Copier, context: ShapeBuild_ReShape) -> bool:
-    """Whether the twin of a face comes back on NURBS or in parts: then it is."""
+    """Replace the twin of a face by NURBS or parts if that is read back correctly; returns whether it is."""
     made = _on_nurbs(document, index)
     if made is not None:
         trial = BRepBuilderAPI_Copy(_bare(twin), False, False).Shape()
@@ -208,7 +208,7 @@ def _mended(document: Document, index: int, twin: TopoDS_Shape, copier: Copier, 
 
 
 def _on_nurbs(document: Document, index: int) -> Conversion | None:
-    """The NURBS form of a face that has another one."""
+    """The NURBS form of a face on another surface; None for a NURBS face or if it cannot be converted."""
     if isinstance(untrimmed(BRep_Tool.Surface_s(document.faces[index], TopLoc_Location())), _NURBS):
         return None
     try:
@@ -224,7 +224,7 @@ def _bare(face: TopoDS_Shape) -> TopoDS_Face:
 
 
 def _divided(face: TopoDS_Face, copier: Copier, context: ShapeBuild_ReShape) -> bool:
-    """Whether a face comes back in parts: then those take its place in a context."""
+    """Replace a face by parts in a context if these are read back correctly; returns whether they are."""
     for divide in (_tubes, partial(_parts, axis=0), partial(_parts, axis=1)):
         parts = divide(face, ShapeBuild_ReShape())
         if parts is not None and BRepCheck_Analyzer(parts).IsValid() and _kept(parts, copier(parts)):
@@ -242,7 +242,7 @@ def _tubes(face: TopoDS_Face, context: ShapeBuild_ReShape) -> TopoDS_Shape | Non
 
 
 def _mistaken(document: Document, index: int) -> EditError:
-    what = "goes right round its surface in a way that readers of this format mistake"
+    what = "goes right round its surface in a way that readers of this format misinterpret"
     return EditError(f"{document.name}: #{index + 1} {what}", "write BREP, or split the face")
 
 
@@ -251,7 +251,7 @@ def _faces(shape: TopoDS_Shape) -> list[TopoDS_Shape]:
 
 
 def _parts(face: TopoDS_Face, context: ShapeBuild_ReShape, axis: int) -> TopoDS_Shape | None:
-    """A face cut across a direction in which its surface closes, u (0) or v (1)."""
+    """A face cut across a closed direction of its surface, u (0) or v (1)."""
     location = TopLoc_Location()
     surface = BRep_Tool.Surface_s(face, location)
     basis = untrimmed(surface)
@@ -280,7 +280,7 @@ def _parts(face: TopoDS_Face, context: ShapeBuild_ReShape, axis: int) -> TopoDS_
 
 
 def _time(edge: TopoDS_Edge) -> None:
-    """Let the curves of an edge run alike."""
+    """Give the curves of an edge the same parameterisation."""
     builder = BRep_Builder()
     builder.SameRange(edge, False)
     builder.SameParameter(edge, False)
@@ -289,7 +289,7 @@ def _time(edge: TopoDS_Edge) -> None:
 
 
 def _away(face: TopoDS_Face, axis: int, low: float, high: float) -> float:
-    """The middle of the widest stretch of a parameter into which no boundary comes but those that go all the way."""
+    """The middle of the widest range of a parameter that no boundary enters, except those that go all the way round."""
     taken = [(high, high)]
     for edge in edge_uses(face):
         values = along(edge, face)[:, axis]

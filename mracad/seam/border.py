@@ -15,7 +15,7 @@ from mracad.seam.sides import inner_side
 
 Array = np.ndarray
 Jet = tuple[Array, ...]
-"""``S, S_n, S_t`` and perhaps ``S_nn`` along a border, from :func:`jets`."""
+"""``S, S_n, S_t`` and for order 2 ``S_nn`` along a border, from :func:`jets`."""
 
 AFFINE = 1e-7
 """Largest deviation, as a fraction of the seam, from an affine map between the parameters along it."""
@@ -65,7 +65,7 @@ class Border:
 
 
 def border(model: Model, edge: Edge, side: Side, use: int) -> Border | None:
-    """The isoparametric curve by which a face meets an edge, if its parameter is even along it; None otherwise."""
+    """The isoparametric curve by which a face meets an edge, if the edge's parameter is affine in it; else None."""
     face = model.faces[side.face]
     assert face.surface is not None and side.uv is not None
     net = model.surfaces[face.surface].net

@@ -7,7 +7,7 @@ from enum import Enum
 
 
 class Still(Enum):
-    """Why an edge does not move with both of its faces, as users read it; ``{}`` is the kind of the neighbour."""
+    """Why an edge does not move with both of its faces, in words for users; ``{}`` is the kind of the neighbour."""
 
     HELD = "held by --hold"
     FROZEN = "frozen by --edges"

@@ -6,8 +6,8 @@ satisfies, at the Greville points of the splines along it,
     G0   δ_b = δ_a,   G1   ∂_n δ_b = a ∂_n δ_a + b ∂_t δ_a,   G2   ∂_nn δ_b = a² ∂_nn δ_a + r ∂_n δ_a + s ∂_t δ_a
 
 (a, b, r, s of the input's joint: :class:`mracad.seam.joint.Joint`), or an equivalent with fewer control points in each
-condition.  One condition per function of the space is exact where the joint's coefficients are constant, and never
-locks where they vary.  With double knots along the seam (:func:`doubled`) conditions can be exact there too.
+condition.  One condition per function of the space is exact where the joint's coefficients are constant, and leaves the
+seam free to move where they vary.  With double knots along the seam (:func:`doubled`) it can be exact there too.
 """
 
 from __future__ import annotations
@@ -31,14 +31,14 @@ ROUNDING = 1e-13
 """Share of the largest entry of the conditions of a seam below which entries are dropped."""
 
 MOST_PLAIN = 1_000_000
-"""Most entries of a dense matrix in which conditions are simplified."""
+"""Largest number of entries of a dense matrix in which conditions are simplified."""
 
 SAME = 1e-9
 """Fraction of a seam within which knots of its two sides are the same."""
 
 
 def laid_out(nets: Mapping[int, Net]) -> tuple[dict[int, int], int]:
-    """Where the control points of each net begin when all are laid out one after another, and their number."""
+    """Offset of the control points of each net when all are laid out one after another, and their total number."""
     ends = np.cumsum([0, *(net.u.count * net.v.count for net in nets.values())]).tolist()
     return dict(zip(nets, ends[:-1], strict=True)), ends[-1]
 
@@ -66,9 +66,9 @@ def matched(nets: Mapping[int, Net], seams: Sequence[Seam]) -> dict[int, Net]:
 
 
 def doubled(nets: Mapping[int, Net], seams: Sequence[Seam]) -> dict[int, Net]:
-    """The nets with double knots along seams of a varying joint, so that their conditions can hold everywhere.
+    """The nets with double knots along seams whose joint varies, so that their conditions can hold everywhere.
 
-    Both sides still have the same splines along a seam, but other seams may have to be matched again.
+    Both sides still have the same splines along these seams, but other seams may have to be matched again.
     """
     result = dict(nets)
     for seam in seams:
@@ -83,7 +83,7 @@ def doubled(nets: Mapping[int, Net], seams: Sequence[Seam]) -> dict[int, Net]:
 
 
 def _lost(joint: Joint) -> int:
-    """How many derivatives fewer a condition along a seam has than the displacement."""
+    """Number of continuous derivatives by which a condition along a seam falls short of the displacement."""
     return int(joint.varying or joint.shear != 0.0)
 
 
@@ -119,7 +119,7 @@ def _near(nets: Mapping[int, Net], border: Border, at: float) -> float:
 
 
 def _most(values: Iterable[float]) -> Array:
-    """Knots needed by several seams, without duplicates up to rounding."""
+    """Sorted knots needed by several seams, without duplicates up to rounding."""
     result: list[float] = []
     for value in sorted(values):
         if not result or value - result[-1] > 1e-12 * max(1.0, abs(value)):
@@ -146,9 +146,9 @@ def rows(
         control points are laid out one after another.
     seams : sequence of Seam
     everywhere : bool
-        Whether joints that vary are exact too: their knots must be double.
+        Whether joints that vary are also exact, for which their knots must be double.
     coarse : mapping of int to pair of KnotVector, optional
-        Knots in u and v, by surface, of the spaces of the displacements: no more conditions than these need.
+        Coarse knots in u and v, by surface, if displacements lie in these splines: no more conditions than these need.
 
     Returns
     -------
@@ -180,7 +180,7 @@ def rows(
 def _plain(knots: KnotVector, column: Array, value: Array) -> tuple[Array, Array, Array]:
     """Conditions at the Greville points, on the coefficients of the spline through them if that is sparser.
 
-    If both sides are alike across their seam, a condition then involves only a few control points.
+    If both sides have the same form across their seam, a condition then involves only a few control points.
 
     Parameters
     ----------

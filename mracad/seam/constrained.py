@@ -15,18 +15,19 @@ SLACK = 1e-9
 about as much."""
 
 PASSES, MOST, MET = 2, 24, 1e-14
-"""Proximal passes (one leaves errors of 1e-6 where lengths are many spans), and the most until conditions are met to a
-share of the motion: nearly dependent rows converge slowly."""
+"""Number of proximal passes (one leaves errors of 1e-6 where lengths are many spans), and the largest number until
+conditions are met to a share of the motion: nearly dependent rows converge slowly."""
 
 HELD = 1e-9
-"""Share of a condition that must be on points that may move: otherwise only rounding is left."""
+"""Share of a condition's row that must be on points that may move: below it only rounding is left."""
 
 LEAST = 1e-10
-"""Share of the largest diagonal entry that is added to the form: functions that barely reach into a face stay put."""
+"""Share of the largest diagonal entry that is added to the form, so that functions that barely reach into a face
+stay."""
 
 
 class Constrained:
-    """argmin ½ xᵀ A x − bᵀ x under L x = r, x = 0 off ``free``.
+    """argmin ½ xᵀ A x − bᵀ x subject to L x = r, and x = 0 outside ``free``.
 
     Conditions take one sparse factorisation of the quasi-definite [[A, Lᵀ], [L, −ε]] and proximal passes, which
     tolerate dependent rows of L.
@@ -106,7 +107,7 @@ class Constrained:
         return self._whole(x)
 
     def settled(self, x: Array) -> Array:
-        """The nearest to x, ``(n, k)``, with L x = 0, after further passes on the remainder."""
+        """The point nearest to x with L x = 0, ``(n, k)``, after further passes on the remainder."""
         return x + self(np.zeros_like(x), start=x) if len(self.there) else x
 
     def _whole(self, x: Array) -> Array:

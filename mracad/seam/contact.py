@@ -1,4 +1,4 @@
-"""Contacts along trim curves: seams whose two sides have no common spline space, and rims held at what stays.
+"""Contacts along trim curves: seams whose two sides have no common spline space, and rims beside faces that stay.
 
 They cannot be kept exactly without freezing everything that meets the curve.  Instead, a displacement δ has conditions
 at Gauss points of every piece between knot lines of either side,
@@ -7,8 +7,8 @@ at Gauss points of every piece between knot lines of either side,
 
 (δ_b = 0 at a rim, and with G1 also D_t δ_a = 0, t along it: even a tiny error tilts a surface where its knots are
 close; directions as in :mod:`mracad.seam.trimmed`), weighted with the inverse square of the allowed error: the net
-meets them where it can, and elsewhere δ gives way.  Two noisy sides are already apart by their noise: conditions pull
-them together, the more gently the further apart they were.
+meets them where it can, and misses them by a little elsewhere.  Two noisy sides are already apart by their noise:
+conditions pull them together, more gently where they were further apart.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ _EVENLY = np.linspace(0.0, 1.0, 129)
 
 @dataclass(frozen=True, eq=False)
 class Contact:
-    """A trace of a surface that moves, and that of the one that moves with it, or None at a rim.
+    """A trace of a surface that moves, and that of the surface that moves with it; None at a rim.
 
     Attributes
     ----------
@@ -44,11 +44,11 @@ class Contact:
     order : {0, 1, 2}
         Derivatives across the trace that are kept.
     close, fit : bool
-        Whether the gap and the angle of the input are closed.
+        Whether the gap and the angle of the input are mended.
     since : {0, 1, 2}
         The lowest order of the conditions.
     edge : int
-        The edge it belongs to.
+        The edge to which it belongs.
     """
 
     a: Trace
@@ -76,9 +76,9 @@ class Rows:
     order : ndarray (conditions,) of int
         0 position (mm), 1 slope, 2 curvature (1/mm).
     width : ndarray (conditions,)
-        Length of the contact that each stands for, mm.
+        Length of the contact that each condition represents, mm.
     owner : ndarray (conditions,) of int
-        Number of its contact.
+        Index of the contact of each condition.
     """
 
     matrix: Any
@@ -87,14 +87,15 @@ class Rows:
     owner: Array
 
     def limits(self, opened: Array, tolerances: Array) -> Array:
-        """How far contacts may be open, ``(conditions,)``.
+        """Allowed errors of contacts, ``(conditions,)``.
 
         Parameters
         ----------
         opened : ndarray (conditions, 3)
-            How far they were: the limit for positions place by place, for slopes and curvatures by the worst.
+            Errors before the edit: positions are limited place by place, slopes and curvatures by the worst of a
+            contact.
         tolerances : ndarray (contacts, 3)
-            How much more is allowed, for each order.
+            Allowed growth, for each order.
         """
         old, worst = np.linalg.norm(opened, axis=1), np.zeros((int(self.owner.max(initial=-1)) + 1, 3))
         np.maximum.at(worst, (self.owner, self.order), old)

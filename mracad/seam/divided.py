@@ -2,8 +2,8 @@
 
 The effect of a joint on a surface fades within the length ℓ of the filter, or within a few knot spans.  So we take the
 minimum over the control points without joints, surface by surface, then over a strip along every joint under its
-conditions, then over the insides again, until nothing is left to do: a multiplicative Schwarz method, whose error falls
-by about e^(−√2 w / ℓ) in every sweep, w the width of the strips.  Every step lowers the objective.
+conditions, then over the insides again, until the corrections are small: a multiplicative Schwarz method, whose error
+falls by about e^(−√2 w / ℓ) in every sweep, w the width of the strips.  Every step lowers the objective.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ LEFT = 1e-4
 """Share of the first strips' correction that may remain."""
 
 SWEEPS = 20
-"""Most sweeps; one or two are usually enough."""
+"""Largest number of sweeps; one or two are usually enough."""
 
 PENALTY = 1e7
 """Weight of conditions against a form whose diagonal is one; each pass divides their error by about as much."""
@@ -39,9 +39,9 @@ class _Strip:
     ----------
     points : ndarray (q,) of int
     outside : csr_array (q, all points)
-        What the form and the penalties of conditions make of them outside of it.
+        Rows of the form and of the penalties of conditions that couple its points to points outside of it.
     rows : csr_array (q, conditions)
-        The conditions on them.
+        Conditions on its points.
     factor : Definite
     """
 
@@ -53,19 +53,19 @@ class _Strip:
 
 @dataclass(frozen=True, eq=False)
 class _Colour:
-    """Strips that have nothing in common, solved at once.
+    """Strips without common points or conditions, solved at once.
 
     Attributes
     ----------
     points : ndarray (q,) of int
-        One strip after another, in the points about strips.
+        Points of one strip after another, as positions among the points about strips.
     outside : csc_array (points about strips, q)
-        What the form and the penalties of conditions make of them outside of their strips.
+        Columns of the form and of the penalties of conditions that couple them to points outside of their strips.
     rows : csc_array (conditions, q)
     ends : ndarray of int
-        Where strips begin.
+        Positions at which strips begin.
     factors : list of Definite
-        Of each strip.
+        The factor of each strip.
     """
 
     points: Array
@@ -76,7 +76,7 @@ class _Colour:
 
     @classmethod
     def of(cls, strips: Sequence[_Strip], place: Array, about: int) -> _Colour:
-        """Put together what has nothing in common; ``place`` are the numbers of points about strips."""
+        """Combine strips without common points; ``place`` maps points to their numbers among those about strips."""
         from scipy.sparse import csr_array, vstack
 
         outside = vstack([strip.outside for strip in strips], format="csr")
@@ -96,21 +96,21 @@ class _Colour:
 
 
 class Divided:
-    """As :class:`mracad.seam.constrained.Constrained`, of many surfaces.
+    """The same as :class:`mracad.seam.constrained.Constrained`, for many surfaces.
 
     Parameters
     ----------
     forms : iterable of scipy.sparse.csr_array (n, n)
-        A, one per surface; the rest is over the points of all of them.
+        A, one per surface; everything else is over the points of all surfaces.
     diagonal : ndarray (points,)
-        Its diagonal.
+        The diagonal of A.
     soft : scipy.sparse matrix (points, points), optional
-        More of A.
+        A further term of A.
     rows : scipy.sparse matrix (conditions, points)
     free : ndarray of bool (points,)
     division : Division
     left : float
-        Share of what the first strips had to make good that may be left to them.
+        Share of the first strips' correction that may remain.
     """
 
     def __init__(
@@ -229,7 +229,10 @@ class Divided:
             x[points] = factor(x[points])
 
     def _met(self, owed: Array, size: float, right: Array | None = None) -> Array:
-        """A displacement that meets conditions beside one of a size; the form times it is subtracted from ``right``."""
+        """A correction by which a displacement of some ``size`` meets the conditions.
+
+        ``owed`` is what they still miss; the form times the correction is subtracted from ``right``.
+        """
         found = np.zeros((self.size, owed.shape[1]))
         for _ in range(MOST):
             if np.abs(owed).max(initial=0.0) <= MET * max(size, np.abs(found).max(initial=0.0)):
@@ -247,7 +250,7 @@ class Divided:
 
 
 class _Strips:
-    """Builds strips as soon as the rows of the form for all of their points are known: these take the most memory.
+    """Builds each strip as soon as the rows of the form for all of its points are known, because they take most memory.
 
     Parameters
     ----------
@@ -272,7 +275,7 @@ class _Strips:
         self.made: dict[int, _Strip] = {}
 
     def add(self, points: Array, form: Any, tied: Array, tied_form: Any) -> None:
-        """Add the form on the strip points of the next surface; those tied by joints separately."""
+        """Add the form on the strip points of the next surface, and separately on those that joints tie."""
         from scipy.sparse import csr_array, vstack
 
         surface = len(self.forms)
@@ -306,7 +309,7 @@ class _Strips:
         return _Strip(points, _taken(form, column < 0), self.pull[points], Definite(own))
 
     def done(self) -> tuple[Array, list[_Colour]]:
-        """The points about strips, and strips by colour."""
+        """The points about strips, and the strips by colour."""
         about = np.flatnonzero(self.reached)
         self.place[about] = np.arange(len(about))
         conditions = [np.unique(self.made[i].rows.indices) for i in range(len(self.strips))]
@@ -324,7 +327,7 @@ def _part(form: Any, points: Array) -> Any:
 
 
 def _taken(form: Any, which: Array, columns: Array | None = None, width: int | None = None) -> Any:
-    """Some of the entries of a matrix, in other columns if given."""
+    """Some entries of a matrix, moved to other columns if given."""
     from scipy.sparse import csr_array
 
     ends = np.append(0, np.cumsum(which))[form.indptr].astype(np.int32)

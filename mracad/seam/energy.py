@@ -31,7 +31,7 @@ KINK_WEIGHT = 1e3
 """Weight of squared kinks on knot lines against squared curvature."""
 
 FLATTEST = 1e-4
-"""Least ratio of the metric's singular values: beyond it (poles) the shorter direction counts as so long."""
+"""Least ratio of the metric's singular values: where it is smaller (at poles), the shorter direction is floored."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +43,7 @@ class Forms:
     mass : csr_array (points, points)
         mm².
     bending : csr_array (points, points)
-        Per mm², with the kinks on knot lines that are no crease.
+        1/mm², with the kinks on knot lines that are no crease.
     creases : csr_array (points, points)
         Kinks on creases.
     """
@@ -71,9 +71,9 @@ def forms(
     quadrature : Quadrature
         Gauss points over the faces on it.
     creases : pair of collections of float
-        Knots in u and v on which the surface has a crease: there only a displacement's own kink counts.
+        Knots in u and v on which the surface has a crease: only a displacement's own kink counts there.
     stretch : Stretch
-        What waves count for in the bending, by direction.
+        Lengths by direction in the bending.
     """
     along = sites(net.u, quadrature.u, quadrature.wu), sites(net.v, quadrature.v, quadrature.wv)
     frame, area = _frames(metric, along, stretch)
@@ -130,7 +130,7 @@ def _kink(net: Net, metric: Net, quadrature: Quadrature, axis: int, lines: Array
 
 
 def _onwards(knots: KnotVector) -> Array:
-    """The breaks, and of a periodic direction the first one of the next turn."""
+    """The breaks; in a periodic direction also the first one of the next turn."""
     return np.append(knots.breaks, knots.breaks[1] + knots.period) if knots.periodic else knots.breaks
 
 
@@ -152,8 +152,8 @@ def _on_lines(quadrature: Quadrature, axis: int, knots: KnotVector, lines: Array
 
 @dataclass(frozen=True, eq=False)
 class _Side:
-    """One side of a line: the derivatives of the functions across it ``(q, k)``, by length; lengths ``(q,)`` by
-    parameter across and along it."""
+    """One side of a line: derivatives of the functions across it by length ``(q, k)``, and lengths per parameter across
+    and along it ``(q,)``."""
 
     slope: Array
     height: Array
@@ -173,11 +173,11 @@ def _sloped(net: Net, metric: Net, uv: Array, axis: int, side: Side) -> tuple[Ar
 
 
 def _frames(metric: Net, along: tuple[Sites, Sites], stretch: Stretch) -> tuple[Array, Array]:
-    """Coefficients in H̃_11, √2 H̃_12, H̃_22 of ∂_u, ∂_v, ∂_uu, ∂_uv, ∂_vv, ``(5, 3, qu, qv)``, and areas ``(qu, qv)``."""
+    """Coefficients in H̃_11, √2 H̃_12, H̃_22 of ∂_u, ∂_v, ∂_uu, ∂_uv, ∂_vv, ``(5, 3, qu, qv)``; areas ``(qu, qv)``."""
     xu, xv, xuu, xuv, xvv = _jets(metric, along)[1:]
     e, f, g = _dot(xu, xu), _dot(xu, xv), _dot(xv, xv)
     root = np.sqrt(np.maximum(e * g - f * f, 0.0))
-    # floors where the metric degenerates, so that nothing is divided by zero there
+    # floors against division by zero where the metric degenerates
     mean_u, mean_v = (np.sqrt(np.median(x)) for x in (e, g))
     e, g = np.maximum(e, (FLATTEST**0.5 * mean_u) ** 2), np.maximum(g, (FLATTEST**0.5 * mean_v) ** 2)
     f = np.clip(f, -0.999 * np.sqrt(e * g), 0.999 * np.sqrt(e * g))
@@ -205,7 +205,7 @@ def _frames(metric: Net, along: tuple[Sites, Sites], stretch: Stretch) -> tuple[
 def _over_weights(
     net: Net, weights: Array, along: tuple[Sites, Sites], area: Array, frame: Array
 ) -> tuple[Array, Array]:
-    """Coefficients of mass and what frames take of w_i B_i and its derivatives ``(6, 3, qu, qv)``, for w_i B_i / w."""
+    """Coefficients of mass and frames for w_i B_i / w, in terms of w_i B_i and its derivatives, ``(6, 3, qu, qv)``."""
     w, wu, wv, wuu, wuv, wvv = _jets(Net(net.u, net.v, weights[..., None]), along)[:, 0]
     fu, fv, fuu, fuv, fvv = frame / w
     lu, lv = wu / w, wv / w
@@ -226,7 +226,7 @@ def _dot(a: Array, b: Array) -> Array:
 
 
 def _on_pattern(form: Any, like: Any) -> Any:
-    """A matrix that shares the pattern of another, if they are equal."""
+    """The matrix, sharing the index arrays of another one if the patterns are equal."""
     from scipy.sparse import csr_array
 
     same = np.array_equal(form.indptr, like.indptr) and np.array_equal(form.indices, like.indices)

@@ -11,10 +11,11 @@ import numpy as np
 Array = np.ndarray
 
 WIDEST = 50.0
-"""Widest band, over the fourth root of the number of unknowns, that takes less time than nested elimination."""
+"""Largest bandwidth, over the fourth root of the number of unknowns, for which a band is faster than nested
+dissection."""
 
 LOST = 1e-9
-"""Relative residual that may be left after one refinement; factors that leave more need pivots."""
+"""Relative residual allowed after one refinement; factors that leave more need pivoting."""
 
 
 class Definite:
@@ -23,7 +24,7 @@ class Definite:
     Parameters
     ----------
     matrix : scipy.sparse matrix (n, n)
-        Symmetric, positive definite; indefinite by rounding is tolerated.
+        Symmetric positive definite, up to rounding.
     """
 
     def __init__(self, matrix: Any) -> None:
@@ -75,7 +76,7 @@ def nested(matrix: Any) -> Callable[[Array], Array]:
 
 
 def _ordered(matrix: Any) -> tuple[Array | None, int]:
-    """The order of the unknowns in which a band is narrower, as they come (None) or by Cuthill and McKee; its width."""
+    """The order of unknowns with the narrower band, as given (None) or Cuthill-McKee, and its bandwidth."""
     from scipy.sparse.csgraph import reverse_cuthill_mckee
 
     row = np.repeat(np.arange(matrix.shape[0]), np.diff(matrix.indptr))

@@ -4,11 +4,11 @@ Along the curve of the edge in the parameter plane of the face that moves, a dis
 
     n_B · δ = 0,      n_B the normal of the neighbour at the foot of the edge,
 
-which keeps the edge on a plane exactly and on a curved neighbour to first order.  What is left there is
+which keeps the edge on a plane exactly and on a curved neighbour to first order.  The remaining error there is
 
     d(f + δ) − d(f),      d the signed distance from the neighbour,
 
-taken away by Newton steps n_B · c = −(d(f + δ) − d(f)) with the normals at the new feet.  On a natural boundary of the
+removed by Newton steps n_B · c = −(d(f + δ) − d(f)) with the normals at the new feet.  On a natural boundary of the
 face the conditions hold at the Greville points of the splines along it: on a plane that is n_B · δ_i = 0 for every
 control point.  Elsewhere they hold as closely as the control points allow, at Gauss points of every piece between knot
 lines.  At its ends an edge meets others: where none of them stays it follows its faces; where one stays, a line or a
@@ -46,12 +46,12 @@ EVENLY = np.linspace(0.0, 1.0, 129)
 
 @dataclass(frozen=True, eq=False)
 class Sheetlike:
-    """A NURBS face that stays, as something to slide along.
+    """A NURBS face that stays, along which edges slide.
 
     Attributes
     ----------
     net : Net
-        In the frame of the face.
+        Its surface, in the frame of the face.
     face : Face
     seeds : ndarray (k, 2)
         Parameters of the edge on it.
@@ -86,7 +86,7 @@ class Pin:
     Attributes
     ----------
     uv : ndarray (2,)
-        On the face that moves.
+        Parameters on the face that moves.
     path : Path or None
         The edge along which it moves; None if it stays.
     """
@@ -100,7 +100,8 @@ class Pin:
         return 3 if self.path is None else 2
 
     def off(self, points: Array, old: Array) -> tuple[Array, Array]:
-        """How much farther off a point ``(1, 3)`` is than the old one, mm, and the directions in which that counts."""
+        """By how much a point ``(1, 3)`` is farther away than the old one, mm, and the directions in which that
+        counts."""
         if self.path is None:
             return (points - old)[0], np.eye(3)
         (foot, way), (before, _) = self.path.feet(points), self.path.feet(old)
@@ -118,15 +119,15 @@ class Slide:
     edge, beside : int
         The edge, and the face along which it slides.
     trace : Trace
-        On the face that moves.
+        The edge on the face that moves.
     border : (int, int) or None
-        The axis across it and the end of the net (0, −1) on which it lies, on a natural boundary.
+        On a natural boundary, the axis across it and the end of the net (0, −1) on which it lies.
     ground : Elementary or Sheetlike
         The surface of the neighbour.
     pins : tuple of Pin
-        Ends that do not simply follow.
+        Ends that do not just follow the faces.
     cause : Cause
-        Why it would stay.
+        Why it stays if it cannot slide.
     """
 
     edge: int
@@ -139,7 +140,7 @@ class Slide:
 
     @property
     def curved(self) -> bool:
-        """Whether the condition on displacements leaves something to Newton steps."""
+        """Whether Newton steps are needed besides the condition on displacements."""
         bent = any(pin.path is not None and pin.path.radius for pin in self.pins)
         return bent or not (isinstance(self.ground, Elementary) and self.ground.kind == "plane")
 
@@ -152,12 +153,12 @@ class Slide:
 
 @dataclass(frozen=True, eq=False)
 class Led:
-    """Where the conditions of edges that slide hold.
+    """Places of the conditions of edges that slide.
 
     Attributes
     ----------
     spots : sequence of (Slide, Pin or None, ndarray (q, 2))
-        The edge or one of its ends, and parameters on the face that moves.
+        An edge or one of its ends, and parameters on the face that moves.
     slack : ndarray (conditions,)
         See :class:`mracad.seam.guided.Guides`.
     """
@@ -178,8 +179,8 @@ class Led:
         return Guides(self._matrix(nets), ways, self.slack, np.zeros(len(ways)))
 
     def aims(self, model: Model, nets: Mapping[int, Net], before: Mapping[int, Net]) -> tuple[Array, Array]:
-        """The directions of the conditions ``(conditions, 3)`` and how much farther off surfaces are in them than they
-        were ``before``, ``(conditions,)``, mm."""
+        """The directions of the conditions ``(conditions, 3)``, and by how much surfaces are farther away in them than
+        ``before``, ``(conditions,)``, mm."""
         ways, off = [np.empty((0, 3))], [np.empty(0)]
         for slide, pin, uv in self.spots:
             face, surface = model.faces[slide.trace.face], slide.trace.surface
@@ -212,7 +213,7 @@ class Led:
 
 
 def led(nets: Mapping[int, Net], slides: Sequence[Slide], limit: float, weight: float) -> Led | None:
-    """Where edges that slide have conditions; None for no edges.
+    """The places of the conditions of edges that slide; None without edges.
 
     Parameters
     ----------

@@ -9,7 +9,7 @@ joins the coordinates.  There are few such conditions, so the displacement under
 
     δ = P b + P Φᵀ (n ∘ μ),      (W⁻¹ + (Φ P Φᵀ) ∘ (n nᵀ)) μ = r − nᵀ Φ P b
 
-(∘ entry by entry; W the weights of conditions that are met as closely as they can be, W⁻¹ = 0 where they are exact).
+(∘ entry by entry; W the weights of conditions that need not be exact, W⁻¹ = 0 for exact ones).
 The matrix is positive semidefinite, as the entrywise product of two such matrices.
 """
 
@@ -26,7 +26,7 @@ from mracad.seam.divided import Divided
 Array = np.ndarray
 
 PASSES = 12
-"""Most proximal passes: conditions may depend on each other."""
+"""Largest number of proximal passes: conditions may depend on each other."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +91,7 @@ class Guided:
         return Guided(self.base, replace(self.guides, ways=ways, goal=goal), self.response)
 
     def _led(self, found: Array, whole: Array) -> Array:
-        """A displacement with what the conditions add to it; ``whole`` is what must meet them."""
+        """A displacement corrected so that ``whole``, of which it is a part, meets the conditions."""
         from scipy.linalg import cho_solve
 
         ways = self.guides.ways

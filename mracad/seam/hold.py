@@ -1,10 +1,10 @@
-"""Separation: the control points of a surface that an edit must hold, so that every joint stays as it is.
+"""Separation: the control points of a surface that an edit must hold so that every joint stays as it is.
 
-METHOD (S. the paper's wavelet signal separation): S' = S + δ.  Along an edge that is an isoparametric curve u = c
-of the surface, δ and its cross derivatives up to order k vanish when the coefficients of all basis functions with
-a non-zero derivative of order ≤ k at c do: the outer k + 1 rows where c is a clamped end.  Along any other edge
-the coefficients of all functions whose open support meets the curve are held, so that δ vanishes there with all
-its derivatives; edges, vertices and pcurves stay exactly valid.
+The edited surface is S + δ.  Along an edge that is an isoparametric curve u = c of the surface, δ and its cross
+derivatives up to order k vanish if the coefficients of all basis functions with a non-zero derivative of order ≤ k at c
+do: the outer k + 1 rows where c is a clamped end.  Along any other edge the coefficients of all functions whose open
+support meets the curve are held, so that δ vanishes there with all its derivatives.  Edges, vertices and pcurves stay
+exactly valid.
 """
 
 from __future__ import annotations
@@ -82,8 +82,8 @@ def separate(
     edited : collection of int
         Indices of those that may move; the others' whole region is frozen.
     keep : {"g0", "g1", "g2"} or mapping of int to int
-        The continuity that each edge keeps with its other side; or the number of derivatives, by edge, where edges
-        that are not named only keep their position.
+        The continuity that each edge keeps with its other side, or the number of derivatives by edge; edges that are
+        not in the mapping only keep their position.
     moving : collection of int
         Edges that may move, because their other side moves with them.
     """
@@ -112,7 +112,7 @@ def frozen_along(net: Net, curves: Sequence[Curve], region: Region, orders: Sequ
     net : Net
     curves : sequence of Curve
     region : Region
-        Of the face that the curves bound; its ``crossed`` cells are theirs.
+        Region of the face that the curves bound; its ``crossed`` cells are those of the curves.
     orders : sequence of {0, 1, 2}
         Highest derivative across each curve that is kept.
     """
@@ -137,7 +137,7 @@ def frozen_along(net: Net, curves: Sequence[Curve], region: Region, orders: Sequ
 def jet_support(knots: KnotVector, at: float, highest: int) -> Array:
     """Basis functions ``(n,)`` with a non-zero derivative of order ≤ ``highest`` at ``at``, from either side.
 
-    Functions of a knot that is invisibly close count too: the other side of that knot is what is seen.
+    Functions at a knot that is closer than can be seen count too: what is visible is the other side of that knot.
     """
     start, end = knots.domain
     if knots.periodic:

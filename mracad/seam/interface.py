@@ -31,13 +31,13 @@ from mracad.wavelet.ladder import arc_lengths
 Array = np.ndarray
 
 RIM_POINTS = 65
-"""Points of a boundary curve from which distances are measured."""
+"""Number of points of a boundary curve from which distances are measured."""
 
 POLE = 2
 """Derivatives kept at a pole, where a side of a surface is one point: any motion there would make a cone."""
 
 LOOSE = Still.TRIMMED, Still.UNEVEN
-"""Why seams may only move to a tolerance: not a parameter line of both sides, or a joint without a law."""
+"""Causes for which seams can only move to a tolerance: not a parameter line of both sides, or a joint without a law."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,21 +48,21 @@ class Joints:
     ----------
     exact : tuple of Seam
     loose : tuple of TrimmedSeam
-        Seams kept to a tolerance.
+        Seams that are kept to a tolerance.
     closing : mapping of int to (Border, Border)
         Closing edges that a periodic space keeps smooth anyway.
     frozen : mapping of int to Cause
         Edges that stay, and why.
     meetings : mapping of int to Meeting
-        How edges meet their other side; where they stay, they keep that.
+        How edges meet their other side, which they keep where they stay.
     jumps : bool
         Whether jumps of curvature along them must not grow.
     open : frozenset of int
         Free edges and poles that move with their faces.
     cornered : bool
-        Whether the corners of faces between two of them stay.
+        Whether the corners between two of them stay.
     zones : tuple of Zone
-        Regions in which nothing moves.
+        Regions in which nothing may move.
     slides : tuple of Slide
         Edges that slide along a neighbour that stays.
     """
@@ -102,13 +102,13 @@ class Joints:
         yield from ((seam.a.surface, seam.b.surface) for seam in self.loose)
 
     def firm(self, sliding: Collection[int] = ()) -> Joints:
-        """The same joints, in which edges slide of some surfaces only, by default of none."""
+        """The same joints, with sliding edges only on some surfaces, by default on none."""
         slides = tuple(slide for slide in self.slides if slide.trace.surface in sliding)
         still = {slide.edge: slide.cause for slide in self.slides if slide.trace.surface not in sliding}
         return replace(self, slides=slides, frozen={**self.frozen, **still})
 
     def among(self, surfaces: Collection[int]) -> Joints:
-        """The joints between some surfaces, with all others as rims."""
+        """The joints between some surfaces; edges to all others are rims."""
         exact = tuple(s for s in self.exact if s.a.surface in surfaces and s.b.surface in surfaces)
         loose = tuple(s for s in self.loose if s.a.surface in surfaces and s.b.surface in surfaces)
         return replace(self, exact=exact, loose=loose)
@@ -209,7 +209,7 @@ def rims(
     movable : collection of int
         Faces that may move.
     joined : Joints
-        The edges that move with them, and what the others keep.
+        The edges that move with these faces, and what the others keep.
     given : collection of int
         Edges that hold nothing.
 
@@ -287,12 +287,12 @@ def mended_ends(
 
 
 def away(net: Net, faces: Iterable[Face], moving: Collection[int], stretch: Stretch = EVEN) -> Array:
-    """Distance of a surface from the edges of faces on it that do not move; where waves are shorter it counts for more.
+    """Distance of a surface from the edges of its faces that do not move, longer where wavelengths are shorter.
 
     Returns
     -------
     ndarray (nu, nv)
-        At the Greville points, mm; infinite where nothing holds it.
+        Distance at the Greville points, mm; infinite where nothing is held.
     """
     from scipy.spatial import KDTree
 
@@ -306,7 +306,7 @@ def away(net: Net, faces: Iterable[Face], moving: Collection[int], stretch: Stre
 
 
 def _laid(net: Net, uv: Array, stretch: Stretch) -> Array:
-    """Points of a surface; where directions differ, on a plane in which waves of one length are as long in each."""
+    """Points of a surface; where directions differ, on a plane scaled so that their wavelengths become equal."""
     if stretch.even:
         return np.asarray(net.evaluate(uv))
     lengths = [np.concatenate([[0.0], np.cumsum(arc_lengths(net, axis))]) for axis in (0, 1)]

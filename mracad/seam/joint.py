@@ -25,7 +25,7 @@ from mracad.seam.wishes import Wishes
 Array = np.ndarray
 
 SLIP = 1e-4
-"""Largest distance between points of equal parameter measured along the seam, as a share of its length."""
+"""Largest distance along the seam between points of equal parameter, as a share of its length."""
 
 EXACT, CLOSE = 1e-8, 2e-3
 """A joint's polynomials are exact if they miss the input by at most EXACT of |T_n|, and usable up to CLOSE: the angle
@@ -66,7 +66,7 @@ class Joint:
 
     @property
     def varying(self) -> bool:
-        """Whether a smooth T does not follow from a smooth S of the same degree."""
+        """Whether the conditions raise the degree, so that no smooth T of S's degree may satisfy them."""
         return self.order > 0 and (len(self.across) > 1 or len(self.along) > 0)
 
     def part(self, low: float, high: float) -> Joint:
@@ -80,7 +80,7 @@ class Joint:
 def joint_of(
     model: Model, borders: tuple[Border, Border], found: tuple[Jet, Jet], order: int, wishes: Wishes
 ) -> Joint | Cause:
-    """The joint between two borders, of the highest order with a law; or why there is none."""
+    """The joint between two borders, of the highest order with a law; the cause if there is none."""
     (a, b), ((s, sn, st, snn), (t, tn, tt, tnn)) = borders, found
     length = np.linalg.norm(st, axis=1).mean()
     slip = np.abs(((s - t) * st).sum(axis=1) / np.maximum(np.linalg.norm(st, axis=1), 1e-12 * length)).max()
@@ -109,7 +109,7 @@ def joint_of(
 
 
 def _bent(joint: Joint, sn: Array, st: Array, snn: Array, tnn: Array) -> Joint:
-    """The joint with its second derivatives, where they have a law."""
+    """The joint with its second derivatives, if they have a law."""
     if joint.varying:
         return joint
     bend, shear = _components(sn, st, tnn - joint.across[0] ** 2 * snn)

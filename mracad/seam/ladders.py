@@ -1,10 +1,9 @@
 """Knot ladders that surfaces share along their seams.
 
 A level of joined patches is a level of the surface that they form, so a coarse knot on one side of a seam must also be
-one on the other side, whatever the knots, degrees and orientations.  The directions of surfaces that run along a seam
-side by side are therefore mapped affinely onto one common parameter, seam by seam across all patches.  The ladder is
-built on the union of their knots, and each surface takes the knots within its own domain, as simple knots of the
-highest of their degrees.
+a knot on the other side, whatever the knots, degrees and orientations.  The directions of surfaces along a seam are
+therefore mapped affinely onto one common parameter, seam by seam across all patches.  The ladder is built on the union
+of their knots, and each surface takes the knots within its own domain, as simple knots of the highest of their degrees.
 """
 
 from __future__ import annotations
@@ -38,11 +37,11 @@ class Ladder:
     Attributes
     ----------
     members : mapping of Direction to Map
-        Onto the common parameter.
+        Maps of directions onto the common parameter.
     levels : sequence of KnotVector
-        Over the common parameter, from all knots to the coarsest.
+        Knots over the common parameter, from all knots to the coarsest.
     degrees : (int, int)
-        Degrees of the coarse splines, on the first level and on the others.
+        Degrees of the coarse splines on the first level and on the others.
     creases : mapping of Direction to mapping of float to int
         Knots that a surface keeps on every level, and by how much their multiplicity exceeds the degree.
     """
@@ -61,7 +60,7 @@ class Ladder:
         level : int
             0 for all knots.
         fine : KnotVector
-            Knots of the direction, with those of its neighbours; possibly more, or of higher degree.
+            Knots of the direction, with those of its neighbours; there may be more, and of a higher degree.
         """
         rung = self.levels[min(level, len(self.levels) - 1)]
         whole = rung is self.levels[0]
@@ -90,10 +89,10 @@ def ladders(nets: Mapping[int, Net], creases: Mapping[int, Creases], seams: Sequ
     Parameters
     ----------
     nets : mapping of int to Net
-        By surface.
+        The surfaces, by index.
     creases : mapping of int to Creases
     seams : sequence of Seam
-        Between these surfaces.
+        Seams between these surfaces.
     """
     knots = {(i, axis): each for i, net in nets.items() for axis, each in enumerate((net.u, net.v))}
     found: dict[Direction, Ladder] = {}
@@ -103,7 +102,7 @@ def ladders(nets: Mapping[int, Net], creases: Mapping[int, Creases], seams: Sequ
 
 
 def _linked(knots: Mapping[Direction, KnotVector], seams: Sequence[Seam]) -> list[dict[Direction, Map]]:
-    """Directions that seams link, directly or through others, by surface; a seam that contradicts others is ignored."""
+    """Groups of directions that seams link, directly or through others; a seam that contradicts others is ignored."""
     of: dict[Direction, dict[Direction, Map]] = {m: {m: (1.0, 0.0)} for m in knots}
     for seam in seams:
         one, two = (seam.a.surface, 1 - seam.a.axis), (seam.b.surface, 1 - seam.b.axis)
@@ -131,7 +130,7 @@ def _alike(one: KnotVector, two: KnotVector, slope: float, shift: float) -> bool
 
 @dataclass(frozen=True, eq=False)
 class _Placed:
-    """A direction on the common ascending parameter: its knots in some degree, the knots it keeps, lengths of spans."""
+    """A direction on the common, ascending parameter: its knots, those that it keeps, and the lengths of its spans."""
 
     knots: KnotVector
     kept: Array
@@ -142,15 +141,15 @@ class _Placed:
         return rungs_by_level(self.knots, keep=self.kept, lengths=self.lengths)
 
     def density(self, rung: KnotVector) -> float:
-        """Logarithm of spans by length, where a knot of multiplicity r counts as r knots."""
+        """Logarithm of the number of spans per length; a knot of multiplicity r counts as r knots."""
         return float(np.log((rung.multiplicities[1:-1].sum() + 1) / self.lengths.sum()))
 
 
 def _ladder(nets: Mapping[int, Net], creases: Mapping[int, Creases], members: Mapping[Direction, Map]) -> Ladder:
     """The ladder on the union of the members' own knots.
 
-    A level is the densest that is no denser than the average of its members', of the lowest degree whose splines they
-    all contain.
+    A level is the densest one that is no denser than the average of its members' levels, and of the lowest degree whose
+    splines they all contain.
     """
     degrees = [(nets[i].u, nets[i].v)[axis].degree for i, axis in members]
     placed = [_placed(nets[m[0]], creases[m[0]][m[1]], m[1], way, min(degrees)) for m, way in members.items()]
@@ -179,7 +178,8 @@ def _placed(net: Net, creases: frozenset[float], axis: int, way: Map, degree: in
 
 
 def _union(placed: Sequence[_Placed], elevations: Sequence[int]) -> tuple[_Placed, int]:
-    """All knots, their ends among the knots that stay, and mean lengths; the least multiplicity once elevated."""
+    """The union of all knots, with ends among those that are kept and mean lengths, and the least multiplicity once
+    elevated."""
     every = np.sort(np.concatenate([one.knots.breaks for one in placed]))
     breaks = every[np.append(True, np.diff(every) > SAME * (every[-1] - every[0]))]
     middle = (breaks[:-1] + breaks[1:]) / 2

@@ -1,8 +1,8 @@
 """The surface in whose metric displacements are measured: a smoothed copy of the edited one.
 
 In a surface's own metric its second derivatives are purely normal: noise along the surface is invisible, and the noise
-of the Christoffel symbols is differentiated.  Hence two passes: a plane net of mean chord lengths; then, in its metric,
-the surface smoothed at a few wavelengths.
+of the Christoffel symbols is differentiated.  So there are two passes: a plane net of mean chord lengths first, then,
+in its metric, the surface smoothed at a few wavelengths.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ SMOOTHER = 2.5
 """Wavelength at which the metric is smoothed, over that of the edit."""
 
 BARELY = 1e-6
-"""Share of a function's mass that must lie in a face: others could go anywhere, with hardly any effect."""
+"""Share of a function's mass that must lie in a face: others could move anywhere, with hardly any effect."""
 
 
 def planar(net: Net) -> Net:
@@ -38,16 +38,16 @@ def planar(net: Net) -> Net:
 
 
 def _walked(count: int, steps: Array) -> Array:
-    """Positions after steps from 0, ``(count,)``; every step counts as positive."""
+    """Positions ``(count,)`` after steps from 0; steps are kept positive."""
     steps = np.maximum(steps, 1e-9 * steps.max(initial=1e-300))
     return np.append(0.0, np.cumsum(steps))[:count]
 
 
 def seen(net: Net, masses: Forms) -> Array:
-    """Control points ``(nu, nv)`` that reach into the faces over which masses were taken."""
+    """Mask ``(nu, nv)`` of the control points that reach into the faces over which masses were taken."""
     us, vs = net.u.greville(), net.v.greville()
     area = np.linalg.norm(cross(net.tangents(us, vs, 0), net.tangents(us, vs, 1)), axis=-1)
-    area = np.minimum(area, np.median(area))  # where it is large only here, it says little of the function
+    area = np.minimum(area, np.median(area))  # unusually large areas say little about the function
     whole = np.multiply.outer(*(gram(knots).toarray().diagonal() for knots in (net.u, net.v))) * area
     mass = masses.mass.diagonal().reshape(whole.shape)
     return np.asarray((mass > BARELY * whole) & (mass > 0))

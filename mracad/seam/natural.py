@@ -25,12 +25,12 @@ WHOLE = 1e-2
 
 @dataclass(frozen=True, eq=False)
 class Seam:
-    """Two borders of edited faces that meet, and their joint; its fractions run from start to stop on both.
+    """Two borders of edited faces that meet, and their joint; fractions run from start to stop on both.
 
     Attributes
     ----------
     edge, twin : int
-        The edge; twice, or the two free edges that coincide in an unsewn model.
+        The edge, twice; or the two free edges that coincide in an unsewn model.
     gap, angle : float
         Largest distance at equal fractions, mm, and angle between the outward normals.
     loose : bool
@@ -63,7 +63,7 @@ class Treatment:
     faces : tuple of int
         Faces that meet there.
     how : {"coupled", "to tolerance", "mended", "slid", "frozen"}
-        ``mended``: it moves like a coupled one, and its gap or angle is closed; ``slid``: along a face that stays.
+        ``mended``: coupled, and its gap or angle is closed; ``slid``: it moved along a face that stays.
     reason : Cause or None
         Why it is frozen.
     """
@@ -81,7 +81,7 @@ class Meeting:
     Attributes
     ----------
     order : {0, 1, 2}
-        Derivatives that it keeps with its other side.
+        Number of derivatives that both sides share.
     gap, bend : float
         Largest distance between them, mm, and jump of the curvature across it, 1/mm.
     faces : tuple of int
@@ -106,7 +106,7 @@ class Meeting:
 
 @dataclass(frozen=True, eq=False)
 class Seams:
-    """The edges of the faces that an edit may move, sorted.
+    """The edges of the faces that an edit may move, by kind.
 
     Attributes
     ----------
@@ -115,9 +115,9 @@ class Seams:
     closing : dict of int to (Border, Border)
         Closing edges inside a periodic direction, which its spline space keeps as smooth as its knots allow.
     frozen : dict of int to Cause
-        Every other edge, and why it does not move.
+        All other edges, and why they do not move.
     twins : dict of int to int
-        Free edges that coincide with another one, as a whole.
+        Free edges that coincide as a whole with another one.
     meetings : dict of int to Meeting
         Edges at which two faces meet.
     """
@@ -130,7 +130,7 @@ class Seams:
 
     @property
     def orders(self) -> dict[int, int]:
-        """Derivatives that edges keep with their other side, if that stays."""
+        """Number of derivatives that edges keep with their other side, if that stays."""
         return {edge: each.order for edge, each in self.meetings.items()}
 
 
@@ -174,7 +174,7 @@ def _meetings(model: Model, wishes: Wishes, found: Sequence[tuple[Edge, Edge, Se
 
 
 def _still(edge: Edge, wishes: Wishes) -> Cause | None:
-    """Why an edge stays whatever its faces do; None if it may move."""
+    """Why an edge stays even if its faces move; None if it may move."""
     if edge.index in wishes.hold:
         return Cause(Still.HELD)
     if edge.degenerate:
@@ -228,7 +228,7 @@ def _twin(model: Model, edge: Edge, face: int) -> Edge | None:
 
 
 def runs_back(one: Array, other: Array) -> bool:
-    """Whether a curve that coincides with another one runs the other way; both are given by points."""
+    """Whether a curve runs opposite to another one that coincides with it; both are given by points."""
     at = np.linspace(0, len(other) - 1, len(one)).round().astype(int)
     ahead, behind = (np.linalg.norm(one - other[k], axis=1).mean() for k in (at, at[::-1]))
     return bool(behind < ahead)
@@ -281,6 +281,6 @@ def _fixed(model: Model, movable: Collection[int], sides: Sequence[Side]) -> Cau
 
 
 def _room(model: Model, border: Border) -> int:
-    """Derivatives that can be kept across a border, and on the opposite one, without tying all control points."""
+    """Number of derivatives that can be kept across a border and its opposite without fixing all control points."""
     net = model.surfaces[border.surface].net
     return 2 if (net.u, net.v)[border.axis].count > 6 else 1

@@ -31,9 +31,9 @@ def slides(
     ----------
     model : Model
     frozen : mapping of int to Cause
-        Edges that may slide, and why they stay otherwise.
+        Edges that may slide, and why they stay if they cannot.
     pairs : iterable of (int, int, int)
-        Edges that move with the two surfaces that they join; free ones with one of them, twice.
+        Edges that move, with the two surfaces that they join (free edges: the same one twice).
     movable : collection of int
         Faces that move.
     """
@@ -53,7 +53,7 @@ def slides(
 
 
 def _sides(model: Model, edge: Edge, cause: Cause, movable: Collection[int]) -> tuple[Side, Side] | None:
-    """The side of an edge that moves and the one that stays, if the latter is something to slide along."""
+    """The side of an edge that moves and the one that stays, if the edge can slide along the latter."""
     if cause.still not in (Still.ANALYTIC, Still.NEIGHBOUR) or len(edge.sides) != 2 or edge.closing:
         return None
     moving = [side.face in movable for side in edge.sides]
@@ -111,7 +111,7 @@ class _Meets:
                     self.at[vertex].add(index)
 
     def pins(self, edge: Edge, face: Face, trim: Trim) -> tuple[Pin, ...]:
-        """The ends of an edge that slides, as far as they do not just follow."""
+        """The ends of an edge that slides, without those that just follow the faces."""
         found = []
         uv = trim.curve.evaluate(np.array(trim.curve.knots.domain))[0]
         for place, vertex in zip(uv, self.model.rails.ends[edge.index], strict=True):
@@ -121,7 +121,7 @@ class _Meets:
         return tuple(found)
 
     def _end(self, vertex: int, edge: Edge, face: Face) -> tuple[bool, Path | None]:
-        """Whether nothing stays at a vertex, and what it moves along otherwise."""
+        """Whether all edges at a vertex move, and else the edge along which it moves."""
         others = self.at[vertex]
         stays = others - self.sliding.keys() - self.joined.keys()
         joined: list[set[int | None]] = [set(self.joined[each]) for each in others & self.joined.keys()]

@@ -34,16 +34,16 @@ Array = np.ndarray
 Solver = Constrained | Divided | Guided
 
 KEPT = 60_000
-"""Control points whose factors are cached, besides the last one."""
+"""Largest number of control points for which factors are cached, besides the last one."""
 
 OVERLAP = 2.0
-"""Most control points in strips, over all, for the alternating method."""
+"""Largest share of control points in strips for the alternating method."""
 
 WIDTH = 7.0
 """Width of strips, in lengths within which the effect of joints fades."""
 
 MASS = 0.37
-"""Length within which masses alone make it fade, in chords of the control net times degrees."""
+"""Length within which it fades by masses alone, in chords of the control net times degrees."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,14 +75,14 @@ class Space:
 
 @dataclass(frozen=True)
 class Effort:
-    """What many joined surfaces are solved with.
+    """How many joined surfaces are solved.
 
     Attributes
     ----------
     direct : int
-        Most control points that are solved at once.
+        Largest number of control points that are solved at once.
     left : float
-        Of more: see :class:`mracad.seam.divided.Divided`.
+        For larger problems, see :class:`mracad.seam.divided.Divided`.
     """
 
     direct: int = 12_000
@@ -91,7 +91,7 @@ class Effort:
 
 @dataclass(frozen=True, eq=False)
 class Soft:
-    """Conditions that are met as closely as their weights ask.
+    """Conditions that are met only as closely as their weights ask.
 
     Attributes
     ----------
@@ -109,7 +109,7 @@ class Soft:
 
 
 class Blocks:
-    """A matrix with blocks on its diagonal, one a surface, ``scipy.sparse.csr_array`` each."""
+    """A block-diagonal matrix, with a ``scipy.sparse.csr_array`` per surface."""
 
     def __init__(self, parts: Sequence[Any]) -> None:
         self.parts = parts
@@ -122,7 +122,7 @@ class Blocks:
         return found
 
     def diagonal(self) -> Array:
-        """Its diagonal."""
+        """The diagonal, ``(points,)``."""
         return np.concatenate([part.diagonal() for part in self.parts])
 
     def tocsr(self) -> Any:
@@ -138,7 +138,7 @@ class Problem:
     Parameters
     ----------
     spaces : mapping of int to Space
-        By surface index.
+        Surfaces by index.
     rows : scipy.sparse matrix (conditions, points)
         L, on the control points of the spaces laid out one after another.
     goal : ndarray (conditions, 3), optional
@@ -146,7 +146,7 @@ class Problem:
     soft : Soft, optional
     effort : Effort
     guides : Guides, optional
-        Conditions of edges that slide; edges that do are not rims.
+        Conditions of edges that slide; such edges are not rims.
     """
 
     def __init__(
@@ -187,7 +187,7 @@ class Problem:
         stiffness : float
             a = ℓ⁴, mm⁴.
         free : ndarray of bool (points,), optional
-            Control points that may move, instead of those of the spaces; then only contacts between surfaces count.
+            Control points that may move, instead of those of the spaces; only contacts between surfaces count then.
         of : ndarray (points, 3), optional
             Displacements to filter, instead of the part above trends.
         order : int
@@ -234,7 +234,7 @@ class Problem:
         return np.asarray(delta + solver(np.zeros_like(delta), start=delta, goal=self.goal))
 
     def aimed(self, delta: Array, stiffness: float, ways: Array, off: Array) -> Array:
-        """A displacement ``(points, 3)`` corrected as smoothly as possible for edges off what they slide along.
+        """A displacement ``(points, 3)`` corrected as smoothly as possible, for edges that left what they slide along.
 
         Parameters
         ----------
@@ -242,7 +242,7 @@ class Problem:
         stiffness : float
             mm⁴.
         ways, off : ndarray (conditions, 3), (conditions,)
-            Directions of the conditions of edges that slide, and how far off they are in them, mm.
+            Directions of the conditions of edges that slide, and their distances in them, mm.
         """
         solve = self._solver(stiffness, self.free)
         assert isinstance(solve, Guided)
@@ -250,7 +250,7 @@ class Problem:
         return np.asarray(delta + solve.aimed(ways, goal)(np.zeros_like(delta), start=delta, goal=self.goal))
 
     def _solver(self, stiffness: float, free: Array) -> Solver:
-        """The solver of the form M + stiffness · K and the contacts, with what slides unless all rims are free."""
+        """The solver of the form M + stiffness · K and the contacts, with sliding edges unless all rims are free."""
         held = free is self.free
         key = stiffness, free.tobytes(), held
         if key not in self._solvers:
@@ -285,18 +285,18 @@ class Problem:
 
     @property
     def rimmed(self) -> bool:
-        """Whether the surfaces are held or led anywhere."""
+        """Whether the surfaces are held, or edges slide, anywhere."""
         led = self.soft is not None or self.guides is not None
         return led or bool((self.seen & ~self.free).any())
 
     def fading(self, width: float) -> Array:
-        """0 where held, 1 farther than ``width`` (mm) from there, smooth between, ``(points, 1)``."""
+        """0 where held, 1 farther than ``width`` (mm) from there, smooth in between, ``(points, 1)``."""
         every = [np.full(s.free.shape, np.inf) if s.away is None else s.away for s in self.spaces.values()]
         away = np.concatenate([each.ravel() for each in every])
         return faded(away, width)[:, None]
 
     def gains(self, delta: Array, target: Array, amounts: Sequence[float]) -> list[float]:
-        """How much nearer amounts of a displacement bring each surface to a target, as a squared norm."""
+        """By how much amounts of a displacement bring each surface nearer to a target, as squared norms."""
         size = np.repeat(amounts, [space.free.size for space in self.spaces.values()])[:, None]
         done = size * delta
         return [float(part.sum()) for part in self.split(done * (self.mass @ (2 * target - done))).values()]
@@ -308,7 +308,7 @@ class Problem:
 
 
 def faded(away: Array, width: float) -> Array:
-    """0 at no distance (mm), 1 beyond ``width``, smooth between."""
+    """0 at no distance (mm), 1 beyond ``width``, smooth in between."""
     share = np.minimum(away / width, 1.0)
     return np.asarray(share**3 * (10 - 15 * share + 6 * share**2))
 

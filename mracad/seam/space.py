@@ -15,7 +15,7 @@ from mracad.wavelet.ladder import arc_lengths
 Array = np.ndarray
 
 MOST_POINTS = 10_000
-"""Most control points to which a surface is refined."""
+"""Largest number of control points to which a surface is refined."""
 
 HALVINGS = 12
 
@@ -66,7 +66,7 @@ def line(net: Net, trim: Trim) -> int | None:
 
 
 def end(net: Net, trim: Trim) -> tuple[int, int] | None:
-    """The axis across a boundary curve and the end (0, −1) of a clamped net on which it lies, if it does."""
+    """The axis across a boundary curve and the end (0, −1) of a clamped net on which it lies; None if on neither."""
     axis = line(net, trim)
     if axis is None:
         return None

@@ -1,4 +1,4 @@
-"""Lengths that differ by direction and place: what an energy counts waves for.
+"""Lengths that differ by direction and place, for energies of second derivatives.
 
 With ℓ the length of an energy of second derivatives H (:mod:`mracad.seam.energy`), its part at a point becomes
 |R H R|², R symmetric: for a wave of wavevector k, |R k|⁴ instead of |k|⁴.
@@ -8,8 +8,8 @@ With ℓ the length of an energy of second derivatives H (:mod:`mracad.seam.ener
 - R⁻⁴ + (ℓ |S| / θ)⁴ instead of R⁻⁴ (powers of matrices), S the shape operator: where the surface bends with a radius
   r, no length is more than about θ r in that direction, so that rounds keep their shape.
 
-S must not be that of the waves that are to go.  The surface is looked at without waves shorter than w, w / 2, w / 4 …;
-the first of these that hardly turns within w / 2π shows the shape at a point.
+S must not be the curvature of the waves to be removed.  The surface is examined without waves shorter than w, w / 2,
+w / 4 …; the first of these that hardly turns within w / 2π shows the shape at a point.
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ Form = tuple[Array, Array, Array]
 """Components 11, 12 and 22 of a symmetric form at points."""
 
 THETA = 0.3
-"""Turn of the normal within a length, radians, up to which a surface carries it."""
+"""Largest turn of the normal within a length, radians."""
 
 HALVINGS = 6
-"""Most times that the wavelength is halved to see the shape."""
+"""How often the wavelength is halved at most to find the shape."""
 
 _TWO = 2.0**0.5
 
@@ -47,7 +47,7 @@ class Limit:
     length : float
         ℓ, mm.
     looks : tuple of (float, Net)
-        The surface without waves shorter than 2π times a length (mm), ever shorter.
+        Lengths (mm), from long to short, and the surface without waves shorter than 2π times each.
     """
 
     length: float
@@ -57,7 +57,7 @@ class Limit:
     def of(
         cls, net: Net, wavelengths: tuple[float, float], creases: tuple[AbstractSet[float], AbstractSet[float]]
     ) -> Limit:
-        """The limit for a surface, from which waves shorter than wavelengths along u and v (mm) are to go."""
+        """The limit for a surface from which waves shorter than ``wavelengths`` along u and v (mm) will be removed."""
         looks = []
         shortest = min(wavelengths)
         for halving in range(HALVINGS + 1):
@@ -70,7 +70,7 @@ class Limit:
 
     @property
     def tight(self) -> bool:
-        """Whether there are places that bend too much for the longest look."""
+        """Whether the surface bends too much anywhere for the longest length."""
         length, net = self.looks[0]
         us, vs = net.u.greville()[:, None], net.v.greville()[:, None]
         mean, half = _halves(Limit(self.length, self.looks[:1]).shape(us, vs, orthonormal(net, us, vs)))
@@ -105,9 +105,9 @@ class Stretch:
     lengths : (float, float)
         Along u and along v.
     lead : int
-        The axis along whose lines its length counts; the other length counts across them.
+        The axis along whose parameter lines its length counts; the other length counts across them.
     limit : Limit, optional
-        What limits them besides.
+        Further limit by curvature.
     """
 
     lengths: tuple[float, float] = (1.0, 1.0)
@@ -116,16 +116,16 @@ class Stretch:
 
     @property
     def even(self) -> bool:
-        """Whether directions do not differ."""
+        """Whether all directions are equal."""
         return self.lengths == (1.0, 1.0)
 
     @property
     def plain(self) -> bool:
-        """Whether neither directions nor places differ."""
+        """Whether all directions and places are equal."""
         return self.even and self.limit is None
 
     def times(self, length: float) -> tuple[float, float]:
-        """A length along u and along v."""
+        """A length along u and along v, multiplied by those of the directions."""
         return self.lengths[0] * length, self.lengths[1] * length
 
     def root(self, u: Array, v: Array, first: Form, frame: Form) -> Form:
@@ -151,7 +151,7 @@ class Stretch:
         scale = self.limit.length / THETA
         inverse, limit = _power(root, lambda x: x**-4.0), _power(bent, lambda x: (scale * x) ** 4)
         a, b, c = (one + other for one, other in zip(inverse, limit, strict=True))
-        least = max(self.lengths) ** -4.0  # no limit makes a sum smaller; where it is large, rounding would
+        least = max(self.lengths) ** -4.0  # rounding must not make a large sum smaller than its first term
         return _power((a, b, c), lambda x: np.maximum(x, least) ** -0.25)
 
 
@@ -185,7 +185,7 @@ def _halves(form: Form) -> tuple[Array, Array]:
 
 
 def _power(form: Form, of: Callable[[Array], Array]) -> Form:
-    """A function of a form: of its eigenvalues."""
+    """A symmetric form with a function applied to its eigenvalues."""
     a, b, c = form
     mean, half = _halves(form)
     high, low = of(mean + half), of(mean - half)

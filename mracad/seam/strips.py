@@ -19,7 +19,7 @@ class Layout:
     Attributes
     ----------
     ends : ndarray (surfaces + 1,) of int
-        Where each begins.
+        Position at which each surface begins.
     places : ndarray (points, 3)
     reach : ndarray (surfaces,)
         Width of strips on each, mm.
@@ -78,7 +78,7 @@ def joints(layout: Layout, rows: Any, soft: Any, free: Array) -> dict[tuple[int,
 def strips(layout: Layout, joined: dict[tuple[int, int], Array], free: Array, most: float) -> list[Array] | None:
     """The free points near the points of each joint, on its surfaces and on their joined neighbours.
 
-    None where these are more than ``most`` in all.
+    None if there are more than ``most`` in all.
     """
     boxes = [_box(layout.places[begin:end]) for begin, end in pairwise(layout.ends.tolist())]
     size = np.array([np.linalg.norm(high - low) for low, high in boxes])
@@ -117,7 +117,7 @@ def _box(places: Array) -> tuple[Array, Array]:
 
 
 def _along(places: Array, points: Array) -> Array:
-    """Points sorted along the direction in which they extend most: that keeps the band of a strip narrow."""
+    """Points sorted along the direction in which they extend most, which keeps the band of a strip narrow."""
     off = places[points] - places[points].mean(axis=0)
     return points[np.argsort(off @ np.linalg.eigh(off.T @ off)[1][:, -1], kind="stable")]
 

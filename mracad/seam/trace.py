@@ -22,13 +22,13 @@ from mracad.seam.sides import from_inside
 Array = np.ndarray
 
 SAMPLES = 1025
-"""Points of a trace between which it counts as straight when searching for crossings."""
+"""Number of points of a trace, between which it counts as straight when searching for crossings."""
 
 NEAR = 1e-9
-"""Crossings closer than this fraction of the edge are one."""
+"""Crossings closer than this fraction of the edge count as one."""
 
 EVENLY = np.linspace(0.0, 1.0, SAMPLES)
-"""Fractions of a trace at its points."""
+"""Fractions of a trace at these points."""
 
 LOOKS = shares(75)
 """Fractions of a trace at which it is measured, as in the report."""
@@ -42,7 +42,7 @@ class Trace:
     ----------
     face, surface : int
     curve : Curve
-        In the parameter plane, over the edge's range.
+        Curve in the parameter plane, over the edge's range.
     law : (ndarray, ndarray), optional
         Fractions of the seam and the corresponding fractions of the curve, if different.
     line : (int, float), optional
@@ -140,7 +140,7 @@ def derived(table: Sequence[Array], way: Array, bend: Array, order: int) -> Arra
     Parameters
     ----------
     table : sequence of ndarray (q, k)
-        As :func:`mracad.bspline.functions.functions` gives them.
+        Derivatives, as from :func:`mracad.bspline.functions.functions`.
     way, bend : ndarray (q, 2)
         c and z.
     order : {0, 1, 2}

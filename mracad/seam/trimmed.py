@@ -42,7 +42,7 @@ class TrimmedSeam:
     Attributes
     ----------
     edge, twin : int
-        The edge; twice, or the two free edges that coincide in an unsewn model.
+        The edge, twice; or the two free edges that coincide in an unsewn model.
     order : {0, 1, 2}
         Cross derivatives that the seam keeps.
     opening : ndarray (3,)
@@ -50,7 +50,7 @@ class TrimmedSeam:
     close, fit : bool
         Whether the gap and the angle of the input are to be closed instead of kept.
     since : {0, 1, 2}
-        The least of the derivatives that are kept to the tolerance: an exact seam keeps those below.
+        The lowest of the derivatives that are kept to the tolerance; an exact seam keeps those below.
     """
 
     edge: int
@@ -66,15 +66,15 @@ class TrimmedSeam:
     def excess(
         self, before: Model, after: Model, allowed: Sequence[float], more: Sequence[float]
     ) -> tuple[Array, Array]:
-        """Opening after an edit over the allowed one, the worst of all that the seam keeps.
+        """Opening after an edit over the allowed one, the worst of everything that the seam keeps.
 
-        Allowed is the worst of the input; for the gap, that of the same place plus the tolerance.
+        The worst of the input is allowed; for the gap, that at the same place plus the tolerance.
 
         Parameters
         ----------
         before, after : Model
         allowed, more : sequence of float
-            Gap (mm), angle and curvature jump (1/mm) that are always allowed, and their allowed growth.
+            Gap (mm), angle and curvature jump (1/mm) that are always allowed, and the allowed growth of each.
 
         Returns
         -------
@@ -83,7 +83,7 @@ class TrimmedSeam:
         """
         share = judged(after, (self.a, self.b))
         old, now = (parted(model, self.a, self.b, share) for model in (before, after))
-        worst = np.fmax(self.opening, np.fmax.reduce(old, axis=1))  # there are more places on finer nets
+        worst = np.fmax(self.opening, np.fmax.reduce(old, axis=1))  # finer nets have more places
         limit = np.repeat(np.maximum(allowed, worst + more)[:, None], len(share), axis=1)
         limit[0] = np.minimum(limit[0], old[0] + allowed[0] + more[0])
         return share, (now / limit)[: self.order + 1].max(axis=0)
@@ -96,7 +96,7 @@ def trimmed(model: Model, edge: Edge, twin: Edge, wishes: Wishes) -> TrimmedSeam
     ----------
     model : Model
     edge, twin : Edge
-        The edge; twice, or the two free edges that coincide in an unsewn model.
+        The edge, twice; or the two free edges that coincide in an unsewn model.
     wishes : Wishes
     """
     faces = [model.faces[i] for i in (edge.sides[0].face, twin.sides[-1].face)]
@@ -129,7 +129,7 @@ def _followed(model: Model, a: Trace, b: Trace, back: bool) -> Array:
 
 
 def beside(model: Model, seam: Seam, wishes: Wishes) -> TrimmedSeam | Cause:
-    """The continuity that the joint of a seam does not keep exactly, kept to the tolerance."""
+    """The seam that keeps, to the tolerance, the continuity that the joint of an exact seam does not keep."""
     found = _judged(model, seam.edge, seam.twin, (along(seam.a), along(seam.b)), wishes)
     return replace(found, since=seam.joint.order + 1) if isinstance(found, TrimmedSeam) and seam.joint.order else found
 

@@ -15,7 +15,7 @@ CREASE = np.radians(1.0)
 """A seam whose normals differ by more than this anywhere is a crease: it only keeps G0."""
 
 BENT = 0.01
-"""Jump of the curvature, as a share of it, up to which a seam counts as continuous in curvature."""
+"""Jump of the curvature, as a share of the curvature, up to which a seam counts as continuous in curvature."""
 
 
 @dataclass(frozen=True)
@@ -25,22 +25,22 @@ class Wishes:
     Attributes
     ----------
     keep : {"g0", "g1", "g2", "as-is"}
-        As-is: as much as each of them has.
+        Continuity to keep; ``as-is``: what each seam has.
     fit : float
         Seams whose normals differ by up to this angle anywhere are made tangent.
     close_gaps : bool
     hold : frozenset of int
         Edges that must not move.
     zones : tuple of Zone
-        Regions in which nothing must move.
+        Regions in which nothing may move.
     bend : float
         Jump of the curvature, 1/mm, that is allowed besides :data:`BENT` of the curvature itself.
     open : bool
         Whether free edges and poles move with their faces.
     free : bool
-        Whether free edges do.
+        Whether free edges move, but poles stay.
     corners : bool
-        Whether the corners of faces between two free edges that move do, too.
+        Whether the corners between two free edges that move also move.
     slide : frozenset of int
         Edges that may slide along a neighbour that stays.
     """
@@ -62,9 +62,9 @@ class Wishes:
         Parameters
         ----------
         angles : ndarray (q,)
-            Between the normals of its two faces.
+            Angles between the normals of its two faces.
         one, other : ndarray (q,)
-            Curvatures of the two across it, 1/mm; NaN where there is none.
+            Curvatures of both across it, 1/mm; NaN where undefined.
         """
         if not np.nanmax(angles, initial=0.0) <= max(CREASE, self.fit):
             return 0

@@ -1,4 +1,4 @@
-"""Regions that edits must not touch: balls, boxes, and wherever a surface bends more tightly than a radius."""
+"""Regions that edits must not change: balls, boxes, and all places where a surface bends more tightly than a radius."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from mracad.spec.places import Box, Disc, Point, Tight, Zone
 Array = np.ndarray
 
 POINTS = 4
-"""Points a knot span, in either direction, at which a surface is looked at."""
+"""Points per knot span and direction at which a surface is examined."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,10 +28,10 @@ class Zoned:
     ----------
     net : Net
     faces : sequence of Face
-        On it: where it stands.
+        Faces on it, which tell where its instances are.
     zones : sequence of Zone
     look : Limit
-        How its curvature is seen.
+        How its curvature is measured.
     """
 
     net: Net
@@ -41,7 +41,7 @@ class Zoned:
 
     @classmethod
     def of(cls, net: Net, faces: Sequence[Face], zones: Sequence[Zone], look: Limit | None = None) -> Zoned:
-        """The part of a surface in regions; its curvature is seen as it is by default."""
+        """The part of a surface in regions; by default its curvature is measured as it is."""
         return cls(net, faces, zones, look or Limit(1.0, ((0.0, net),)))
 
     @cached_property
@@ -57,7 +57,7 @@ class Zoned:
 
     @cached_property
     def _inside(self) -> Array:
-        """Which points lie in a region, or within half the distance to the next point of it, ``(pu, pv)``."""
+        """Mask ``(pu, pv)`` of points that lie in a region, or within half the distance to the next point of it."""
         steps = [np.linalg.norm(np.diff(self._points, axis=axis), axis=2) for axis in (0, 1)]
         wide = [np.maximum(_padded(each, axis, 0), _padded(each, axis, 1)) for axis, each in enumerate(steps)]
         slack = np.hypot(*wide) / 2
@@ -77,7 +77,7 @@ class Zoned:
         return np.asarray(np.abs(a + c) / 2 + np.sqrt(((a - c) / 2) ** 2 + b * b))
 
     def _apart(self, zone: Disc | Box, points: Array) -> Array:
-        """Distance of points ``(…, 3)`` from a ball or a box, wherever the surface stands, mm."""
+        """Distance of points ``(…, 3)`` from a ball or a box, the least over all instances of the surface, mm."""
         return np.asarray(np.min([_distance(zone, face.placed(points)) for face in self.faces], axis=0))
 
     @property
@@ -101,7 +101,7 @@ class Zoned:
 
 
 def _padded(steps: Array, axis: int, side: int) -> Array:
-    """Steps between points as one for each point: the one after it, or before it."""
+    """Steps between points, padded to one per point: the step after it, or before it."""
     return np.pad(steps, [(side, 1 - side) if each == axis else (0, 0) for each in (0, 1)], mode="edge")
 
 

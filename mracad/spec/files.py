@@ -1,4 +1,4 @@
-"""Options that name files: what in their text is a path, and the types of such fields."""
+"""Options that name files: which part of their text is a path, and the types of such fields."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from typing import Annotated
 
 @dataclass(frozen=True)
 class Naming:
-    """How the text of an option names a file: what stands before the path, how it ends where it is one at all, and
-    whether digits alone name none."""
+    """How the text of an option names a file: the prefix before the path, the extension that a path must have, and
+    whether a text of digits is a number instead."""
 
     prefix: str = ""
     ending: str = ""
@@ -22,7 +22,7 @@ class Naming:
         return text[len(self.prefix) :] if named and not (self.or_number and text.isdecimal()) else None
 
     def renamed(self, text: str, files: Mapping[str, str]) -> str:
-        """The text with its path replaced, where it has one that ``files`` knows."""
+        """The text with its path replaced, if ``files`` contains it."""
         file = self.file(text)
         return text if file is None else self.prefix + files.get(file, file)
 
@@ -31,4 +31,4 @@ File = Annotated[str, Naming()]
 """The type of a field that names a file."""
 
 CountText = Annotated[str, Naming(or_number=True)]
-"""The type of a field that is a number, or names a file that holds it."""
+"""The type of a field that is a number, or names a file with the number in it."""

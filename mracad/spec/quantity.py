@@ -1,4 +1,4 @@
-"""Quantities as texts: one table of units and one parser for lengths, times, amounts of memory, angles and shares."""
+"""Quantities as text: one table of units and one parser for lengths, times, memory sizes, angles and percentages."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ MILLIMETRES = {"um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4, "ft":
 """Length units by name, in millimetres."""
 
 NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
-"""A number in a text, as a regular expression."""
+"""Regular expression of a number."""
 
 MOST_GAIN = 1000.0
 """Largest gain of a band."""
@@ -31,17 +31,17 @@ class Kind:
     Attributes
     ----------
     noun : str
-        What it is in messages, as ``"a length"``.
+        What messages call it, such as ``"a length"``.
     example : str
-        How to write it.
+        Examples of how to write it.
     units : mapping
-        What each unit is worth; ``""`` stands for a number alone.
+        Value of each unit; ``""`` stands for a number without unit.
     positive : bool
-        Whether it must be greater than zero.
+        Whether the value must be greater than zero.
     most : float
         The largest value.
     folded : bool
-        Whether units may be in small or capital letters.
+        Whether units ignore case.
     """
 
     noun: str
@@ -52,20 +52,20 @@ class Kind:
     folded: bool = False
 
     def read(self, text: str, name: str, percent: float | None = None) -> float:
-        """The value of a text in the unit that counts 1.
+        """The value of a text, in the unit whose value is 1.
 
         Parameters
         ----------
         text : str
         name : str
-            Of the option, for messages.
+            Name of the option, for messages.
         percent : float, optional
-            What one hundredth of the whole is worth: then ``%`` is a unit, too.
+            Value of one per cent; if given, ``%`` is also a unit.
 
         Raises
         ------
         UsageError
-            For another text, and for a value out of bounds.
+            For a malformed text, or a value out of bounds.
         """
         units = self.units if percent is None else {**self.units, "%": percent}
         match = _QUANTITY.fullmatch(text)
@@ -101,7 +101,7 @@ Length = Annotated[
     LENGTH,
     Meta(extra_json_schema={"pattern": rf"^\s*\+?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?\s*({'|'.join(MILLIMETRES)}|%)?\s*$"}),
 ]
-"""The type of a field that :func:`length` reads; it stays a text, for it may be a share of the model."""
+"""The type of a field that :func:`length` reads; it stays text, because it may be a share of the model."""
 
 Angle = Annotated[float, ANGLE]
 """The type of a field that is an angle, degrees."""
@@ -110,7 +110,7 @@ Time = Annotated[float, TIME]
 """The type of a field that is a time, seconds."""
 
 Share = Annotated[float, SHARE]
-"""The type of a field that is a share of a hundred."""
+"""The type of a field that is a percentage."""
 
 
 def length(text: str, diagonal: float, name: str) -> float:
@@ -125,8 +125,8 @@ def length(text: str, diagonal: float, name: str) -> float:
 
 
 def band_of(text: str, diagonal: float | None) -> tuple[float, float]:
-    """The least and the largest wavelength of a band, mm, on a model of a diagonal (of 1 mm where that is not known
-    yet); raises UsageError."""
+    """The smallest and the largest wavelength of a band, mm, on a model of a diagonal (1 mm if not known yet); raises
+    UsageError."""
     low, colon, high = text.partition(":")
     hint = "write a band as 0.5mm:20mm or :20mm"
     if not colon:

@@ -1,7 +1,7 @@
 """Recipes: the steps that a model goes through, from a TOML file or one line of text.
 
-A step has the name and the options of its command (:data:`mracad.spec.steps.STEPS`).  Everything that can be wrong in a
-recipe is found before a model is read, and named with its place::
+A step has the name and the options of its command (:data:`mracad.spec.steps.STEPS`).  All errors in a recipe are found
+before a model is read, and reported with file and line::
 
     [[step]]
     use = "smooth"
@@ -37,14 +37,14 @@ OWN = ("use", "id")
 
 @dataclass(frozen=True)
 class Step:
-    """One step, ready to be done: the name of its command, its options, and its own name within the recipe."""
+    """A resolved step: the name of its command, its options, and its own name within the recipe."""
 
     id: str
     use: str
     options: Options
 
     def text(self) -> str:
-        """The step as a line of ``mracad pipeline``; files by name, without their folders."""
+        """The step as text for ``mracad pipeline``; files by name, without their folders."""
         words = [self.use]
         options = self.options.relocated({file: Path(file).name for file in self.options.files()})
         for name, given in options.given().items():
@@ -61,7 +61,7 @@ class Step:
 
 @dataclass(frozen=True)
 class _Table:
-    """One step as it is written: its values, and where each of them stands (``""`` for the step itself)."""
+    """A step as written: its values, and the place of each in the file (``""`` for the step itself)."""
 
     values: Mapping[str, Any]
     places: Mapping[str, str]
@@ -80,9 +80,9 @@ class Recipe:
     Attributes
     ----------
     tables : tuple
-        The steps as they are written.
+        The steps as written.
     file : Path or None
-        Where it was read from; files that its options name are relative to its folder.
+        The file that it was read from; paths in its options are relative to its folder.
     """
 
     tables: tuple[_Table, ...]
@@ -90,12 +90,12 @@ class Recipe:
 
     @property
     def name(self) -> str:
-        """Name of the file, or ``"pipeline"``."""
+        """Name of the file; ``"pipeline"`` without one."""
         return self.file.name if self.file else "pipeline"
 
     @property
     def ids(self) -> list[str]:
-        """The name of each step: its ``id``, or that of its command, counted from the second on (``smooth-2``)."""
+        """The name of each step: its ``id``, or that of its command, numbered from the second on (``smooth-2``)."""
         found: list[str] = []
         for table in self.tables:
             own = str(table.values.get("id") or table.values["use"])
@@ -112,7 +112,7 @@ class Recipe:
         Raises
         ------
         UsageError
-            For a text of another form, or a step or option that does not exist.
+            For a malformed text, or a step or option that does not exist.
         """
         tables = list(self.tables)
         for text in assignments:
@@ -129,7 +129,7 @@ class Recipe:
         return recipe
 
     def steps(self, source: str) -> tuple[Step, ...]:
-        """The steps for one input, its name and folder put in for ``{name}`` and ``{folder}``.
+        """The steps for one input, whose name and folder replace ``{name}`` and ``{folder}``.
 
         Raises
         ------
@@ -264,23 +264,23 @@ def _table(words: list[str], place: str) -> _Table:
 
 
 def title(steps: Iterable[Step]) -> str:
-    """What was done, in one line that ``mracad pipeline`` understands: for the header of the file."""
+    """The steps in one line that ``mracad pipeline`` can read: for the header of the file."""
     return " ! ".join(step.text() for step in steps)
 
 
 def record_of(steps: Iterable[Step], place: str | os.PathLike[str]) -> str:
-    """The steps as a recipe with every option resolved and the versions of what did them.
+    """The steps as a recipe, with every option resolved and the versions of the packages.
 
     Parameters
     ----------
     steps : iterable of Step
     place : path
-        Of the file that it is for; the files that options name are named from there.
+        Path of the recipe to be written; files that options name are written relative to it.
 
     Raises
     ------
     UsageError
-        For a text that is not Unicode, which TOML cannot hold.
+        For text that is not valid Unicode, which TOML cannot hold.
     """
     lines = ["[versions]", *(f"{toml(name)} = {toml(version)}" for name, version in versions().items())]
     for step in steps:
@@ -296,7 +296,7 @@ def record_of(steps: Iterable[Step], place: str | os.PathLike[str]) -> str:
 
 @cache
 def versions() -> dict[str, str]:
-    """Versions of what decides the result."""
-    from importlib import metadata  # slow to load, as the command line's help need not be
+    """Versions of the packages that affect the result."""
+    from importlib import metadata  # slow to load, and not needed for help
 
     return {"mracad": __version__, **{name: metadata.version(name) for name in ("cadquery-ocp", "numpy", "scipy")}}

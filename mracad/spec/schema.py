@@ -1,4 +1,4 @@
-"""What recipes may hold: their JSON schema, and the page that lists steps with their options."""
+"""The JSON schema of recipes, and the documentation page of all steps and options."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def _step_schema(use: str, struct: type[Options]) -> dict[str, Any]:
 
 
 def _property(part: dict[str, Any], quantity: Kind | None) -> dict[str, Any]:
-    """An option's schema: without null, which TOML lacks; a quantity may be a number or a text, a list one text."""
+    """The schema of an option: no null, which TOML lacks; quantities may be numbers, and lists a single text."""
     kinds = [kind for kind in part.get("anyOf", []) if kind != {"type": "null"}]
     found = {key: value for key, value in part.items() if key != "anyOf" and value is not None}
     found |= kinds[0] if len(kinds) == 1 else {"anyOf": kinds} if kinds else {}

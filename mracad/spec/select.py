@@ -1,4 +1,4 @@
-"""Selectors: the words by which users name faces and edges of a model, and what an edit may move by them."""
+"""Selectors, by which users name faces and edges of a model, and what an edit may move."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ CadQuery = Callable[[str], "set[int]"]
 
 @dataclass(frozen=True)
 class Selected:
-    """Faces and edges that a list of selectors names (indices)."""
+    """Indices of the faces and edges that a list of selectors names."""
 
     faces: frozenset[int]
     edges: frozenset[int]
@@ -28,20 +28,20 @@ class Selected:
 
 @dataclass(frozen=True)
 class Scope:
-    """What an edit may move (indices).
+    """What an edit may move, as indices of faces and edges.
 
     Attributes
     ----------
     faces : frozenset of int
-        Faces that it is to change.
+        Faces to change.
     held : frozenset of int
-        Faces that must not move, whatever the others do.
+        Faces that must not move.
     edges : frozenset of int
         Edges that must not move.
     named : frozenset of int
-        Faces that were asked for one by one, by number or place.
+        Faces that were selected individually, by number or place.
     zones : tuple of Zone
-        Regions in which nothing must move.
+        Regions in which nothing may move.
     firm : frozenset of int
         Edges that must not slide.
     """
@@ -59,14 +59,14 @@ class Scope:
         return self.faces - self.held
 
     def holding(self, faces: Iterable[int], firm: Iterable[int] = ()) -> Scope:
-        """The same with more faces held, and more edges that do not slide."""
+        """This scope with more faces held, and more edges that must not slide."""
         return replace(self, held=self.held | frozenset(faces), firm=self.firm | frozenset(firm))
 
 
 def scope(
     model: Model, options: Selection, cadquery: CadQuery | None = None, nurbs: Iterable[int] | None = None
 ) -> Scope:
-    """What the options of an edit say that it may move.
+    """What an edit may move according to its options.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def scope(
     cadquery : callable, optional
         As for :func:`select`.
     nurbs : iterable of int, optional
-        The faces that are edited by default: all NURBS faces.
+        The faces to edit by default; all NURBS faces if not given.
 
     Raises
     ------
@@ -97,7 +97,7 @@ def scope(
 
 
 def every_nurbs(model: Model) -> list[int]:
-    """The NURBS faces, those that were converted included."""
+    """Indices of the NURBS faces, including converted ones."""
     return [face.index for face in model.faces if face.surface is not None or face.kind in NURBS]
 
 
@@ -111,7 +111,7 @@ def select(
     model : Model
     selectors : iterable of str
     everything : iterable of int
-        Faces that stand for "all".
+        All faces that can be selected.
     cadquery : callable, optional
         Resolves ``cq:`` selectors to face indices.
 

@@ -1,4 +1,4 @@
-"""Options as they are written, in TOML and on lines: values from texts, texts from values, places for messages."""
+"""Options as text, in TOML and on the command line: values from text, text from values, places for messages."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def options(struct: type[Given], values: Mapping[str, Any], place: Callable[[str
         One of :data:`mracad.spec.steps.STEPS`.
     values : mapping
     place : callable, optional
-        Says where the value of a name stands, for messages.
+        Tells the place of an option's value, for messages.
 
     Raises
     ------
@@ -50,7 +50,7 @@ def options(struct: type[Given], values: Mapping[str, Any], place: Callable[[str
 
 
 def filled(value: Any, variables: Mapping[str, str], place: str) -> Any:
-    """A value with its variables replaced, and double braces by single ones."""
+    """A value with variables filled in and double braces replaced by single ones."""
     if isinstance(value, list):
         return [filled(member, variables, place) for member in value]
     if not isinstance(value, str):
@@ -67,7 +67,7 @@ def filled(value: Any, variables: Mapping[str, str], place: str) -> Any:
 
 
 def braced(value: Any) -> Any:
-    """A value that :func:`filled` leaves as it is."""
+    """A value with its braces doubled, so that :func:`filled` gives it back."""
     if isinstance(value, list | tuple):
         return [braced(member) for member in value]
     return value.replace("{", "{{").replace("}", "}}") if isinstance(value, str) else value
@@ -89,7 +89,7 @@ def toml(value: Any) -> str:
 
 
 def toml_value(text: str) -> Any:
-    """A text as the TOML value that it is, or as itself."""
+    """The TOML value that a text is, or else the text itself."""
     import tomllib
 
     try:
@@ -99,7 +99,7 @@ def toml_value(text: str) -> Any:
 
 
 def places_of_steps(text: str, name: str) -> list[dict[str, str]]:
-    """For each ``[[step]]``, the place of the step and of each of its keys."""
+    """For each ``[[step]]``, the places (``file:line``) of the step and of each of its keys."""
     found: list[dict[str, str]] = []
     inside = False
     for number, line in enumerate(_without_long_strings(text).splitlines(), 1):
@@ -120,5 +120,5 @@ def place_of(text: str, key: str, name: str) -> str:
 
 
 def _without_long_strings(text: str) -> str:
-    """A TOML text whose strings of several lines are only their line ends."""
+    """A TOML text with multi-line strings reduced to their line ends."""
     return re.sub(r'"""[\s\S]*?"""|\'\'\'[\s\S]*?\'\'\'', lambda match: "\n" * match[0].count("\n"), text)

@@ -36,7 +36,7 @@ def rungs_by_level(
     tolerance : float
         Breaks closer than this (mm), or than 1e-6 of the whole, count as one knot.
     odd : sequence of bool
-        For the first rungs, whether the other knots of each run go: the second, the fourth, and so on.
+        For the first rungs, whether the other knots of each run are dropped: the second, the fourth, and so on.
 
     Returns
     -------
@@ -65,8 +65,8 @@ def ladder_for_scale(
     keep: AbstractSet[float] | Array = frozenset(),
     tolerance: float = 1e-4,
 ) -> KnotVector:
-    """The coarse knot vector for a scale, which is a wavelength: ripples up to half of it go, those of three times it
-    stay.
+    """The coarse knot vector for a scale, which is a wavelength: ripples up to half of it are removed, those of three
+    times it stay.
 
     Alternate knots are dropped, sweep by sweep, wherever the merged span stays shorter than ``scale``, so that
     knots end up ``scale / 2`` to ``scale`` apart: the projection onto spacing H removes wavelengths below 1.5 H and
@@ -114,7 +114,7 @@ def finest_scale(
     keep: AbstractSet[float] | Array = frozenset(),
     tolerance: float = 1e-4,
 ) -> float:
-    """The least scale for which :func:`ladder_for_scale` finds a coarser knot vector, mm; 0 if there is none.
+    """The smallest scale for which :func:`ladder_for_scale` finds a coarser knot vector, mm; 0 if there is none.
 
     The parameters are those of :func:`ladder_for_scale`.
     """
@@ -199,25 +199,25 @@ class _Ladder:
         self.spans = np.rint(ratio * _RESOLUTION).astype(np.int64)
 
     def sensible(self, clusters: int) -> bool:
-        """Whether a space with so many clusters is useful: a loop needs some spans."""
+        """Whether a space with this number of clusters is useful: a loop needs some spans."""
         return not self.kv.periodic or clusters > max(self.kv.degree + 1, 3)
 
     def beside(self) -> Array:
-        """Sum of the spans before and after each cluster; at the ends twice the only one (a loop continues)."""
+        """Sum of the spans before and after each cluster; twice the only span at an end (a loop continues)."""
         before, after = np.append(self.spans[0], self.spans), np.append(self.spans, self.spans[-1])
         if self.kv.periodic:
             before[0], after[-1] = self.spans[-1], self.spans[0]
         return np.asarray(before + after)
 
     def inner(self, odd: bool) -> Array:
-        """All clusters; if ``odd``, without the ends of each run between fixed ones, where anything is left."""
+        """All clusters; if ``odd``, without the ends of each run between fixed ones, unless nothing else remains."""
         free = ~self.fixed[self.alive]
         within = np.pad(free, 1)
         within = free & within[:-2] & within[2:]
         return within if odd and within.any() else free
 
     def drop(self, candidate: Array) -> bool:
-        """Remove alternate clusters of each run of candidates; return whether any went."""
+        """Remove alternate clusters of each run of candidates; return whether any was removed."""
         gone = _alternate(candidate & ~self.fixed[self.alive], np.append(0, np.cumsum(self.spans)))
         if len(self.alive) < 2 or not gone.any() or not self.sensible(int(np.count_nonzero(~gone))):
             return False

@@ -162,8 +162,9 @@ def projection(coarse: KnotVector, fine: KnotVector, weights: Array | None = Non
 
     Notes
     -----
-    Normal equations up to degree 5 on tame knots; beyond, where they square a large condition number, orthogonal
-    triangularisation (QR) of ``√W B'`` block by block, with ``B'`` the coarse basis at the Gauss points.
+    Normal equations are used up to degree 5 on moderately uneven knots.  Beyond that, where they would square a large
+    condition number, ``√W B'`` is triangularised orthogonally (QR) block by block, with ``B'`` the coarse basis at the
+    Gauss points.
     """
     key = None if weights is None else tuple(checked_weights(fine, weights).tolist())
     return _cached(coarse, fine, key)
@@ -174,8 +175,8 @@ def at_scale(
     scale: float | tuple[float, float],
     keep: tuple[AbstractSet[float], AbstractSet[float]] = (frozenset(),) * 2,
 ) -> Net:
-    """A net over its own knots without detail finer than a scale, or one along u and one along v (mm); breaks in u and
-    v to keep stay as they are."""
+    """A net over its own knots without detail finer than a scale (mm), or one scale along u and one along v; the breaks
+    in u and v given in ``keep`` stay."""
     poles = net.poles
     scales = scale if isinstance(scale, tuple) else (scale, scale)
     for axis, knots in enumerate((net.u, net.v)):

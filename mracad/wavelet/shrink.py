@@ -27,24 +27,24 @@ from mracad.wavelet.transform import LevelBands, decompose, reconstruct
 Array = np.ndarray
 
 Gain = Callable[[Array, Array], Array]
-"""From details over their deviations, and those of a pilot, to what is kept of the first."""
+"""Maps details, and those of a pilot, both over their deviations, to the details that are kept."""
 
 SPINS, FEW, LARGE = 16, 4, 400_000
-"""Ladders over which the mean is taken, the fewest, and the control points that they may have together."""
+"""Number of ladders over which the mean is taken, the least number, and the limit of their control points in all."""
 
 BLOCK = 256
-"""Columns of analysis matrices that are looked at together."""
+"""Number of columns of analysis matrices that are processed together."""
 
 
 @dataclass(frozen=True, eq=False)
 class Spin:
-    """One pair of ladders, and what its analysis makes of noise.
+    """One pair of ladders, and the deviations that noise has in its details.
 
     Attributes
     ----------
     u, v : sequence of KnotVector
     deviations : sequence of mapping of str to ndarray
-        Of the details of each level and band for unit noise on control points.
+        Standard deviations of the details of each level and band for unit noise on control points.
     """
 
     u: Sequence[KnotVector]
@@ -53,7 +53,7 @@ class Spin:
 
 
 def spins(net: Net, keep: tuple[frozenset[float], frozenset[float]] = (frozenset(),) * 2) -> list[Spin]:
-    """Ladders of a net that drop different knots, always the same ones for the same knots.
+    """Ladders of a net that drop different knots, chosen reproducibly.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ def _norms(ladder: Sequence[KnotVector]) -> list[tuple[Array, Array]]:
 
 
 def thresholded(poles: Array, noise: float, every: Sequence[Spin]) -> Array:
-    """Control points without the details that noise alone could make.
+    """Control points without the details that noise alone could cause.
 
     Parameters
     ----------
@@ -122,12 +122,13 @@ def thresholded(poles: Array, noise: float, every: Sequence[Spin]) -> Array:
 
 
 def shrunk(poles: Array, noise: float, every: Sequence[Spin], pilot: Array) -> Array:
-    """Control points with each detail in the share that a pilot has of it: near 1 where that is far above the noise.
+    """Control points with each detail multiplied by its gain, near 1 where the detail of a pilot is far above the
+    noise.
 
     Parameters
     ----------
     poles, pilot : ndarray (nu, nv, 3)
-        Noisy ones, and an estimate without noise.
+        Noisy control points, and an estimate without noise.
     noise : float
         Standard deviation of each coordinate, mm.
     every : sequence of Spin
@@ -136,7 +137,7 @@ def shrunk(poles: Array, noise: float, every: Sequence[Spin], pilot: Array) -> A
 
 
 def _mean(poles: Array, noise: float, every: Sequence[Spin], gain: Gain, pilot: Array) -> Array:
-    """The mean over ladders of control points whose details over their deviations got gains."""
+    """The mean, over ladders, of control points whose details (over their deviations) were multiplied by gains."""
     total = np.zeros_like(poles)
     for spin in every:
         own, other = (decompose(each, spin.u, spin.v) for each in (poles, pilot))

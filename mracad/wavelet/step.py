@@ -18,7 +18,7 @@ from mracad.wavelet.filters import wavelets
 from mracad.wavelet.project import projection
 
 EXACT = 1e-13
-"""Loss by rounding that is allowed, as a share of the whole signal."""
+"""Allowed rounding loss, as a share of the whole signal."""
 
 
 class TwoScale:
@@ -63,7 +63,7 @@ class TwoScale:
         return bool(np.abs(probe - self.synthesise(both[: self._m], both[self._m :])).max() < 0.1 * EXACT)
 
     def analyse(self, c: Array, axis: int = 0, overwrite: bool = False) -> tuple[Array, Array]:
-        """Coarse poles and details of poles ``c`` along ``axis``; they may take its place if ``overwrite`` says so."""
+        """Coarse control points and details of ``c`` along ``axis``; with ``overwrite`` they may take its place."""
         c = np.asarray(c, dtype=float)
         if c.shape[axis] != self.fine.count:
             raise UsageError(f"{c.shape[axis]} control points along axis {axis}, but the knots need {self.fine.count}")
@@ -79,9 +79,9 @@ class TwoScale:
         return best, found if helps else np.zeros_like(found)
 
     def synthesise(self, coarse: Array, detail: Array, axis: int = 0, out: Array | None = None) -> Array:
-        """The poles with the given coarse poles and details along ``axis``.
+        """The control points with the given coarse control points and details along ``axis``.
 
-        They are written to ``out`` if given; the two may be parts of that array.
+        They are written to ``out`` if given; both inputs may be parts of that array.
         """
         if (coarse.shape[axis], detail.shape[axis]) != (self._m, self.fine.count - self._m):
             raise UsageError(
@@ -103,7 +103,7 @@ class TwoScale:
 
 
 class Chain:
-    """Several steps in a row, presented as one: ``details`` of the steps follow each other, the finest first."""
+    """Several steps in a row, used as one: the details of the steps follow each other, the finest first."""
 
     def __init__(self, steps: Sequence[TwoScale]) -> None:
         self.steps = tuple(steps)
@@ -114,7 +114,7 @@ class Chain:
         return all(each.exact for each in self.steps)
 
     def analyse(self, c: Array, axis: int = 0, overwrite: bool = False) -> tuple[Array, Array]:
-        """Coarse poles and details of poles ``c`` along ``axis``; they may take its place if ``overwrite`` says so."""
+        """Coarse control points and details of ``c`` along ``axis``; with ``overwrite`` they may take its place."""
         details = []
         for each in self.steps:
             c, detail = each.analyse(c, axis, overwrite)
@@ -122,7 +122,8 @@ class Chain:
         return c, np.concatenate(details, axis=axis)
 
     def synthesise(self, coarse: Array, detail: Array, axis: int = 0, out: Array | None = None) -> Array:
-        """The poles with the given coarse poles and details along ``axis``, written to ``out`` if it is given."""
+        """The control points with the given coarse ones and details along ``axis``, written to ``out`` if it is
+        given."""
         end = detail.shape[axis]
         for each in reversed(self.steps):
             begin = end - (each.fine.count - each.coarse.count)
@@ -134,7 +135,7 @@ class Chain:
 
 @kept(128)
 def step(coarse: KnotVector, fine: KnotVector) -> TwoScale | Chain:
-    """The step between two nested spaces, factored once.
+    """The step between two nested spaces, factored once and cached.
 
     If neighbouring knots are removed, or several copies of one, the step is a chain of steps that each remove
     alternate ones: a single step would be badly conditioned.
@@ -168,7 +169,7 @@ def _between(coarse: KnotVector, fine: KnotVector) -> list[KnotVector]:
 
 
 def _orders(row: Array, column: Array, n: int, periodic: bool) -> tuple[Array, Array]:
-    """Orders of rows and columns in which the matrix has a narrow band: columns by the middle of their supports."""
+    """Orders of rows and columns that give the matrix a narrow band: columns by the middle of their supports."""
     if not periodic:
         first, last = np.full(n, n), np.zeros(n, dtype=int)
         np.minimum.at(first, column, row)

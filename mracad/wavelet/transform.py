@@ -30,7 +30,7 @@ class LevelBands:
     bands : dict
         ``"LH"``, ``"HL"``, ``"HH"``: details (see the module).
     residual : ndarray or None
-        The loss by rounding, in control points of the finer net, if it is more than 1e-13 of the whole net.
+        The rounding loss, in control points of the finer net, if it is more than 1e-13 of the whole net.
     """
 
     u: TwoScale | Chain | None
@@ -91,8 +91,8 @@ def decompose(poles: Array, ladder_u: Sequence[KnotVector], ladder_v: Sequence[K
     ----------
     poles : ndarray (nu, nv, k), or (n, k) for a curve
     ladder_u, ladder_v : sequence of KnotVector
-        Nested, from the poles' own knots to the coarsest.  One level is one step in u and one in v; the shorter ladder
-        just stops.
+        Nested, from the net's own knots to the coarsest.  One level is one step in u and one in v; the shorter ladder
+        ends early.
 
     Returns
     -------
@@ -141,7 +141,7 @@ def reconstruct(pyramid: Pyramid, level: float = 0.0) -> Array:
 
 
 def _move(poles: Array, offset: Array) -> None:
-    """Add ``offset`` to every control point of a contiguous array, by whole lines: faster than point by point."""
+    """Add ``offset`` to every control point of a contiguous array, by whole lines, which is faster."""
     lines = poles.reshape(len(poles), -1)
     lines += np.tile(offset, lines.shape[1] // len(offset))
 
@@ -181,7 +181,7 @@ def _analysed(
 def _bands(
     c: Array, u: TwoScale | Chain | None, v: TwoScale | Chain | None, overwrite: bool = False
 ) -> tuple[Array, dict[str, Array]]:
-    """Coarse poles and bands of one level."""
+    """Coarse control points and bands of one level."""
     bands = {}
     if u is not None:
         c, bands["HL"] = u.analyse(c, 0, overwrite)

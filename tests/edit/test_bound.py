@@ -77,8 +77,8 @@ def test_nothing_to_smooth_is_said():
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        ({}, "smooth needs a scale, a level or a bound of the deviation"),
-        ({"max_deviation": "0.1mm", "amount": 0.5}, "amount: a bound alone is reached by the scale"),
+        ({}, "smooth needs a scale, a level or a limit of the deviation"),
+        ({"max_deviation": "0.1mm", "amount": 0.5}, "amount: it needs a scale or a level"),
         ({"max_deviation": "0.1mm", "across": "5mm"}, "across: it needs a scale"),
         ({"max_deviation": "0mm"}, "max-deviation: '0mm' is not greater than zero"),
     ],

@@ -59,7 +59,7 @@ def test_corners_may_move_along(noisy):
     off = {way: np.abs(_corners(nets[way].surfaces[0].net) - _corners(noisy)).min() for way in nets}
     print(f"rim {held:.4f} with its corners held, {free:.4f} without")
     assert off["hold"] == 0 < off["move"] and free < held
-    with pytest.raises(UsageError, match="corners: they stay where free edges do"):
+    with pytest.raises(UsageError, match="corners: they cannot move while free edges stay"):
         Smooth(scale="25mm", corners="move")
 
 

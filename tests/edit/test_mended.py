@@ -29,9 +29,10 @@ def test_what_is_not_mended_is_named_with_how_far_off_it_stayed(patches):
     before = seams(view(torn(patches, False)))
     widest, steepest = max(before, key=lambda m: m.gap), max(before, key=lambda m: m.angle)
     (gaps,) = notes(torn(patches, False), close_gaps=True, edges="frozen")
-    assert "closed 0 of" in gaps and f"edge#{widest.edge + 1} stays open by {widest.gap:.3g} mm" in gaps
+    assert "closed 0 of" in gaps and f"edge#{widest.edge + 1} keeps a gap of {widest.gap:.3g} mm" in gaps
     (angles,) = notes(torn(patches, False), fit_g1=5.0, edges="frozen")
-    assert "made tangent 0 of" in angles and f"edge#{steepest.edge + 1} stays bent by {steepest.angle:.3g}°" in angles
+    assert "made tangent 0 of" in angles
+    assert f"edge#{steepest.edge + 1} keeps an angle of {steepest.angle:.3g}°" in angles
 
 
 def test_what_is_mended_needs_no_note_and_what_needs_none_is_said(patches):
@@ -41,7 +42,7 @@ def test_what_is_mended_needs_no_note_and_what_needs_none_is_said(patches):
     assert "no gap between edited faces" in none
     least = min(m.angle for m in seams(view(torn(patches, False))) if m.angle > 0.02)
     (above,) = notes(torn(patches, False), fit_g1=least / 2)
-    assert f"the least above: {least:.3g}°" in above
+    assert f"the smallest above that: {least:.3g}°" in above
     assert notes(sound) == []
 
 
@@ -51,4 +52,4 @@ def test_notes_are_printed_and_reported(mracad, patches, tmp_path):
     words = ("smooth", path, "--level", "1", "--close-gaps", "--edges", "frozen", "-o", tmp_path / "out.step")
     result = mracad(*words, "--report", tmp_path / "r.json")
     assert result.code == 0 and "note: close-gaps: closed 0 of" in result.out
-    assert "stays open by" in json.loads((tmp_path / "r.json").read_text())["notes"][0]
+    assert "keeps a gap of" in json.loads((tmp_path / "r.json").read_text())["notes"][0]

@@ -137,7 +137,7 @@ def test_an_edit_that_fails_for_a_face_that_had_to_stay_says_so(monkeypatch):
 
     def edit(model, options, *, scope, progress):
         if 1 not in scope.chosen:
-            raise EditError("the place is off the faces to edit", "give a point on one of them")
+            raise EditError("the place is not on the faces to edit", "give a point on one of them")
         return Stub()(model, options, scope=scope, progress=progress)
 
     monkeypatch.setattr(job, "torn", first_edited([1]))

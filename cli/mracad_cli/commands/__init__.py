@@ -1,1 +1,1 @@
-"""One module a command; its docstring is the help, ``command`` the click command."""
+"""One module per command: its docstring is the help, ``command`` the click command."""

@@ -1,7 +1,7 @@
-"""Run a recipe on many models, each in a worker process with limits; run it again to do only what changed.
+"""Run a recipe on many models, each in a worker process with limits. A second run does only what changed.
 
 IN are files, folders (all models below them) or patterns; - reads a list from standard input. If a file crashes its
-worker, hangs or needs too much memory, only that file fails. Exit code 1 if any file failed; run again to go on.
+worker, hangs or needs too much memory, only that file fails. Exit code 1 if any file failed; run again to continue.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Place:
-    """Where files are put, and where the work is done."""
+    """The output folder, and the workers."""
 
     folder: str
     format: str | None
@@ -49,7 +49,7 @@ class Place:
 
 @dataclass(frozen=True)
 class Reports:
-    """What is said, and what is written beside the outputs."""
+    """What is printed, and what is written beside the outputs."""
 
     report: str | None
     junit: str | None
@@ -85,7 +85,7 @@ _placing = options.gathered(
     click.option(
         "--format",
         type=click.Choice(list(FORMATS)),
-        help="Format of the outputs, and their ending.  [default: that of each input]",
+        help="Format of the outputs, and their extension.  [default: that of each input]",
     ),
 )
 _settings = options.gathered(
@@ -132,7 +132,7 @@ def command(
     from mracad.spec.recipe import load
 
     steps = load(recipe).with_values(assignments)
-    steps.steps("model.step")  # what is wrong in it is said before anything is read
+    steps.steps("model.step")  # errors in it are reported before anything is read
     check_reports(reports.report, reports.junit, reports.depfile, overwrite=True)
     words = [word for given in sources for word in (_listed() if given == "-" else [given])]
     items = find(words, Path(place.folder), place.format or "")
@@ -151,7 +151,7 @@ def _listed() -> list[str]:
 
 
 def _run(recipe: Recipe, items: Sequence[Item], place: Place, settings: Settings, reports: Reports) -> int:
-    """Do a batch, say what becomes of each file, and at the end of all."""
+    """Do a batch, and print the outcome of each file and a summary."""
     from mracad_cli.render import json, junit, text
 
     start = time.perf_counter()
@@ -174,7 +174,7 @@ def _run(recipe: Recipe, items: Sequence[Item], place: Place, settings: Settings
 
 
 def _outcomes(recipe: Recipe, items: Sequence[Item], place: Place, settings: Settings, as_json: bool) -> list[Outcome]:
-    """What became of the files, in the order in which they were done."""
+    """The outcomes of the files, in the order in which they were done."""
     from mracad.job.batch.manifest import Manifest
     from mracad.job.batch.run import run
     from mracad_cli.render.json import plain
@@ -200,7 +200,7 @@ def _outcomes(recipe: Recipe, items: Sequence[Item], place: Place, settings: Set
                 progress(f"{recipe.name}, {failed} failed" if failed else recipe.name, len(outcomes), len(items))
         except KeyboardInterrupt:
             said = f"interrupted after {len(outcomes)} of {len(items)} files"
-            raise MracadError(said, "run it again to go on", Code.INTERRUPTED) from None
+            raise MracadError(said, "run it again to continue", Code.INTERRUPTED) from None
     return outcomes
 
 
@@ -218,7 +218,7 @@ def _workers(place: Place, files: int) -> Iterator[Workers]:
 
 
 def _depfile(recipe: Recipe, items: Sequence[Item], folder: Path) -> str:
-    """A rule for make for each output."""
+    """One make rule per output."""
     return "".join(
         depfile_text([str(folder / item.output)], [item.source, *needed(recipe.steps(item.source), recipe)])
         for item in items

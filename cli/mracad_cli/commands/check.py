@@ -1,7 +1,7 @@
-"""Check a model layer by layer; exit code 1 when something asked for does not hold.
+"""Check a model layer by layer; exit code 1 when a check that was asked for fails.
 
-The file as parsed, the shapes that the kernel loads from it, its own check of them, closed shells, seams, faces that
-cross, tolerances, walls, the mesh. Valid is yes, no or unknown, never a guess.
+The layers: the file as parsed, the shapes that the kernel loads from it, the kernel's own check, closed shells, seams,
+faces that cross, tolerances, walls, the mesh. The verdict is yes, no or unknown, never a guess.
 """
 
 from __future__ import annotations

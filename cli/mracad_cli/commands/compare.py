@@ -1,7 +1,7 @@
 """Compare a model with a reference; exit code 1, with the reasons, when something differs beyond its limit.
 
-Faces are matched whatever their numbers. A face's deviation is measured both ways by exact projection; where it only
-became longer or shorter, its outline has moved. Lengths are compared in millimetres whatever the files' units.
+Faces are matched by shape, not by number. A face's deviation is measured both ways by exact projection; a face that
+only became longer or shorter counts as a moved outline. Lengths are compared in millimetres whatever the files' units.
 """
 
 from __future__ import annotations

@@ -15,7 +15,7 @@ from mracad_cli.outputs import check_target, deliver, read
 from mracad_cli.say import json_text, say
 
 OTHERS = "instance hold keep edges"
-"""Options of edits that nothing is edited with here."""
+"""Options of edits that do not apply here."""
 
 
 @click.group(cls=Group, help=__doc__)
@@ -26,7 +26,7 @@ def command() -> None:
 @command.command("list")
 @options.apply(options.reading(), options.of(Selection, "chosen", OTHERS), options.printing)
 def list_(reading: Reading, chosen: Selection, as_json: bool) -> None:
-    """Propose features: places where the detail of a face stands out, with size, height and scales."""
+    """List features: places where the detail of a face stands out, with size, height and scales."""
     from mracad.edit.feature.find import found
     from mracad.job.look import looked_at
     from mracad_cli.render.json import plain

@@ -1,4 +1,4 @@
-"""Say what is in a model: units, products, faces, scales, seams, validity."""
+"""Show what is in a model: units, products, faces, scales, seams, validity."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ from mracad_cli.say import json_text, say
         type=click.Choice(["g0", "g1", "g2"]),
         default="g1",
         show_default=True,
-        help="Continuity that edges keep; it decides which control points are free.",
+        help="Continuity that edges keep; it determines which control points are free.",
     ),
     click.option(
         "--all",
         "everything",
         is_flag=True,
-        help="List the instances, the faces that are not NURBS and every seam, too.",
+        help="Also list instances, faces that are not NURBS and every seam.",
     ),
     options.printing,
 )

@@ -19,7 +19,7 @@ def command() -> None:
 @click.argument("file", metavar="RECIPE", type=options.path)
 @options.apply(options.assignments, options.printing)
 def check(file: str, assignments: tuple[str, ...], as_json: bool) -> None:
-    """Say what a recipe would do; exit code 2 when something in it is wrong."""
+    """Show what a recipe would do; exit code 2 when something in it is wrong."""
     from mracad.spec.recipe import load
 
     found = load(file).with_values(assignments)

@@ -1,1 +1,1 @@
-"""What commands say, made of their reports: one module a form."""
+"""What commands print, made from their reports: one module per form."""

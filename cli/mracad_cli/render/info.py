@@ -1,4 +1,4 @@
-"""What there is to say of a model, as JSON-ready values and as lines."""
+"""The content of a model, as JSON-ready values and as lines of text."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Seen:
-    """What there is to say of a model."""
+    """What was read and measured; ``width`` is the scale, mm, and ``keep`` the continuity that edges keep."""
 
     document: Document
     model: Model
@@ -33,7 +33,7 @@ class Seen:
 
 
 def body(seen: Seen) -> dict[str, Any]:
-    """All of it."""
+    """Everything, as JSON-ready values; lengths in millimetres."""
     from mracad.inspect.seams import summary
     from mracad.occ.boxes import face_boxes
     from mracad.occ.instance import instances
@@ -57,7 +57,7 @@ def body(seen: Seen) -> dict[str, Any]:
 
 
 def lines(seen: Seen, everything: bool) -> list[str]:
-    """In short; with ``everything`` the instances, faces that are not NURBS and every seam, too."""
+    """A summary; with ``everything`` also instances, faces that are not NURBS and every seam."""
     from mracad.inspect.seams import summary
     from mracad.occ.instance import instances
 
@@ -94,7 +94,7 @@ def _seam_row(m: SeamMeasure) -> Sequence[str]:
 
 
 def _facts(model: Model, face: Face, box: np.ndarray) -> dict[str, Any]:
-    """What a face is, and its box; lengths in millimetres."""
+    """Type, net and bounding box of a face; lengths in millimetres."""
     facts: dict[str, Any] = {
         "face": face.index + 1,
         "name": face.name,
@@ -117,7 +117,7 @@ def _facts(model: Model, face: Face, box: np.ndarray) -> dict[str, Any]:
 
 
 def _judged(face: Face, scales: FaceScales | None) -> dict[str, Any]:
-    """What there is to smooth on a face at the given scale, and what stands against it."""
+    """Whether smoothing at the given scale would change a face, and the detail that it would remove."""
     status, reason = _status(face, scales)
     return {
         "smoothing": status,
@@ -133,7 +133,7 @@ def _judged(face: Face, scales: FaceScales | None) -> dict[str, Any]:
 
 
 def _status(face: Face, scales: FaceScales | None) -> tuple[str, str]:
-    """A word for what smoothing at the given scale would meet, and the reason where it would change nothing."""
+    """Whether smoothing at the given scale would change a face, as one word, and the reason if not."""
     from mracad.inspect.scales import LEAST
 
     if scales is None:
@@ -177,6 +177,6 @@ def _row(model: Model, face: Face, scales: FaceScales | None) -> Sequence[str]:
 
 
 def _table(rows: Sequence[Sequence[str]]) -> list[str]:
-    """Aligned columns."""
+    """Rows as lines with aligned columns."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     return ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]

@@ -29,12 +29,12 @@ def plain(value: Any) -> Any:
 
 
 def outcome(value: FaceOutcome) -> dict[str, Any]:
-    """One face's outcome; lengths in millimetres."""
+    """The outcome of one face; lengths in millimetres."""
     return {**plain(value), "face": value.face + 1}
 
 
 def treatment(value: Treatment) -> dict[str, Any]:
-    """What was done about an edge; the edge and its faces by number."""
+    """How an edge was treated; the edge and its faces by number."""
     faces, reason = [i + 1 for i in value.faces], "" if value.reason is None else str(value.reason)
     return {**plain(value), "edge": value.edge + 1, "faces": faces, "reason": reason}
 
@@ -50,7 +50,7 @@ def seam(value: SeamMeasure) -> dict[str, Any]:
 
 
 def result(value: Report | Judged) -> dict[str, Any]:
-    """What a step did, in full."""
+    """The full report of a step."""
     from mracad.job.document import Report
 
     return report(value) if isinstance(value, Report) else verdict(value.verdict, value.failed)
@@ -89,7 +89,7 @@ def report(value: Report) -> dict[str, Any]:
 
 
 def written(made: Sequence[Made]) -> dict[str, Any]:
-    """What was written."""
+    """The outputs that were written."""
     each = {one.target.name: one for one in made}
     return {
         "written": list(each),
@@ -102,7 +102,7 @@ def written(made: Sequence[Made]) -> dict[str, Any]:
 
 
 def read_back(value: ReadBack | None) -> dict[str, Any] | None:
-    """What an output is as read back; None where it was not."""
+    """The verdict on an output as read back; None where it was not read back."""
     if value is None:
         return None
     return {**plain(value), "faults": _faults(value.faults), "forgiven": _faults(value.forgiven)}
@@ -118,7 +118,7 @@ def validity(value: Validity) -> dict[str, Any]:
 
 
 def verdict(found: Verdict, failed: Sequence[Layer]) -> dict[str, Any]:
-    """A verdict as JSON-ready values; faces and edges count from 1, what is not finite is null."""
+    """A verdict as JSON-ready values; faces and edges count from 1, numbers that are not finite are null."""
     return {
         "file": found.subject,
         "passed": not failed,
@@ -155,7 +155,7 @@ def _counted(name: str, value: Figure) -> Figure:
 
 
 def _shown(value: Any) -> Any:
-    """Figures in which faces and edges have numbers as on the command line."""
+    """Figures with faces and edges numbered as on the command line."""
     if isinstance(value, dict):
         seam = isinstance(value.get("faces"), list | tuple)
         counted = {"ref", "new"} if "there" in value else {"edge", "faces"} if seam else set()

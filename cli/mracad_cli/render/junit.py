@@ -1,4 +1,4 @@
-"""JUnit reports: one writer."""
+"""JUnit reports, all from one writer."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _CONTROL = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]") 
 
 @dataclass(frozen=True)
 class Case:
-    """A test case: what became of it, in a line and in more.
+    """A test case: its status, a line of text and the details.
 
     Attributes
     ----------
@@ -37,7 +37,7 @@ class Case:
 
 
 def text(name: str, cases: Sequence[Case], seconds: float | None = None) -> str:
-    """A report of one suite."""
+    """The XML of one test suite."""
     counts = Counter(case.became for case in cases)
     figures = {
         "tests": len(cases),
@@ -63,7 +63,7 @@ def text(name: str, cases: Sequence[Case], seconds: float | None = None) -> str:
 
 
 def verdict(found: Verdict, failed: Sequence[Layer], command: str) -> str:
-    """A verdict as a report with a case a layer."""
+    """A verdict as a test suite with one case per layer."""
     return text(f"mracad {command} {found.subject}", [_layer(found.subject, x, x in failed) for x in found.layers])
 
 
@@ -78,7 +78,7 @@ def _layer(subject: str, layer: Layer, failed: bool) -> Case:
 
 
 def batch(name: str, outcomes: Sequence[Outcome], seconds: float) -> str:
-    """A batch as a report: a failure is a check that did not hold, an error anything else."""
+    """A batch as a test suite: a failed check is a failure, anything else an error."""
     return text(name, [_outcome(name, outcome) for outcome in outcomes], seconds)
 
 
@@ -98,5 +98,5 @@ def _time(seconds: float | None) -> dict[str, str]:
 
 
 def _clean(text: str) -> str:
-    """A text without the characters that XML cannot hold."""
+    """A text with the characters that XML cannot hold replaced."""
     return _CONTROL.sub("\N{REPLACEMENT CHARACTER}", text)

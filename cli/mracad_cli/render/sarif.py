@@ -12,7 +12,7 @@ from mracad.job.words import placed
 
 
 def verdict(found: Verdict, failed: Sequence[Layer], command: str) -> dict[str, Any]:
-    """One result a finding; errors where the command fails for its layer, notes elsewhere."""
+    """One result per finding: an error if its layer fails the command, else a note."""
     results = [
         result
         for layer in found.layers
@@ -30,7 +30,7 @@ def verdict(found: Verdict, failed: Sequence[Layer], command: str) -> dict[str, 
 
 
 def _result(subject: str, layer: Layer, finding: Finding | None, level: str) -> dict[str, Any]:
-    """A finding, or what a layer says that fails without one."""
+    """The result for a finding, or for a layer that fails without one."""
     faces = finding.faces if finding else ()
     places = [{"name": f"#{face + 1}", "kind": "face"} for face in faces]
     if finding and finding.edge is not None:

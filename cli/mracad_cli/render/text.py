@@ -22,19 +22,19 @@ if TYPE_CHECKING:
     from mracad.spec.recipe import Step
 
 FINDINGS = 8
-"""Most findings of one layer."""
+"""Largest number of findings shown for one layer."""
 
 REASONS = 3
-"""Most reasons named in one line."""
+"""Largest number of reasons named in one line."""
 
 
 def mm(value: float) -> str:
-    """A length for people: three significant digits, millimetres."""
+    """A length in millimetres with three significant digits."""
     return f"{value:.3g} mm"
 
 
 def degrees(value: float) -> str:
-    """An angle for people: two significant digits, or 0 below what measuring can tell."""
+    """An angle in degrees with two significant digits, or 0 below the accuracy of measurement."""
     return f"{value:.2g}°" if value > 1e-5 else "0°"
 
 
@@ -48,7 +48,7 @@ def verdict(valid: bool | None) -> str:
 
 
 def step_lines(step: Step, result: Report | Judged) -> list[str]:
-    """What a step of a recipe did; its first line begins with the step's name."""
+    """The result of a step of a recipe; the first line begins with the step's name."""
     from mracad.job.document import Report
 
     if isinstance(result, Report):
@@ -62,7 +62,7 @@ def step_lines(step: Step, result: Report | Judged) -> list[str]:
 
 @dataclass(frozen=True)
 class Found:
-    """What is said of files that were read back."""
+    """The verdict on files that were read back."""
 
     valid: bool
     how: str = "as read back"
@@ -73,7 +73,7 @@ class Found:
 
 
 def found(made: Sequence[Made]) -> Found | None:
-    """What is said of outputs; None where they were not read back."""
+    """The verdict on outputs; None where they were not read back."""
     known = [each.read_back for each in made if each.read_back]
     if not known:
         return None
@@ -82,7 +82,7 @@ def found(made: Sequence[Made]) -> Found | None:
 
 
 def edit_lines(report: Report, options: Selection, end: str, found: Found | None = None) -> list[str]:
-    """The four lines after an edit; ``end`` is that of the last one, ``found`` what its files are as read back."""
+    """The four lines after an edit; the last one ends in ``end``, ``found`` is the verdict on files as read back."""
     from mracad.inspect.seams import key, summary
 
     edit, model = report.edit, report.model
@@ -128,7 +128,7 @@ def edit_lines(report: Report, options: Selection, end: str, found: Found | None
 
 
 def left_words(left: Sequence[FaceOutcome]) -> list[str]:
-    """The faces that had to be left, by reason."""
+    """The faces that had to stay unchanged, by reason."""
     groups: dict[str, list[int]] = {}
     for each in left:
         groups.setdefault(each.words, []).append(each.face)
@@ -137,7 +137,7 @@ def left_words(left: Sequence[FaceOutcome]) -> list[str]:
 
 
 def roughness_words(edited: Sequence[FaceOutcome]) -> str:
-    """How rough edited faces were and are."""
+    """The roughness of edited faces before and after."""
     both = [each.roughness for each in edited if each.roughness]
     if not both:
         return ""
@@ -152,20 +152,20 @@ def roughness_words(edited: Sequence[FaceOutcome]) -> str:
 
 
 def copies_line(report: Report) -> str:
-    """What became of the copies of a feature."""
+    """The quality of the copies of a feature."""
     copies, (before, after) = report.edit.copies, report.control_points
     worst = max(copies, key=lambda c: c.deviation)
     exact = sum(c.exact for c in copies)
     text = f"copies: {len(copies)}" + (f", {exact} exact" if exact else "")
-    text += f", off the ideal by ≤ {mm(worst.deviation)} ({worst.place})"
+    text += f", deviation from the ideal ≤ {mm(worst.deviation)} ({worst.place})"
     lost = max(copies, key=lambda c: c.lost)
     if lost.lost > 1e-9:
-        text += f"; constraints took ≤ {mm(lost.lost)} ({lost.place})"
+        text += f"; lost to constraints ≤ {mm(lost.lost)} ({lost.place})"
     return f"{text}; control points: {after}" + (f" (were {before})" if after != before else "")
 
 
 def edge_words(edges: tuple[Treatment, ...]) -> str:
-    """What was done about the edges of the edited faces."""
+    """How the edges of the edited faces were treated."""
     slid = sum(e.how == "slid" for e in edges)
     moved = sum(e.how != "frozen" for e in edges) - slid
     loose = sum(e.how == "to tolerance" for e in edges)
@@ -173,7 +173,7 @@ def edge_words(edges: tuple[Treatment, ...]) -> str:
     reasons = ", ".join(f"{count} × {reason}" for reason, count in why.most_common(REASONS))
     reasons += ", …" if len(why) > REASONS else ""
     words = f"{moved} of {plural(len(edges), 'edge')} moved with both faces"
-    words += (f", {loose} to tolerance" if loose else "") + (f", {slid} slid along one that stays" if slid else "")
+    words += (f", {loose} to tolerance" if loose else "") + (f", {slid} slid along a face that stays" if slid else "")
     return words + (f" (stayed: {reasons})" if why else "")
 
 
@@ -204,7 +204,7 @@ def verdict_lines(found: Verdict, failed: Sequence[Layer]) -> list[str]:
 
 
 def batch_lines(outcomes: Sequence[Outcome], seconds: float) -> list[str]:
-    """The batch in a line, and one for each file that failed."""
+    """One line for the batch, and one for each file that failed."""
     counts = Counter(outcome.status for outcome in outcomes)
     parts = [f"{counts[status]} {status}" for status in ("done", "unchanged", "failed", "not tried") if counts[status]]
     lines = [f"{len(outcomes)} file{'s' * (len(outcomes) != 1)}: {', '.join(parts)}; {seconds:.1f} s"]
@@ -213,7 +213,7 @@ def batch_lines(outcomes: Sequence[Outcome], seconds: float) -> list[str]:
 
 
 def sizes(made: Sequence[Made]) -> str:
-    """What was made: names, sizes, and the faces that are in parts."""
+    """The outputs: names, sizes, and the faces that are in parts."""
     return ", ".join(", ".join([m.target.name, _size(len(m.data)), *map(str, m.written.cut)]) for m in made)
 
 

@@ -19,15 +19,15 @@ RING = 1.5
 """Outer radius, over that of the feature, of the ring that determines the surface under it."""
 
 WORTH, BETTER = 3e-3, 3.0
-"""A polynomial bridges the ground if that changes the ring by more than this share of the feature's height, with degree
-6 instead of 4 if that fits so many times better."""
+"""A polynomial bridges the ground if that changes the ring by more than this share of the feature's height.  Its degree
+is 6 instead of 4 if that fits better by the second factor."""
 
 SECTORS = 16
-"""The ring must be covered in three quarters of so many directions."""
+"""Number of directions in three quarters of which the ring must be covered."""
 
 PLATE, CLOSE, CELLS = 600, 1.2, 64
-"""Points of the ring that the thin plate passes through, first those up to so many times the reach; and the cells, up
-to there, over which it is tabulated."""
+"""Number of points of the ring through which the thin plate passes; the distance, over the reach, of those taken first;
+and the number of cells, up to there, over which it is tabulated."""
 
 NORMALS = 6
 """Steps to find the foot of a point on the plate."""
@@ -43,9 +43,9 @@ class Plate:
     Attributes
     ----------
     chart : Charts
-        Of one place: that of the window, brought to the plate.
+        Chart of one place: that of the window, projected onto the plate.
     height : scipy.interpolate.RectBivariateSpline
-        Of the plate in the chart's axes, in shares of the reach.
+        Height of the plate in the chart's axes; all lengths are fractions of the reach.
     reach : float
         mm.
     """
@@ -109,7 +109,7 @@ def _levelled(ground: Ground, window: Window) -> tuple[Array, Array, Array, Arra
     local : ndarray (q, 3)
         mm.
     ring, within : ndarray of bool (q,)
-        Which of them lie in the ring and inside it.
+        Whether they lie in the ring, and inside it.
     """
     feet, reach = window.feet, window.reach
     points, near = (x[0] for x in ground.samples(feet, np.array([RING * reach]), SPREAD)[:2])
@@ -133,7 +133,7 @@ def _levelled(ground: Ground, window: Window) -> tuple[Array, Array, Array, Arra
 
 
 def _thinned(places: Array) -> Array:
-    """Indices of some of the places ``(q, 2)`` of a ring, the close ones first, each place once."""
+    """Indices of some of the places ``(q, 2)`` of a ring, the nearest first, each place once."""
     order = np.random.default_rng(0).permutation(len(places))
     far = np.linalg.norm(places[order], axis=1) > CLOSE
     some = order[np.argsort(far, kind="stable")][:PLATE]

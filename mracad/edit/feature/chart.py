@@ -27,7 +27,7 @@ RAYS, STEPS = 16, 8
 """The fan of geodesics."""
 
 AWAY = 1.5
-"""No geodesic of unit length goes farther than 1, nor faster, unless it overstepped a place that is too steep."""
+"""No geodesic of unit length goes farther than 1, nor faster, unless a step crossed a place that is too steep."""
 
 RIDGE = 1e-9
 """Keeps fits with few points from oscillating."""
@@ -185,7 +185,7 @@ def charts(origin: Array, axes: Array, reach: Array, points: Array, mask: Array,
     mask : ndarray of bool (m, q)
         Points that count.
     degree : int
-        Of the graph.
+        Degree of the graph.
     """
     local = np.einsum("mij,mqj->mqi", axes, points - origin[:, None]) / reach[:, None, None]
     a, b, c = (local[..., k] for k in range(3))

@@ -28,12 +28,12 @@ LOST = 0.01
 
 @dataclass(frozen=True, eq=False)
 class Origin:
-    """Where in a model a feature was found: by surface, its offsets over the surface's own net, and the window.
+    """Where in a model a feature was found.
 
     Attributes
     ----------
     offsets : dict of int to ndarray (nu, nv, 3)
-        In each surface's own frame, mm.
+        Its offsets by surface, over the surface's own net and in its frame, mm.
     feet : Feet
         Its place on the ground without it.
     axes : ndarray (3, 3)
@@ -52,7 +52,7 @@ class Feature:
     Attributes
     ----------
     radius, reach : float
-        Where its taper begins and ends, mm.
+        Radii where its taper begins and ends, mm.
     spacing : float
         Width of its knot spans in the source, mm.
     table : ndarray (n, n, 4)

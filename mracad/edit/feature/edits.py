@@ -51,7 +51,7 @@ def move(
     Raises
     ------
     EditError
-        For a place or a window off the faces, or a feature that does not fit its old or new place.
+        For a place or a window that is not on the faces, or a feature that does not fit its old or new place.
     """
     scope = scope or scope_of(model, options)
     chosen = _movable(model, scope)
@@ -70,7 +70,7 @@ def repeat(
     scope: Scope | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Edit:
-    """Lay copies of a feature; parameters and errors as for :func:`move`."""
+    """Copy a feature; parameters and errors as for :func:`move`."""
     scope = scope or scope_of(model, options)
     chosen = _movable(model, scope)
     feature = feature_of(model, options, chosen, options.feature)
@@ -108,12 +108,12 @@ def transfer(
 
 
 def _refuse_held(model: Model, offsets: Mapping[int, Array], scope: Scope) -> None:
-    """Raise EditError if a region holds part of what is to be taken away, by surface."""
+    """Raise EditError if a region holds part of a feature (offsets by surface) that is to be removed."""
     for i, offset in offsets.items():
         surface = model.surfaces[i]
         held = zoned(surface.net, [model.faces[face] for face in surface.faces], scope.zones)
         if np.any(offset[held]):
-            raise EditError("feature: a region of --hold keeps part of it", "move another, or hold less")
+            raise EditError("feature: a region of --hold keeps part of it", "move another feature, or hold less")
 
 
 def _movable(model: Model, scope: Scope) -> set[int]:

@@ -15,7 +15,8 @@ Array = np.ndarray
 _Box = tuple[tuple[int, int], tuple[int, int]]
 
 EXACT, CONGRUENT = 1e-6, 1e-3
-"""Nets match when knots agree to this share of a span, and control points to this share of the feature's height."""
+"""Nets match when knots agree to the first share of a span, and control points to the second of the feature's
+height."""
 
 TURNED = 0.05
 """Largest entry by which a rotation between nets may differ from that between the frames of the two places."""
@@ -29,7 +30,7 @@ class Shifts:
     ----------
     matched : ndarray of bool (copies,)
     offsets : dict of int to ndarray (nu, nv, 3)
-        Their sums by surface, over its own net and in its own frame, mm.
+        Their sums by surface, over the surface's own net and in its frame, mm.
     """
 
     matched: Array
@@ -102,7 +103,7 @@ def _steps(source: Patch, target: Patch, box: _Box, way: Array) -> tuple[int, in
 
 
 def _moved(one: KnotVector, two: KnotVector, box: tuple[int, int], way: float) -> int | None:
-    """The same in one direction."""
+    """Number of control points by which knots are shifted in one direction; None if they are not."""
     d = one.degree
     if d != two.degree:
         return None

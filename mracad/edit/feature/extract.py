@@ -1,4 +1,4 @@
-"""Features taken from a model: above their surroundings, or above a level."""
+"""Features separated from a model: above their surroundings, or above a level."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from mracad.wavelet.project import band
 Array = np.ndarray
 
 FINEST, COARSEST = 512, 64
-"""Cells of a table across, at most and at least."""
+"""Largest and smallest number of cells across a table."""
 
 NEWTON = 8
 """Steps to find the parameters of a point over a place."""
@@ -51,7 +51,7 @@ def feature_of(model: Model, options: Featured, faces: Collection[int], text: st
     UsageError
         For an invalid text.
     EditError
-        If there is no feature, or an edge holds part of it.
+        If there is no feature, or edges hold part of it.
     FileError
         For an invalid file.
     """
@@ -128,7 +128,7 @@ def _made(ground: Ground, chart: Charts, area: Window, cuts: Mapping[int, Cut], 
         raise EditError(f"{area.label}: no control point lies under the window", "use a larger one")
     if largest <= 1e-7:
         raise EditError(
-            f"{area.label}: nothing stands out there", "name a window over a feature; see mracad feature list"
+            f"{area.label}: nothing stands out there", "choose a window over a feature; see mracad feature list"
         )
     orders = seams(ground.model, {f.index for i in cuts for f in ground.patches[i].faces}, Wishes(keep)).orders
     free = {i: _free(ground, ground.patches[i], orders) for i in cuts}

@@ -61,7 +61,8 @@ class Found:
 
     @property
     def text(self) -> str:
-        """The value for ``--feature``, twice as wide as its rim, so that the surroundings are flat there."""
+        """The value for ``--feature``: a window twice as wide as the feature, so that its rim lies on flat
+        surroundings."""
         x, y, z = (f"{value:.6g}" for value in np.round(self.place, 6) + 0.0)
         return f"near:{x},{y},{z},radius:{self.size:.4g}"
 

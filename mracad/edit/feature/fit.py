@@ -34,13 +34,13 @@ UNEVEN = 1.4
 """Largest width of a span over its average."""
 
 CHECKS, FEWEST, ALL = 300, 60, 30_000
-"""Points in each direction at which a copy is compared with the ideal: at most, at least, and for all copies."""
+"""Points in each direction at which a copy is compared with the ideal: at most, at least, and in all for all copies."""
 
 NARROWEST = 1e-3
 """Least width of a knot span made for a copy, mm."""
 
 MOST = 4_000_000
-"""Control points that a net may grow to."""
+"""Largest number of control points of a net."""
 
 _ACROSS = 160
 
@@ -91,7 +91,7 @@ def _least(copies: Copies, kv: KnotVector) -> float:
 
 
 def grown(near: Array, knots: Knots, steps: int = 1) -> Array:
-    """Control points ``(nu, nv)`` at most so many steps beside some."""
+    """Mask ``(nu, nv)`` of control points at most some ``steps`` from those of a mask."""
     for axis, kv in enumerate(knots):
         for _ in range(steps):
             before, after = np.roll(near, 1, axis), np.roll(near, -1, axis)
@@ -130,7 +130,7 @@ def _room(copies: Copies, patch: Patch, points: Array) -> Array:
 
 
 def _needed(kv: KnotVector, at: Array, points: Array, room: Array) -> Array:
-    """Knots of one direction, along the first axis, that make spans no longer than a share of the room there."""
+    """Knots to insert along the first axis so that spans are no longer than a share of the ``room`` there."""
     length = np.linalg.norm(np.diff(points, axis=0), axis=-1)
     cell = np.searchsorted(kv.breaks, (at[1:] + at[:-1]) / 2) - 1
     lengths, rooms = np.zeros((kv.spans, length.shape[1])), np.full((kv.spans, length.shape[1]), np.inf)

@@ -22,7 +22,7 @@ STEEP = 0.2
 """Least cosine between normals at one place: beyond it is the other side of a wall."""
 
 SIDEWAYS = 1e-3
-"""Share of a distance by which a point may lie off the normal at its foot: beyond, the ground has ended."""
+"""Share of its distance by which a point may lie beside the normal at its foot; beyond that the ground has ended."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +51,7 @@ class Feet:
         return Feet(*(getattr(self, name)[some] for name in self.__dataclass_fields__))
 
     def beside(self, points: Array) -> Array:
-        """How far points lie off the normals at their feet, mm."""
+        """Distance of points from the normals at their feet, mm."""
         way = points - self.points
         return np.asarray(np.linalg.norm(way - (way * self.normals).sum(axis=1, keepdims=True) * self.normals, axis=1))
 
@@ -80,14 +80,14 @@ class Ground:
         return cls(model, frozenset(faces), {i: Patch.of(model, i, faces, (poles or {}).get(i)) for i in surfaces})
 
     def without(self, offsets: Mapping[int, Array]) -> Ground:
-        """The ground less offsets, by surface over the model's own nets."""
+        """The ground with offsets subtracted, by surface over the model's own nets."""
         return Ground.of(
             self.model, self.chosen, {i: self.model.surfaces[i].net.poles - each for i, each in offsets.items()}
         )
 
     @cached_property
     def _stands(self) -> list[tuple[int, Array]]:
-        """For surfaces in several places, the motions from the other places to the first."""
+        """For surfaces with several instances, the motions from the others to the first."""
         found: list[tuple[int, Array]] = []
         for index, patch in self.patches.items():
             for face in patch.faces:
@@ -98,8 +98,8 @@ class Ground:
         return found
 
     def brought(self, points: Array) -> Array:
-        """Points ``(m, 3)`` at any place of a surface with several, moved to the first: an edit of the surface shows at
-        all of them."""
+        """Points ``(m, 3)`` near any instance of a surface, moved to the first instance: an edit of the surface shows
+        at all of them."""
         if not self._stands or not len(points):
             return points
         best, least = points, self.feet(points).apart

@@ -26,8 +26,8 @@ BATCH = 48
 
 @dataclass(frozen=True, eq=False)
 class Way:
-    """Rotation of detail (radians), scales along the face and along the normal, and mirroring: once, or point by point
-    ``(q,)``."""
+    """Rotation of detail (radians), factors along the face and along the normal, and mirroring; a number each, or
+    arrays ``(q,)`` by point."""
 
     turn: Array | float
     size: Array | float
@@ -98,7 +98,7 @@ class Copies:
 
     @cached_property
     def height(self) -> float:
-        """Largest displacement of the least of them, mm."""
+        """Largest displacement of the lowest copy, mm."""
         return float(self.feature.height * np.abs(self.heights).min())
 
     def on(self, patch: Patch) -> Array:
@@ -106,7 +106,7 @@ class Copies:
         return np.asarray(self.touched[:, list(self.ground.patches).index(patch.index)])
 
     def only(self, some: Array) -> Copies:
-        """The copies of a mask; the others reach nothing."""
+        """The copies of a mask; all others reach no patch."""
         return replace(self, touched=self.touched & some[:, None])
 
     def at(self, patch: Patch, uv: Array) -> Array:

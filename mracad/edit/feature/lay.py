@@ -41,7 +41,7 @@ MOVED = 1e-7
 """A seam moves where a copy displaces it by more than this share of its height."""
 
 HALVINGS, LARGEST = 3, 100_000
-"""Most times that the spans under a trimmed seam are halved, and most control points of a net for which they are."""
+"""How often the spans under a trimmed seam are halved at most, and the largest net, in control points, for which."""
 
 _EVENLY = np.linspace(0, 1, 401)
 
@@ -75,7 +75,7 @@ class _Task:
     Attributes
     ----------
     copies : Copies
-        All that are not exact shifts.
+        All copies that are not exact shifts.
     known, removed : mapping of int to ndarray (nu, nv, 3)
         By surface, offsets over its own net: exact shifts and removed features; and the latter alone.
     nets : dict of int to Net
@@ -83,7 +83,7 @@ class _Task:
     poles : dict of int to ndarray (nu, nv, 3)
         Offsets of the copies over these.
     joints : Joints
-        Of the faces under them.
+        Joints of the faces under them.
     size : (float, float)
         Allowed error of the least copy, and the largest reach, mm.
     """
@@ -176,7 +176,7 @@ def _told(ground: Ground, under: Collection[int], joined: Joints) -> Joints:
 
 
 def _crossings(task: _Task, copies: Copies) -> list[Crossing]:
-    """The seams that copies, or removed features, displace."""
+    """The seams that copies or removed features displace."""
     every: tuple[Seam | TrimmedSeam, ...] = task.joints.exact + task.joints.loose
     found = [seam for seam in every if any(_reached(copies, trace(x), task.removed) for x in (seam.a, seam.b))]
     moved = {i: np.any(_wanted(task, i, net)[0], axis=2) for i, net in task.nets.items()} if found else {}
@@ -184,7 +184,7 @@ def _crossings(task: _Task, copies: Copies) -> list[Crossing]:
 
 
 def _reached(copies: Copies, side: Trace, removed: Mapping[int, Array]) -> bool:
-    """Whether copies, or removed features (offsets by surface over its own net), displace one side of a seam."""
+    """Whether copies or removed features (offsets by surface over its own net) displace one side of a seam."""
     patch, uv = copies.ground.patches[side.surface], side.places(_EVENLY)
     moved = [copies.at(patch, uv)]
     if side.surface in removed:

@@ -41,11 +41,11 @@ class Place:
     point : ndarray (3,)
         In space, mm; for parameters the point there.
     face : int or None
-        Given by parameters ``uv`` on this face.
+        The face, for a place given by its parameters ``uv``.
     rotate, size, height : float
-        Of the copy there: an angle (radians) and factors.
+        Angle (radians) and factors of the copy there.
     direction : ndarray (3,) or None
-        Of the copy's x; None for S_u.
+        Direction of the copy's x; None for S_u.
     """
 
     label: str
@@ -65,7 +65,7 @@ def place(ground: Ground, given: Point | OnFace, label: str) -> Place:
     face, uv = face_number(ground.model, given.face, label, PLACE), np.array(given.uv)
     patch = patch_of(ground, face, label)
     if not patch.within(uv) or not patch.inside(ground.model.faces[face], uv[None])[0]:
-        raise EditError(f"{label} is off the face: {_domain(patch)}", "give parameters inside the face")
+        raise EditError(f"{label} is outside the face: {_domain(patch)}", "give parameters inside the face")
     return Place(label, np.asarray(patch.net.evaluate(uv[None]))[0], face, uv)
 
 
@@ -94,7 +94,7 @@ def standing(ground: Ground, places: Sequence[Place], far: float) -> Feet:
     bad = ~on | ~(given | ((apart <= far) & (feet.beside(points) <= SIDEWAYS * far)))
     if bad.any():
         i = int(np.flatnonzero(bad)[0])
-        off = f"{apart[i]:.3g} mm off" if on[i] else "off"
+        off = f"{apart[i]:.3g} mm away from" if on[i] else "not on"
         raise EditError(
             f"{places[i].label} is {off} the faces to edit",
             "give a point on one of them, or select others with --faces",
@@ -119,9 +119,9 @@ class Window:
         Its middle.
     point : ndarray (3,)
     radius, width : float
-        Of the disc, half the diagonal of the rectangle; and of the taper beyond it, mm.
+        Radius of the disc, or half the diagonal of the rectangle, and width of the taper beyond it, mm.
     box : ndarray (2, 2) or None
-        Least and largest parameters of a rectangle.
+        Smallest and largest parameters of a rectangle.
     patch : Patch or None
         Its surface.
     """
@@ -145,9 +145,10 @@ class Window:
         return self.radius + self.width
 
     def shares(self, patch: Patch, points: Array, xy: Array) -> Array:
-        """How far into the taper the Greville points ``(nu, nv)`` of a patch lie: below 0 inside, 1 and more beyond.
+        """Position of the Greville points ``(nu, nv)`` of a patch in the taper: 0 and less inside it, 1 and more
+        beyond.
 
-        Only points with given flat indices and normal coordinates ``(q, 2)`` may lie inside.
+        Only ``points`` (flat indices) with normal coordinates ``xy (q, 2)`` can lie inside.
         """
         if self.box is None:
             beyond = np.linalg.norm(xy, axis=1) - self.radius
@@ -178,7 +179,7 @@ def _beyond(net: Net, box: Array) -> Array:
 def window(ground: Ground, given: Disc | Rectangle, text: str, width: float | None) -> Window:
     """A window on the ground, named by its text; raises UsageError and EditError.
 
-    ``width`` of the taper (mm) is a quarter of the radius, or of the shorter side of a rectangle, by default.
+    The ``width`` of the taper (mm) is by default a quarter of the radius, or of the shorter side of a rectangle.
     """
     label = f"feature {text}"
     if isinstance(given, Disc):

@@ -17,7 +17,7 @@ from mracad.errors import EditError
 Array = np.ndarray
 
 SHORT = 0.2
-"""Share of its height by which a copy may be off the ideal if nothing is held."""
+"""Share of its height by which a copy may deviate from the ideal if nothing is held."""
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class Copy:
     ----------
     place : str
     at : (float, float, float)
-        Where it stands, mm.
+        Its position, mm.
     faces : tuple of int
         Faces that it touches.
     deviation, rms : float
@@ -53,8 +53,8 @@ class Copy:
 
 @dataclass(frozen=True, eq=False)
 class Figures:
-    """Points of a copy on a patch: distances (mm) from the ideal, what constraints cut off, what control points
-    cannot hold, and faces, ``(q,)`` each."""
+    """Figures at points of a copy on a patch, ``(q,)`` each: distances (mm) from the ideal, parts of them that
+    constraints cut off and that control points cannot hold, and faces."""
 
     missed: Array
     lost: Array
@@ -73,7 +73,7 @@ def compared(copies: Copies, wanted: Mapping[int, Wanted], done: Mapping[int, Ar
     done : mapping of int to ndarray (nu, nv, 3)
         The resulting offsets.
     exact : ndarray of bool (copies,)
-        Which are exact shifts.
+        Whether a copy is an exact shift.
     """
     found: list[list[Figures]] = [[] for _ in copies.places]
     for i, each in wanted.items():
@@ -131,7 +131,7 @@ def refuse(copies: Copies, found: Sequence[Copy], clip: bool) -> None:
     for copy, height in zip(found, heights, strict=True):
         if copy.short > SHORT * height:
             raise EditError(
-                f"{copy.place}: the faces there cannot hold the copy: it would be off by "
+                f"{copy.place}: the faces there cannot hold the copy: it would deviate by "
                 f"{100 * copy.short / height:.0f} % of its height ({_numbers(copy)})",
                 "make it smaller with --size, or choose another place",
             )

@@ -39,15 +39,15 @@ ALLOWED = Tolerances()
 
 @dataclass(frozen=True, eq=False)
 class Crossing:
-    """A seam that copies lie over.
+    """A seam under copies.
 
     Attributes
     ----------
     seam : Seam or TrimmedSeam
     stretches : sequence of (float, float)
-        Fractions between which control points that move reach it; the rest of it stays.
+        Pairs of fractions of its length between which control points that move reach it; the rest of it stays.
     halvings : int
-        How often the spans under them are halved.
+        Number of times that the spans under them are halved.
     """
 
     seam: Seam | TrimmedSeam
@@ -77,11 +77,11 @@ class Wanted:
     net : Net
         The surface undisplaced, in the space of its displacement.
     offset, alone : ndarray (nu, nv, 3)
-        Of its control points, mm: all that is wanted, and the copies alone.
+        Wanted offsets of its control points, mm: in all, and of the copies alone.
     free : ndarray of bool (nu, nv)
         Control points that may move.
     face : Face
-        One of those on it.
+        One of the faces on it.
     """
 
     net: Net
@@ -93,7 +93,7 @@ class Wanted:
 
 @dataclass(frozen=True, eq=False)
 class _Window:
-    """A part of a net: the control points of its rows and columns, and which of them take part."""
+    """A part of a net: its rows and columns of control points, and a mask of those that take part."""
 
     part: tuple[slice, slice]
     net: Net
@@ -114,7 +114,7 @@ def crossing(seam: Seam | TrimmedSeam, nets: Mapping[int, Net], moved: Mapping[i
     nets : mapping of int to Net
         By surface.
     moved : mapping of int to ndarray of bool (nu, nv)
-        Control points of those that move.
+        Control points that move, by surface.
     """
     found: list[Stretch] = []
     for side in map(trace, (seam.a, seam.b)):
@@ -156,7 +156,7 @@ def refined(nets: Mapping[int, Net], found: Sequence[Crossing]) -> dict[int, Net
 
 
 def _exact_parts(found: Sequence[Crossing]) -> list[Seam]:
-    """Those parts of seams that move exactly, as seams."""
+    """The parts of seams that move exactly, as seams."""
     return [each.seam.part(*s) for each in found if isinstance(each.seam, Seam) for s in each.stretches]
 
 
@@ -240,7 +240,7 @@ def _near(net: Net, surface: int, found: Sequence[Crossing]) -> tuple[Array, Arr
 
 
 def _window(net: Net, near: Array, local: Array) -> _Window:
-    """The part of a net that holds the whole support of control points."""
+    """The part of a net that contains the whole support of control points."""
     (rows, u), (columns, v) = (
         _cut(kv, np.flatnonzero(near.any(axis=1 - axis))) for axis, kv in enumerate((net.u, net.v))
     )

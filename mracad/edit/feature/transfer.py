@@ -50,7 +50,7 @@ class Character:
     detail : Net
         Offsets: the band.
     tables : pair of (ndarray, ndarray)
-        Parameters from one end of its faces to the other, and arc lengths there, in u and v.
+        Parameters from one end of its faces to the other, and the arc lengths at them, in u and v.
     """
 
     coarse: Patch
@@ -92,7 +92,7 @@ class Character:
 
 
 def _lengths(net: Net, axis: int, low: Array, high: Array) -> tuple[Array, Array]:
-    """Parameters from one end to the other, and arc lengths there, in one direction."""
+    """Parameters from one end to the other in one direction, and the arc lengths at them."""
     breaks = (net.u, net.v)[axis].breaks
     ends = np.concatenate([[low[axis]], breaks[(breaks > low[axis]) & (breaks < high[axis])], [high[axis]]])
     steps = -(-STEPS // (len(ends) - 1)) * (len(ends) - 1)
@@ -105,7 +105,7 @@ def _lengths(net: Net, axis: int, low: Array, high: Array) -> tuple[Array, Array
 
 @dataclass(frozen=True, eq=False)
 class Carried:
-    """The detail of one surface at the places of another, times a factor."""
+    """The detail of one surface at the places of another, multiplied by a factor."""
 
     own: Character
     other: Character
@@ -133,15 +133,15 @@ def laid_on(
     Parameters
     ----------
     model : Model
-        The target's.
+        Model of the target.
     target, source : Patch
     band : (float, float)
         Wavelengths, mm.
     options : Transfer
     width : float or None
-        Width over which the detail fades towards held control points, mm; half the largest wavelength by default.
+        Width over which the detail fades towards held control points, mm; by default half the largest wavelength.
     zones : sequence of Zone
-        Regions in which nothing moves.
+        Regions in which nothing may move.
     """
     own, other = Character.of(target, band), Character.of(source, band)
     stays, comes = options.share()
@@ -176,7 +176,7 @@ def laid_on(
 
 
 def _compared(target: Patch, ideal: Carried, delta: Net, gone: Net) -> Copy:
-    """The result for the detail, after constraints."""
+    """The figures of the detail after constraints, as of a copy."""
     uv = _middles(target, delta.u, delta.v)
     missed = np.linalg.norm(np.asarray(delta.evaluate(uv)) - ideal(uv), axis=1)
     lost = np.linalg.norm(np.asarray(gone.evaluate(uv)), axis=1)
@@ -203,7 +203,7 @@ def _middles(target: Patch, u: KnotVector, v: KnotVector) -> Array:
 
 
 def _window(net: Net, free: Array, width: float) -> Array:
-    """Weights of control points: 0 where held, up to 1 at ``width`` (mm) from there."""
+    """Weights of control points ``(nu, nv)``: 0 where held, rising to 1 at a distance of ``width`` (mm)."""
     from scipy.spatial import cKDTree
 
     points, flat = np.asarray(net.grid(net.u.greville(), net.v.greville())).reshape(-1, 3), free.ravel()

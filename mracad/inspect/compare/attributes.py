@@ -25,7 +25,7 @@ def noted(layer: Layer, format: str) -> Layer:
 
 
 def units(ref: str, new: str) -> Layer:
-    """The units of the files; lengths are compared in millimetres whatever they are."""
+    """The units of the files; lengths are always compared in millimetres."""
     return layer("units", new if ref == new else f"{new}, was {ref}", [], {"ref": ref, "new": new})
 
 
@@ -101,7 +101,7 @@ _VALUES = {"colours": ("of", "colour"), "layers": ("layer",), "materials": ("den
 
 
 def _marked(name: str, ref: Subject, new: Subject, groups: Sequence[Match]) -> list[Finding]:
-    """Attributes that only one has; a face of the reference is known by its number in the new document."""
+    """Attributes that only one document has; faces of the reference have their number in the new document."""
     numbers = {ref.face_numbers[i]: new.face_numbers[j] for i, j in _pairs(groups)}
     old = [_key(name, mark, numbers) for mark in getattr(ref.contents, name)]
     fresh = [_key(name, mark, None) for mark in getattr(new.contents, name)]

@@ -14,18 +14,18 @@ from mracad.inspect.verdict import Finding, Layer
 from mracad.model.brep import Face, Model
 from mracad.model.region import face_region, supported
 
-_LINES = 40  # most sample lines across a face
+_LINES = 40  # largest number of sample lines across a face
 
 SAME = 1e-6
 """Distance, mm, within which a face counts as unmoved."""
 
 LAID_ANEW = 1e-4
-"""Most, mm, that an outline may differ in another format: readers rebuild curves within the edges' tolerances."""
+"""Largest difference of an outline in another format, mm: readers rebuild curves within the edges' tolerances."""
 
 
 @dataclass(frozen=True)
 class Spread:
-    """Distances of points of one face from the other: largest, mean, 95 % below; where the largest is."""
+    """Distances of points of one face from another: largest, mean, 95th percentile, and the point of the largest."""
 
     largest: float = 0.0
     mean: float = 0.0
@@ -46,7 +46,7 @@ class FaceDeviation:
     bound : float or None
         Certified bound on both where the parameterisations match: the largest distance of two control points.
     outline : Spread
-        Of the two boundaries from each other.
+        Distances between the two boundaries.
     tolerance : float
         The larger tolerance of the edges of either boundary, mm.
     """
@@ -117,7 +117,7 @@ def deviations(ref: Subject, new: Subject, groups: Sequence[Match]) -> Measured:
 
 
 def unchanged(ref: Subject, measured: Measured) -> frozenset[int]:
-    """The faces of the new model that have not moved, nor have their outlines."""
+    """The faces of the new model whose surface and outline have not moved."""
     near = max(SAME, EQUAL * ref.model.diagonal)
     moved = {j for (_, j), d in measured if not max(d.worst.largest, d.outline.largest) <= near}
     return frozenset(j for (_, j), _ in measured if j not in moved)
@@ -168,7 +168,7 @@ def _bound(ref: Model, new: Model, i: int, j: int) -> float | None:
 
 
 def _density(model: Model, index: int) -> tuple[int, int]:
-    """Sample lines that meet every span, up to a limit."""
+    """Number of sample lines in u and v, enough to meet every span, up to a limit."""
     surface = model.faces[index].surface
     if surface is None:
         return 0, 0

@@ -10,23 +10,23 @@ import numpy as np
 from mracad.inspect.compare.subject import Array, Match, Subject
 from mracad.model.brep import Face
 
-_STRANGE = 0.3  # most difference in place and size, as a share of the diagonal, between partners
+_STRANGE = 0.3  # largest difference in place and size between partners, as a share of the diagonal
 _ALIKE = 1e-6  # share of the diagonal within which faces are in the same place and of the same size
-_WHOLE = 0.03  # share of its area by which a face may differ from the sum of its parts: areas are exact to a hundredth
-_PROBES = 5  # points that tell whether a face lies on another
+_WHOLE = 0.03  # share of its area by which a face may differ from the sum of its parts: areas are exact to 1 %
+_PROBES = 5  # number of points by which a face is found to lie on another
 
 
 def match(ref: Subject, new: Subject, slack: float, by_product: bool) -> list[Match]:
     """Matching faces, in the order of the reference.
 
     Faces with the same number that agree in place, size, kind and product are partners; the others are paired by the
-    least total difference.  A face left over may be a part of one that was cut.
+    least total difference.  A remaining face may be a part of one that was cut.
 
     Parameters
     ----------
     ref, new : Subject
     slack : float
-        How far a part may lie from its whole face, mm.
+        Largest distance of a part from its whole face, mm.
     by_product : bool
         Whether partners must be of products of the same name, if there is a choice.
     """
@@ -118,7 +118,7 @@ def _kin(a: Face, b: Face, by_product: bool) -> bool:
 def _parts(whole: Subject, cut: Subject, partners: Mapping[int, int], slack: float) -> dict[int, list[int]]:
     """Faces of one document that are cut into several of the other.
 
-    Only faces left over, and those whose partner has another size, are considered.
+    Only remaining faces, and those whose partner has another size, are considered.
     """
     taken = {j: i for i, j in partners.items()}
     left = [j for j in range(len(cut.faces)) if j not in taken]

@@ -17,9 +17,9 @@ from mracad.model.facts import Mass
 from mracad.model.sampling import length
 
 STEEPER = 0.01
-"""Growth of the angle of a smooth seam, degrees, after which it is no longer smooth: readers rebuild curves."""
+"""Growth of the angle of a smooth seam, degrees, beyond which it is no longer smooth: readers rebuild curves."""
 
-_ALONG = 0.1  # share of its length by which a seam may lie off the seam that it is a piece of
+_ALONG = 0.1  # share of its length by which a piece of a seam may lie beside that seam
 _SAME_LENGTH = 1e-3  # relative: free edges of the same total length are the same, in however many pieces
 
 
@@ -27,7 +27,7 @@ _SAME_LENGTH = 1e-3  # relative: free edges of the same total length are the sam
 
 
 def faces(ref: Subject, new: Subject, groups: Sequence[Match]) -> Layer:
-    """Faces that are gone or new; faces of another kind, or in other pieces, are noted."""
+    """Faces that are gone or new; faces that changed their kind or were split or merged are noted."""
     known = {i for group in groups for i in group.ref}
     found = {j for group in groups for j in group.new}
     lost = [f for f in ref.model.faces if f.index not in known]
@@ -82,8 +82,8 @@ def seams(
 ) -> Layer:
     """Seams that are gone, new, wider, steeper, or no longer smooth.
 
-    Between faces of the new model that are ``unchanged`` none can break: if its angle differs, its curves lie elsewhere
-    on the faces, within the tolerance, which is noted.
+    A seam between ``unchanged`` faces of the new model cannot break: if its angle differs, its curves have moved on the
+    faces, within the tolerance, which is noted.
     """
     before, after = (measured(subject.model, every=True) for subject in (ref, new))
     if not (ref.validity.shells and new.validity.shells):
@@ -123,7 +123,7 @@ def seams(
 
 
 def _closes(strand: _Strand) -> bool:
-    """Whether smooth seams close faces on themselves: where such a face is cut open is only representation."""
+    """Whether smooth seams close faces on themselves: the place where such a face is cut is only representation."""
     return all(m.smooth and m.faces[0] == m.faces[1] for m in (*strand.old, *strand.new))
 
 
@@ -135,7 +135,7 @@ def _alone(ref: Subject, new: Subject, strand: _Strand) -> Finding:
 
 
 def _either_way(measures: list[SeamMeasure]) -> list[SeamMeasure]:
-    """Seams between faces of either orientation: without a shell nothing tells the outer side."""
+    """Seams measured regardless of orientation, because without a shell the outer side is unknown."""
     return [replace(m, angle=min(m.angle, 180.0 - m.angle)) for m in measures]
 
 
@@ -147,7 +147,7 @@ def _finding(subject: Subject, seam: SeamMeasure, rule: str, **figures: float) -
 def _strands(
     ref: Model, new: Model, before: list[SeamMeasure], after: list[SeamMeasure], groups: Sequence[Match], slack: float
 ) -> list[_Strand]:
-    """The seams of both documents between matched faces, grouped if they are the same.
+    """The seams of both documents between matched faces, grouped if they run along the same line.
 
     Seams between the parts of one face are left out unless that face closes on itself there.
     """
@@ -219,7 +219,7 @@ def topology(ref: Subject, new: Subject, unsewn: str) -> Layer:
     ----------
     ref, new : Subject
     unsewn : str
-        The format that may lack shells and solids; ``""`` if both have them.
+        The format that may lack shells and solids; ``""`` if both formats have them.
     """
     names = ("solids", "shells", "faces", "open_shells", "free_edges")
     counts = {name: (getattr(ref.validity, name), getattr(new.validity, name)) for name in names}

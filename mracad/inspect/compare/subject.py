@@ -46,12 +46,12 @@ class Subject:
     contents : Contents
     mass : Mass
     faces : list of Mass
-        One for each face of ``model``.
+        Area and centre of each face of ``model``.
     validity : Validity
     lone_faces : int
         Open shells of one face.
     gauge : Gauge
-        On the faces of ``model``.
+        Exact measurements on the faces of ``model``.
     face_numbers, edge_numbers : sequence of int
         The face and edge of the document for each one of ``model``.
     """
@@ -68,7 +68,7 @@ class Subject:
     edge_numbers: Sequence[int]
 
     def named(self, faces: Iterable[int]) -> tuple[int, ...]:
-        """The faces of the document for some faces of ``model``."""
+        """The indices in the document of some faces of ``model``."""
         return tuple(self.face_numbers[face] for face in faces)
 
 

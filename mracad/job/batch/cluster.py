@@ -1,8 +1,8 @@
 """Workers on other machines: Dask's ``distributed`` behind the interface of the local pool.
 
-A task goes to a Dask worker and there into a pool of its own (:mod:`mracad.job.batch.pool`), so that limits, crashes
-and their reasons are the same as at home, and a bad file never takes a Dask worker with it.  When a Dask worker is
-lost, its tasks are done again elsewhere.
+A task goes to a Dask worker and there into a pool of its own (:mod:`mracad.job.batch.pool`).  So limits and crashes
+are reported as they are locally, and a bad file never takes a Dask worker down.  When a Dask worker is lost, its
+tasks are repeated elsewhere.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ class Cluster(Executor):
     Parameters
     ----------
     address : str
-        Of the scheduler, ``"tcp://host:8786"``; or ``"local"`` to start a cluster on this machine.
+        Address of the scheduler, ``"tcp://host:8786"``, or ``"local"`` to start a cluster on this machine.
     limits : Limits
-        Of each task; the memory is that of each worker machine by default.
+        Limits of each task; by default the memory is that of each worker machine.
     workers : int
-        How many tasks a local cluster does at a time.
+        Number of tasks that a local cluster does at a time.
     patience : float
         Seconds to wait for the scheduler and its first worker.
 
@@ -72,7 +72,7 @@ class Cluster(Executor):
 
     @property
     def workers(self) -> int:
-        """Tasks that the cluster can do at a time, just now."""
+        """Number of tasks that the cluster can do at a time, at present."""
         return max(1, sum(self._client.nthreads().values()))
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
@@ -100,7 +100,7 @@ def isolated(limits: Limits, fn: Callable[..., Any], *args: Any, **kwargs: Any) 
 
 
 def lost(error: Exception) -> Exception:
-    """The error of a task; in the words of the local pool where the cluster lost it."""
+    """The error of a task; a :class:`CrashError`, as from the local pool, where the cluster lost it."""
     if isinstance(error, CancelledError) or type(error).__module__.startswith("distributed"):
         return CrashError(f"the cluster lost the task ({type(error).__name__})", "see the logs of its workers")
     return error

@@ -14,7 +14,7 @@ from mracad.formats import FORMATS, READABLE, by_ending
 
 @dataclass(frozen=True)
 class Item:
-    """One file of a batch, its output relative to the output folder, and the format of that."""
+    """One file of a batch, its output relative to the output folder, and the format of the output."""
 
     source: str
     output: str
@@ -24,9 +24,9 @@ class Item:
 def find(words: Iterable[str], folder: Path, format: str = "") -> list[Item]:
     """The files of a batch from paths, folders (all models below them) and patterns.
 
-    Outputs have the names of their inputs, with the ending of ``format`` where that is given; those of a folder keep
-    their place below it, those of a pattern their place below the folder before its first wildcard.  Hidden files are
-    left out, and so is the output folder where it lies below.
+    Outputs have the names of their inputs, with the ending of ``format`` if one is given.  Files of a folder keep their
+    place below it; files of a pattern keep their place below the folder before its first wildcard.  Hidden files and
+    the output folder are left out.
 
     Raises
     ------
@@ -55,12 +55,12 @@ def find(words: Iterable[str], folder: Path, format: str = "") -> list[Item]:
 
 
 def _format(output: str) -> str:
-    """What a file is written as: what it was read from, as far as its name tells."""
+    """The format in which a file is written: that of its input by its ending, else STEP."""
     return by_ending(output).name if Path(output).suffix.lower() in READABLE else "step"
 
 
 def _expanded(word: str, own: Path) -> list[tuple[str, str]]:
-    """The files that a word on the command line means, but those in the output folder, each with its output."""
+    """The files that a word on the command line names, except those in the output folder, each with its output."""
     base = Path(word)
     if base.is_dir():
         files = [path for path in base.rglob("*") if path.suffix.lower() in READABLE]

@@ -1,7 +1,7 @@
-"""What a batch has done, in a file that survives kills: one JSON line an output, only ever appended to.
+"""What a batch has done, in a file that survives kills: one JSON line per output, only ever appended to.
 
-A line is written before its output takes its place, and holds the hash of the output's content.  So whatever the
-moment of a kill, an output counts as done exactly if it is whole and was made from the same input in the same way.
+A line is written before its output is put in place, and holds the hash of the output's content.  So whenever a kill
+comes, an output counts as done exactly if it is whole and was made from the same input in the same way.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from mracad.output import holds, put_all, temporary
 NAME = "manifest.jsonl"
 
 UNFINISHED = ".mracad-batch-"
-"""How the names of files begin that a batch is just writing."""
+"""Prefix of the names of files that a batch is still writing."""
 
 
 class Manifest:
@@ -63,11 +63,11 @@ class Manifest:
         self._file.close()
 
     def made(self, output: str) -> bool:
-        """Whether a batch has made this output, in whatever way."""
+        """Whether a batch has made this output, with any key."""
         return output in self._known
 
     def done(self, output: str, key: str) -> bool:
-        """Whether the output is there, as it was made with this key."""
+        """Whether the output exists, unchanged since it was made with this key."""
         entry = self._known.get(output)
         if entry is None or entry["key"] != key:
             return False
@@ -85,30 +85,30 @@ class Manifest:
         *,
         if_changed: bool = False,
     ) -> None:
-        """Note an output and write it and what belongs to it, all or nothing; raises FileError.
+        """Record an output, and write it and the files that belong to it, all or none; raises FileError.
 
         Parameters
         ----------
         output : str
-            Relative to the folder.
+            Its path relative to the folder.
         key : str
-            A hash of everything that it depends on.
+            A hash of everything that the output depends on.
         data : bytes
         beside : mapping
             Contents of files that belong to it, by their names relative to the folder.
         if_changed : bool
-            Leave a file alone that has this content.
+            Do not touch a file that already has this content.
         """
         try:
             self._note(output, key, data)
         except OSError as error:
             raise FileError(f"cannot write '{self._file.name}': {error.strerror}", "free some disk space") from error
-        with contextlib.suppress(OSError):  # writing says it better
+        with contextlib.suppress(OSError):  # writing reports it better
             (self.folder / output).parent.mkdir(parents=True, exist_ok=True)
         self._put({output: data, **beside}, if_changed)
 
     def restore(self, beside: Mapping[str, bytes]) -> None:
-        """Write what belongs to an output that is done, where it is not there."""
+        """Write those files belonging to a finished output that are missing."""
         self._put(beside, True)
 
     def _put(self, contents: Mapping[str, bytes], if_changed: bool) -> None:
@@ -129,7 +129,7 @@ def digest(data: bytes) -> str:
 
 
 def _lock(handle: int, folder: Path) -> None:
-    """Keep other batches out until the file is closed or the process is gone."""
+    """Keep other batches out until the file is closed or the process ends."""
     try:
         import fcntl
     except ImportError:

@@ -1,8 +1,8 @@
 """Workers in processes of their own: a task that crashes, hangs or needs too much memory fails alone.
 
-The pool is an :class:`concurrent.futures.Executor`.  Each worker is a process that imports what it needs once and
-then does one task after another, told over a pipe; a thread of the pool waits on each, and one more watches the time
-and the memory of all.
+The pool is a :class:`concurrent.futures.Executor`.  Each worker is a process that imports what it needs once and then
+does one task after another, sent over a pipe.  One thread of the pool waits for each worker, and one more watches
+the time and memory of all of them.
 """
 
 from __future__ import annotations
@@ -35,26 +35,26 @@ from mracad.job.guard import end_with_parent
 from mracad.note import Note, noting
 
 TICK = 0.05
-"""Seconds between two looks at the workers."""
+"""Seconds between two checks of the workers."""
 
 GRACE = 5
-"""Seconds beyond its time limit after which a worker that nobody watches any more ends itself."""
+"""Seconds beyond its time limit after which a worker that is no longer watched ends itself."""
 
-_SIZE = struct.Struct(">Q")  # of an answer, before it
+_SIZE = struct.Struct(">Q")  # length of an answer, sent before it
 
 READY = 120.0
-"""Seconds in which a worker must have started."""
+"""Seconds within which a worker must have started."""
 
 
 class Pool(Executor):
     """Processes that do tasks, each within limits.
 
-    Tasks go to them as pickles; what they send back is MessagePack of the type that the function says it returns.
+    Tasks are sent as pickles; results come back as MessagePack of the function's declared return type.
 
     Parameters
     ----------
     workers : int
-        Most tasks done at a time.
+        Largest number of tasks done at a time.
     limits : Limits
     warm : callable, optional
         Called once in each worker before its first task; must be importable.
@@ -69,7 +69,7 @@ class Pool(Executor):
         self._tasks: queue.SimpleQueue[_Task | None] = queue.SimpleQueue()
         self._slots: list[threading.Thread] = []
         self._workers: list[_Worker] = []
-        self._open = 0  # tasks that are not done
+        self._open = 0  # unfinished tasks
         self._lock = threading.Lock()
         self._closing = self._stopped = False
 
@@ -88,7 +88,7 @@ class Pool(Executor):
         return task.future
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """Let what was submitted finish; with ``cancel_futures`` end the workers at once."""
+        """Finish what was submitted; with ``cancel_futures`` end the workers at once."""
         self._closing = True
         if cancel_futures:
             self._stopped = True
@@ -101,7 +101,7 @@ class Pool(Executor):
                 slot.join()
 
     def _slot(self) -> None:
-        """Do tasks, in a worker that is replaced when it is lost or has grown."""
+        """Do tasks in a worker, which is replaced when it is lost or has grown too much."""
         worker: _Worker | None = None
         while (task := self._tasks.get()) is not None:
             tell: Callable[[], object] = bool
@@ -122,14 +122,14 @@ class Pool(Executor):
             self._retire(worker)
 
     def _usable(self, worker: _Worker | None) -> _Worker | None:
-        """The worker, unless it is lost or has grown halfway from what it had when it was ready to its limit."""
+        """The worker, unless it is lost or has grown halfway from its size when ready to its limit."""
         if worker and (worker.lost() or worker.memory() > (worker.ready + self._memory) / 2):
             self._retire(worker)
             return None
         return worker
 
     def _started(self) -> _Worker:
-        """A worker that is warm."""
+        """A new worker that has loaded what it needs."""
         worker = _Worker()
         self._workers.append(worker)
         try:
@@ -145,7 +145,7 @@ class Pool(Executor):
         worker.close()
 
     def _watch(self) -> None:
-        """End the workers that overstep a limit."""
+        """End the workers that exceed a limit."""
         while any(slot.is_alive() for slot in self._slots):
             time.sleep(TICK)
             for worker in list(self._workers):
@@ -158,7 +158,7 @@ class Pool(Executor):
 
 
 class _Task:
-    """A call, pickled, and the type and future of its result."""
+    """A pickled call, with the type and the future of its result."""
 
     def __init__(self, payload: bytes, returns: Any) -> None:
         self.payload, self.returns = payload, returns
@@ -171,7 +171,7 @@ class _Worker:
     def __init__(self) -> None:
         environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
         for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
-            environment.setdefault(name, "1")  # as in one command: results must not depend on the number of cores
+            environment.setdefault(name, "1")  # as in a single command: results must not depend on the number of cores
         with tempfile.TemporaryFile() as page:
             page.truncate(mmap.PAGESIZE)
             self.note = Note(page.fileno())
@@ -183,7 +183,7 @@ class _Worker:
                 stderr=subprocess.DEVNULL,
                 env=environment,
                 pass_fds=shared,
-                process_group=None if sys.platform == "win32" else 0,  # an interrupt is for the client to act upon
+                process_group=None if sys.platform == "win32" else 0,  # only the client acts on an interrupt
             )
         self.reason: MracadError | None = None
         self.seconds, self.deadline = 0.0, math.inf
@@ -212,13 +212,13 @@ class _Worker:
         return self.process.poll() is not None
 
     def memory(self) -> int:
-        """Bytes that the process occupies; 0 once it is gone."""
+        """Bytes that the process occupies; 0 once it has ended."""
         return _occupied(self._process)
 
     def used(self) -> int:
-        """Bytes that the process occupies, or a child of it where that is more.
+        """Bytes that the process or one of its children occupies, whichever is more.
 
-        A child begins with all that the process has, and the process waits for it: together they hold what it does.
+        A child shares all pages of the process at first, and the process waits for it: the sum would count them twice.
         """
         return max(_occupied(process) for process in (self._process, *_children(self._process)))
 
@@ -227,7 +227,7 @@ class _Worker:
         self.process.kill()
 
     def close(self) -> None:
-        """Let the process end: there are no more tasks."""
+        """Let the process end, when there are no more tasks."""
         assert self.process.stdin and self.process.stdout
         with contextlib.suppress(OSError):
             self.process.stdin.close()
@@ -235,7 +235,7 @@ class _Worker:
         self.process.stdout.close()
 
     def _loss(self) -> MracadError:
-        """Why the process is gone."""
+        """The error that tells why the process ended."""
         code = self.process.wait()
         if self.reason:
             return self.reason
@@ -255,7 +255,7 @@ def _occupied(process: psutil.Process) -> int:
 
 
 def _children(process: psutil.Process) -> list[psutil.Process]:
-    """The children of a process; Linux knows them without a look at all processes of the machine."""
+    """The children of a process; on Linux without listing all processes of the machine."""
     listed = Path(f"/proc/{process.pid}/task/{process.pid}/children")
     try:
         if listed.exists():
@@ -266,9 +266,9 @@ def _children(process: psutil.Process) -> list[psutil.Process]:
 
 
 def serve(page: int | None = None) -> None:
-    """What a worker process does: tasks from standard input, results to standard output, until that is closed.
+    """Main loop of a worker process: tasks from standard input, results to standard output, until it is closed.
 
-    What it is at goes to a note in the file with that descriptor, where such can be passed on.
+    Its current activity is noted in the file with the descriptor ``page``, where descriptors can be inherited.
     """
     end_with_parent()
     if page is not None:
@@ -293,6 +293,6 @@ def _done(payload: bytes) -> Any:
 
 
 def _alarm(seconds: float) -> None:
-    """End the process after some seconds, whatever it is doing then: the kernel does not let Python in to look."""
+    """End the process after some seconds, whatever it is doing: Python code cannot run while the kernel works."""
     if hasattr(signal, "setitimer"):
         signal.setitimer(signal.ITIMER_REAL, seconds)

@@ -1,4 +1,4 @@
-"""A batch: its files done by an executor, written one by one as they come."""
+"""A batch: an executor processes its files, and each result is written as it comes."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ from mracad.job.batch.work import Product, Work, do
 from mracad.spec.recipe import Recipe, record_of
 
 AHEAD = 2
-"""Files given to the executor for each of its workers: enough that none waits, few enough to hold in memory."""
+"""Files given to the executor per worker: enough that none waits, few enough to hold in memory."""
 
 RETRIED = frozenset({Code.LIMIT, Code.INTERNAL})
-"""What may go better the next time: limits and crashes."""
+"""Errors after which a file may be tried again: limits and crashes."""
 
 Status = Literal["done", "unchanged", "failed", "not tried"]
 
@@ -39,20 +39,20 @@ class Outcome:
     ----------
     file, output : str
     status : Status
-        ``done``; ``unchanged``: it was done before; ``failed``; ``not tried``: the batch stopped before.
+        ``done``; ``unchanged``: an earlier batch did it; ``failed``; ``not tried``: the batch stopped first.
     code : int
         The exit code that a command would have.
     message, hint : str
         Why it failed, and what to do.
     seconds : float
-        Of the work itself; for a file that failed, since it was given to the executor.
+        Time of the work itself; for a file that failed, time since it was given to the executor.
     attempts : int
     steps : tuple of dict
         What each step did, in short.
     warnings : tuple of str
-        What had to be guessed or is lost.
+        What had to be guessed or was lost.
     read_back : ReadBack or None
-        What the output is as read back, where it was.
+        The output as read back; None where it was not read back.
     """
 
     file: str
@@ -88,11 +88,11 @@ def run(
     ----------
     recipe : Recipe
     items : iterable of Item
-        Looked at only as fast as they are done.
+        Consumed only as fast as they are processed.
     manifest : Manifest
-        Of the output folder.
+        Manifest of the output folder.
     executor : Workers
-        Shut down when the batch stops early.
+        It is shut down when the batch stops early.
     settings : Settings
     """
     batch = _Batch(recipe, manifest, executor, settings)
@@ -121,7 +121,7 @@ def run(
 
 @dataclass
 class _Task:
-    """A file in the hands of the executor."""
+    """A file that was given to the executor."""
 
     item: Item
     work: Work
@@ -139,7 +139,7 @@ class _Batch:
         self._epoch = os.environ.get("SOURCE_DATE_EPOCH")
 
     def start(self, item: Item) -> Outcome | None:
-        """Give a file to the executor, unless it is done or cannot be."""
+        """Give a file to the executor; the outcome instead if it is already done or cannot be done."""
         try:
             steps = self.recipe.steps(item.source)
             files = {file: _bytes(file) for step in steps for file in step.options.files()}
@@ -160,7 +160,7 @@ class _Batch:
         return None
 
     def finished(self) -> Iterator[Outcome]:
-        """Wait for tasks, and write what they made."""
+        """Wait for tasks, and write their products."""
         for future in wait(self.pending, return_when=FIRST_COMPLETED).done:
             task = self.pending.pop(future)
             try:
@@ -181,7 +181,7 @@ class _Batch:
         self.pending[self.executor.submit(do, task.work)] = task
 
     def _record(self, item: Item, work: Work) -> dict[str, bytes]:
-        """The resolved recipe that goes beside the output, where asked."""
+        """The resolved recipe to write beside the output, if asked for."""
         name = f"{item.output}.toml"
         return {name: record_of(work.steps, self.manifest.folder / name).encode()} if self.settings.record else {}
 

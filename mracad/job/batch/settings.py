@@ -1,4 +1,4 @@
-"""How a batch is done; no numerical library is loaded for it."""
+"""Settings of a batch; they load no numerical library."""
 
 from __future__ import annotations
 
@@ -32,13 +32,13 @@ class Settings:
     verify : bool
         Read each output back and judge it.
     overwrite : bool
-        Replace files in the output folder that no batch has made.
+        Replace files in the output folder that were not made by a batch.
     if_changed : bool
-        Leave outputs alone whose content would not change.
+        Do not touch outputs whose content would stay the same.
     record : bool
         Write the resolved recipe beside each output.
     retry : int
-        How often a file is tried again after a crash or a limit.
+        Number of further attempts after a crash or a limit.
     keep_going : bool
         Go on after a file has failed.
     """

@@ -26,24 +26,24 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Work:
-    """One file and what is to be done with it; everything that the result depends on, so it can be done anywhere.
+    """One file and its steps: everything that the result depends on, so that any machine can do it.
 
     Attributes
     ----------
     name : str
-        Of the file, without folder.
+        Name of the file, without its folder.
     data : bytes
         Its content.
     steps : tuple of Step
     settings : Settings
     format : str
-        Of the output.
+        Format of the output.
     files : mapping
-        The content of the files that the steps name.
+        Contents of the files that the steps name.
     epoch : str or None
         ``SOURCE_DATE_EPOCH``.
     versions : mapping
-        Of what decides the result, at the client.
+        Versions at the client of the packages that affect the result.
     """
 
     name: str
@@ -58,8 +58,8 @@ class Work:
 
 @dataclass(frozen=True)
 class Product:
-    """The file that came out, what each step did, in short, what was lost, the seconds that it took, and what the
-    file is as read back (None where it was not)."""
+    """The output, a summary of each step, warnings, the seconds taken, and the output as read back (None where it was
+    not)."""
 
     data: bytes = field(repr=False)
     steps: tuple[dict[str, Any], ...]
@@ -123,7 +123,7 @@ def _read(work: Work) -> Document:
 
 
 def _here(work: Work, folder: Path) -> list[Step]:
-    """The steps, with the files that they name put into a folder of this machine."""
+    """The steps, with the files that they name copied into a folder of this machine."""
     places: dict[str, str] = {}
     for number, (name, data) in enumerate(work.files.items()):
         place = folder / str(number) / Path(name).name
@@ -134,7 +134,7 @@ def _here(work: Work, folder: Path) -> list[Step]:
 
 
 def _short(result: Report | Judged) -> dict[str, Any]:
-    """What a step did, without the long lists."""
+    """A summary of what a step did, without the long lists."""
     from mracad.job.judge import Judged
 
     if isinstance(result, Judged):

@@ -1,7 +1,7 @@
 """The options of every step, declared once: command line, recipes, schemas and documentation come from here.
 
-A ``Struct`` per edit or check, which names its function and so becomes one of ``STEPS``; a field's ``Meta`` carries its
-help.  This package imports no numerical library, so that the command line can show its help at once.
+There is one ``Struct`` per edit or check; it names its function and so becomes one of ``STEPS``.  The ``Meta`` of a
+field holds its help.  This package imports no numerical library, so that the command line can show help quickly.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What the options of every step have in common."""
+"""Common base of the options of all steps."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from mracad.spec.fields import fields
 
 
 class Options(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What every step is asked with.
+    """Options of a step.
 
     Attributes
     ----------
     function : str
-        Where the step is done, ``"module:function"``.
+        The function that does the step, ``"module:function"``.
     """
 
     function: ClassVar[str]
@@ -32,7 +32,7 @@ class Options(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         return {name: value for name, value, default in every if value != default}
 
     def files(self) -> tuple[str, ...]:
-        """Files that the options name, beside the model: what the result depends on, too."""
+        """Files that the options name besides the model; the result depends on them too."""
         texts = ((field.naming, text) for field in fields(type(self)).values() for text in self._texts(field.name))
         return tuple(file for naming, text in texts if naming and (file := naming.file(text)))
 
@@ -71,15 +71,15 @@ class Selection(Options, frozen=True, kw_only=True, forbid_unknown_fields=True):
     hold: Annotated[
         tuple[str, ...],
         Meta(
-            description="Faces and edges (edge#4) that must not move, same selectors as --faces; or regions: "
+            description="Faces and edges (edge#4) that must not move, by the selectors of --faces; or regions: "
             "near:X,Y,Z,radius:R, box:X,Y,Z,X,Y,Z, or 'radius<25mm', where faces bend more tightly."
         ),
     ] = ()
     keep: Annotated[
         Literal["as-is", "g0", "g1", "g2"],
         Meta(
-            description="Continuity to keep along edges: as-is keeps what each has; g0 position, g1 tangent plane, "
-            "g2 curvature."
+            description="Continuity to keep along edges: as-is keeps what each edge has; g0 position, g1 tangent "
+            "plane, g2 curvature."
         ),
     ] = "as-is"
     edges: Annotated[
@@ -92,12 +92,12 @@ class Selection(Options, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
     @property
     def done(self) -> str:
-        """What was done to an edited face, ``"smoothed at 5mm"``."""
+        """What reports say of an edited face, ``"smoothed at 5mm"``."""
         raise NotImplementedError
 
     @property
     def quiet(self) -> str:
-        """What an unchanged face is, ``"already fair at 5mm"``."""
+        """What reports say of an unchanged face, ``"already fair at 5mm"``."""
         raise NotImplementedError
 
     def models(self) -> tuple[str, ...]:

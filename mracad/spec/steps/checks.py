@@ -12,7 +12,7 @@ from mracad.spec.steps.base import Options
 
 
 class Check(Options, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Check validity and continuity; a failure stops a recipe, and gives exit code 1."""
+    """Check validity and continuity; a failure stops a recipe, with exit code 1."""
 
     function: ClassVar[str] = "mracad.job.check:check"
 
@@ -45,16 +45,16 @@ class Check(Options, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
 
 class Compare(Options, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Compare with a reference; a difference beyond its limit stops a recipe, and gives exit code 1."""
+    """Compare with a reference; a difference beyond its limit stops a recipe, with exit code 1."""
 
     function: ClassVar[str] = "mracad.job.compare:compare"
 
-    reference: Annotated[
-        File | None, Meta(description="File to compare with; by default the model as it came into the recipe.")
-    ] = None
+    reference: Annotated[File | None, Meta(description="File to compare with; by default the input of the recipe.")] = (
+        None
+    )
     reference_unit: Annotated[
         str | None,
-        Meta(description="Length unit of the reference, if it states a wrong one: mm, m, in …"),
+        Meta(description="Length unit of the reference, if it states the wrong one: mm, m, in …"),
     ] = None
     max_deviation: Annotated[
         Length, Meta(description="Largest distance between matched faces and between their outlines.")

@@ -1,4 +1,4 @@
-"""Options of edits that carry a feature or the detail of a face."""
+"""Options of edits that copy a feature or the detail of a face."""
 
 from __future__ import annotations
 
@@ -23,20 +23,20 @@ _Feature = Annotated[
 
 
 class Featured(Selection, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What it takes to tell a feature from its surroundings."""
+    """Options that separate a feature from its surroundings."""
 
     taper: Annotated[
         Length | None,
         Meta(
-            description="Width (a length) over which a window fades out beyond its rim. Default: a quarter of its "
+            description="Width over which the feature fades out beyond its window. Default: a quarter of the window's "
             "radius, or of the shorter side of a rectangle."
         ),
     ] = None
     base: Annotated[
         Literal["surroundings", "level"],
         Meta(
-            description="What the feature is measured from: surroundings, a thin plate fitted to what lies around "
-            "the window; level, the face without its --band."
+            description="What the feature is measured from: surroundings is a thin plate fitted around the window; "
+            "level is the face without its --band."
         ),
     ] = "surroundings"
     band: Annotated[
@@ -67,7 +67,7 @@ class Extract(Featured, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
 
 class Copied(Featured, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What edits that lay copies of a feature share."""
+    """Options of edits that make copies of a feature."""
 
     edges: Annotated[
         Literal["frozen", "coupled"],
@@ -95,7 +95,7 @@ class Copied(Featured, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
 
 class Single(Copied, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What edits that lay copies of a feature of the model itself share."""
+    """Options of edits that copy a feature of the model itself."""
 
     feature: _Feature
 
@@ -111,7 +111,7 @@ class Move(Single, frozen=True, kw_only=True, forbid_unknown_fields=True):
         super().__post_init__()
         if self.feature.endswith(".feature"):
             message = f"feature: a file cannot be moved: {self.feature}"
-            raise UsageError(message, "lay copies of it with mracad repeat", "feature")
+            raise UsageError(message, "copy it with mracad repeat", "feature")
 
     @property
     def done(self) -> str:
@@ -191,7 +191,7 @@ class Transfer(Copied, frozen=True, kw_only=True, forbid_unknown_fields=True):
     mode: Annotated[
         str,
         Meta(
-            description="How the detail of a face is applied: add it, replace the face's own detail in the band, or "
+            description="How the detail of a face is applied: add it; replace the face's own detail in the band; or "
             "blend=0.3 for a mix with 30% of it."
         ),
     ] = "add"
@@ -207,7 +207,7 @@ class Transfer(Copied, frozen=True, kw_only=True, forbid_unknown_fields=True):
         self.share()
 
     def share(self) -> tuple[float, float]:
-        """How much of the face's own detail stays, and how much of the other's comes."""
+        """Shares of the face's own detail that is kept, and of the other face's detail that is added."""
         if self.mode in ("add", "replace"):
             return (1.0, 1.0) if self.mode == "add" else (0.0, 1.0)
         match = re.fullmatch(r"blend=(\d+\.?\d*|\.\d+)", self.mode)
@@ -220,7 +220,7 @@ class Transfer(Copied, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
     @property
     def done(self) -> str:
-        return "edited with detail of another"
+        return "edited with the detail of another face"
 
     @property
     def quiet(self) -> str:

@@ -13,7 +13,7 @@ from mracad.spec.steps.base import Selection
 
 
 class Fitting(Selection, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """How an edit that changes whole faces goes about it."""
+    """Options of edits that change whole faces."""
 
     fit_g1: Annotated[
         Annotated[Angle, Meta(ge=0.0, le=45.0)] | None,
@@ -33,13 +33,13 @@ class Fitting(Selection, frozen=True, kw_only=True, forbid_unknown_fields=True):
     refine: Annotated[
         Literal["auto", "never"],
         Meta(
-            description="Where a face has too few control points for the edit: auto inserts knots, without changing "
-            "the face's shape; never uses only its own."
+            description="Where a face has too few control points for the edit: auto inserts knots, which does not "
+            "change its shape; never keeps its knots."
         ),
     ] = "auto"
     amount: Annotated[
         float,
-        Meta(description="How much of the edit to apply: 1 is all of it, 0 none.", ge=0.0, le=1.0),
+        Meta(description="How much of the edit to apply: 1 all of it, 0 none.", ge=0.0, le=1.0),
     ] = 1.0
     max_deviation: Annotated[
         Length | None,
@@ -48,7 +48,7 @@ class Fitting(Selection, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
 
 class Fairing(Fitting, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """How an edit that makes faces fairer goes about it."""
+    """Options of edits that make faces fairer."""
 
     edges: Annotated[
         Literal["coupled", "slide", "frozen"],
@@ -62,19 +62,19 @@ class Fairing(Fitting, frozen=True, kw_only=True, forbid_unknown_fields=True):
     free_edges: Annotated[
         Literal["hold", "smooth"],
         Meta(
-            description="Edges of one face alone: hold, they stay; smooth, they move with their face, but for the "
-            "corners between two of them."
+            description="Edges of only one face: hold keeps them in place; smooth moves them with their face, except "
+            "the corners between two of them."
         ),
     ] = "hold"
     corners: Annotated[
         Literal["hold", "move"],
-        Meta(description="Corners between two free edges that move: hold, they stay; move, they move along."),
+        Meta(description="Corners between two free edges that move: hold keeps them in place; move moves them too."),
     ] = "hold"
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.corners == "move" and self.free_edges == "hold":
-            raise UsageError("corners: they stay where free edges do", "add --free-edges smooth", "corners")
+            raise UsageError("corners: they cannot move while free edges stay", "add --free-edges smooth", "corners")
 
 
 class Smooth(Fairing, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -92,30 +92,27 @@ class Smooth(Fairing, frozen=True, kw_only=True, forbid_unknown_fields=True):
     across: Annotated[
         Length | None,
         Meta(
-            description="Scale across the direction of --along: --scale then counts along it. Waves along a blade go, "
-            "its profile stays."
+            description="Scale across the direction of --along; --scale then counts along it. For example, to remove "
+            "waves along a blade and keep its profile."
         ),
     ] = None
     along: Annotated[
         Annotated[str, places.heading] | None,
         Meta(
-            description="Direction in which --scale counts, with --across: X, Y, Z, edge#4, or the face's u or v. "
-            "Default: the one in which each face is longer."
+            description="Direction of --scale, with --across: X, Y, Z, edge#4, or the face's u or v. Default: the "
+            "direction in which each face is longer."
         ),
     ] = None
     limit_by_curvature: Annotated[
         bool,
         Meta(
-            description="Where a face bends with a radius too small for the scale (noses, fillets), the wavelength "
-            "follows the radius, and the round stays."
+            description="Use shorter wavelengths where a face bends with a radius too small for the scale, so that "
+            "noses and fillets stay."
         ),
     ] = True
     level: Annotated[
         Annotated[float, Meta(gt=0.0)] | None,
-        Meta(
-            description="Instead of --scale: how many levels of the face's own knot ladder to remove, 2.5 for two "
-            "and a half."
-        ),
+        Meta(description="Instead of --scale: how many levels of the face's own knot ladder to remove, such as 2.5."),
     ] = None
 
     @property
@@ -152,40 +149,40 @@ class Smooth(Fairing, frozen=True, kw_only=True, forbid_unknown_fields=True):
         """Raise UsageError where the options leave no scale to be found."""
         if self.max_deviation is None:
             hint = "give --scale 5mm, --scale 2%, --level 2.5 or --max-deviation 0.2mm"
-            raise UsageError("smooth needs a scale, a level or a bound of the deviation", hint)
+            raise UsageError("smooth needs a scale, a level or a limit of the deviation", hint)
         if self.amount < 1.0:
-            raise UsageError("amount: a bound alone is reached by the scale", "leave it out, or give --scale", "amount")
+            raise UsageError("amount: it needs a scale or a level", "leave it out, or give --scale", "amount")
 
 
 class Denoise(Fairing, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Take the noise from the NURBS faces of a model and leave their shape: no scale to choose."""
+    """Remove noise from the NURBS faces of a model and keep their shape, with no scale to choose."""
 
     function: ClassVar[str] = "mracad.edit.denoise:denoise"
 
     noise: Annotated[
         Length | None,
         Meta(
-            description="Standard deviation of each coordinate of the control points (a length); by default it is "
-            "measured, face by face."
+            description="Standard deviation of each coordinate of the control points; by default it is measured for "
+            "each face."
         ),
     ] = None
     method: Annotated[
         Literal["wiener", "spline"],
         Meta(
-            description="wiener: shrink details in wavelet space about a smoothing spline, or take the spline alone "
-            "where that is expected to be nearer; spline: a smoothing spline, its wavelengths by cross-validation."
+            description="wiener shrinks details in wavelet space about a smoothing spline, or takes the spline alone "
+            "where it is expected to be more accurate; spline takes one with wavelengths found by cross-validation."
         ),
     ] = "wiener"
     strength: Annotated[
         float,
-        Meta(description="What the noise counts for, times what it is: above 1 more is taken.", gt=0.0, le=10.0),
+        Meta(description="Factor on the noise: above 1, more is removed.", gt=0.0, le=10.0),
     ] = 1.0
 
     outliers: Annotated[
         Annotated[Share, Meta(ge=0.0, le=10.0)],
         Meta(
-            description="Share of the control points that may be wrong (0.5%): those farther off than noise explains "
-            "go where the others put them."
+            description="Largest share of control points to treat as wrong, such as 0.5%: those too far off for noise "
+            "are replaced by what the others suggest."
         ),
     ] = 0.0
 
@@ -203,7 +200,7 @@ class OffsetFaces(Fitting, frozen=True, kw_only=True, forbid_unknown_fields=True
 
     function: ClassVar[str] = "mracad.edit.offset:offset"
 
-    distance: Annotated[Length, Meta(description="How far outward (a length).")]
+    distance: Annotated[Length, Meta(description="How far to move, outward.")]
     edges: Annotated[
         Literal["coupled", "frozen"],
         Meta(
@@ -211,7 +208,7 @@ class OffsetFaces(Fitting, frozen=True, kw_only=True, forbid_unknown_fields=True
             "frozen keeps them in place."
         ),
     ] = "coupled"
-    inward: Annotated[bool, Meta(description="Move them inward instead.")] = False
+    inward: Annotated[bool, Meta(description="Move inward instead.")] = False
 
     @property
     def done(self) -> str:

@@ -294,9 +294,9 @@ def test_holes_and_edges_refuse_copies_or_take_their_part(feature, tmp_path, cap
 
 
 ERRORS = [
-    (["--at", "60,50,60"], 4, "place 1 (60,50,60) is 60 mm off"),
-    (["--at", "110,50,0"], 4, "place 1 (110,50,0) is 10 mm off"),
-    (["--at", "#1@500,2"], 4, "place 1 (#1@500,2) is off the face"),
+    (["--at", "60,50,60"], 4, "place 1 (60,50,60) is 60 mm away from the faces"),
+    (["--at", "110,50,0"], 4, "place 1 (110,50,0) is 10 mm away from the faces"),
+    (["--at", "#1@500,2"], 4, "place 1 (#1@500,2) is outside the face"),
     (["--at", "#4@1,2"], 2, "place 1 (#4@1,2): '#4'"),
     (["--at", "1,2"], 2, "at: '1,2' is not a place"),
     (["--at", "95,50,0"], 4, "place 1 (95,50,0): edges or holes"),
