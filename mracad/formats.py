@@ -1,4 +1,4 @@
-"""File formats by name, ending and first bytes; ``mracad.occ`` and ``mracad.mesh`` read and write them."""
+"""File formats by name, file extension and first bytes; ``mracad.occ`` and ``mracad.mesh`` read and write them."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ class Format:
     ----------
     name : str
         As ``--format`` takes it.
-    endings : tuple of str
+    extensions : tuple of str
         In lower case, with the dot; the first is the usual one.
     kind : {"exact", "mesh"}
         Exact formats are read and written, meshes only written.
     """
 
     name: str
-    endings: tuple[str, ...]
+    extensions: tuple[str, ...]
     kind: Kind
 
 
@@ -47,18 +47,20 @@ FORMATS = {
     )
 }
 
-READABLE = frozenset(ending for format in FORMATS.values() if format.kind == "exact" for ending in format.endings)
+READABLE = frozenset(
+    extension for format in FORMATS.values() if format.kind == "exact" for extension in format.extensions
+)
 """File extensions that can be read."""
 
 
-def by_ending(path: str | os.PathLike[str]) -> Format:
+def by_extension(path: str | os.PathLike[str]) -> Format:
     """The format for the extension of a file name; raises FileError."""
-    ending = PurePath(path).suffix.lower()
+    extension = PurePath(path).suffix.lower()
     for format in FORMATS.values():
-        if ending in format.endings:
+        if extension in format.extensions:
             return format
-    known = " ".join(format.endings[0] for format in FORMATS.values())
-    raise FileError(f"cannot write {path}: unknown ending {ending!r}", f"end it in one of {known}")
+    known = " ".join(format.extensions[0] for format in FORMATS.values())
+    raise FileError(f"cannot write {path}: unknown extension {extension!r}", f"use one of {known}")
 
 
 def by_content(data: bytes, name: str) -> Format:

@@ -230,7 +230,7 @@ writing = gathered(
         metavar="OUT",
         multiple=True,
         type=click.Path(allow_dash=True),
-        help=f"File to write; its extension gives the format ({' '.join(f.endings[0] for f in FORMATS.values())}); "
+        help=f"File to write; its extension gives the format ({' '.join(f.extensions[0] for f in FORMATS.values())}); "
         "repeatable; - for standard output.",
     ),
     click.option(

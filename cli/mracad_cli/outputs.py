@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from mracad import note
 from mracad.errors import FileError, UsageError
-from mracad.formats import FORMATS, by_ending
+from mracad.formats import FORMATS, by_extension
 from mracad_cli.options import Reading, Reports, Writing
 from mracad_cli.say import json_text, say
 
@@ -57,7 +57,7 @@ def check_outputs(writing: Writing, beside: Iterable[str | None] = (), *, needed
         raise UsageError("no output is named", "name a file with -o OUT.step, or - for standard output")
     if paths.count("-") > 1:
         raise UsageError("- is named twice", "give each -o once")
-    formats = {path: FORMATS[writing.format] if path == "-" else by_ending(path) for path in paths}
+    formats = {path: FORMATS[writing.format] if path == "-" else by_extension(path) for path in paths}
     files = [path for path in paths if path != "-"]
     check_reports(*files, *beside, overwrite=writing.overwrite or writing.if_changed)
     how = (writing.schema or "").upper(), writing.chord, writing.angle, writing.ascii_stl

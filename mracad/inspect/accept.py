@@ -219,8 +219,7 @@ def _same(memory: _File, one: int, file: _File, other: int, room: Callable[[Line
 def _bodies(memory: _File, file: _File) -> Iterator[Fault]:
     """Faces that are lost or replaced, and the volume and box of everything.
 
-    A face is the same if no edge moved farther than its tolerance, unless its edges do not tell on which side of them
-    it lies.
+    A face is the same if no edge moved farther than its tolerance and the edges tell on which side of them it is.
     """
     old, new = memory.facts, file.facts
     changed = {face for pair in _changed(memory, file, lambda edge: max(edge.tolerance, SLACK)) for face in pair}
@@ -240,9 +239,7 @@ def _bodies(memory: _File, file: _File) -> Iterator[Fault]:
             others.append(Fault(FaultKind.AREA, (face,), value, was))
     yield from others
     solids = old.counts.solids and new.counts.solids
-    if solids and (
-        lost or old.counts.solids != new.counts.solids
-    ):  # exact volumes are slow, and tell nothing new otherwise
+    if solids and (lost or old.counts.solids != new.counts.solids):  # exact volumes are slow, and not needed otherwise
         value, was = new.probe.volume(), old.probe.volume()
         if abs(value - was) > SAME * abs(was):
             yield Fault(FaultKind.VOLUME, tuple(lost), value, was)

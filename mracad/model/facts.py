@@ -272,7 +272,7 @@ class Facts:
     vertices : ndarray (f,)
         The largest tolerance among the vertices of each face, mm.
     edges : tuple of Line
-        All edges, without degenerate ones.
+        All edges; degenerate ones without samples or faces.
     probe : Probe
     """
 

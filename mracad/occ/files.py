@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from mracad.errors import EditError, FileError, UsageError
-from mracad.formats import FORMATS, by_content, by_ending
+from mracad.formats import FORMATS, by_content, by_extension
 from mracad.occ.document import Document, named_labels, nested_colours
 from mracad.occ.labels import label_name
 from mracad.occ.literals import known
@@ -160,7 +160,7 @@ def write(document: Document, target: str | os.PathLike | BinaryIO, format: str 
     """
     wanted, name = FileOptions(**how), document.name
     if isinstance(target, str | os.PathLike):
-        format, name = format or by_ending(target).name, Path(target).name
+        format, name = format or by_extension(target).name, Path(target).name
     format = format or "step"
     if format not in FORMATS:
         raise UsageError(f"unknown format '{format}'", "use one of " + ", ".join(FORMATS))

@@ -229,10 +229,8 @@ class Divided:
             x[points] = factor(x[points])
 
     def _met(self, owed: Array, size: float, right: Array | None = None) -> Array:
-        """A correction by which a displacement of some ``size`` meets the conditions.
-
-        ``owed`` is what they still miss; the form times the correction is subtracted from ``right``.
-        """
+        """The correction of a displacement of some ``size`` that still misses conditions by ``owed``; the form times it
+        is subtracted from ``right``."""
         found = np.zeros((self.size, owed.shape[1]))
         for _ in range(MOST):
             if np.abs(owed).max(initial=0.0) <= MET * max(size, np.abs(found).max(initial=0.0)):

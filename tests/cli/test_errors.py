@@ -51,7 +51,7 @@ def test_a_missing_file_and_a_directory(mracad, tmp_path):
         (["--scale", "1e999"], 2, "not a length"),
         (["--scale", "5 bananas"], 2, "not a length"),
         (["--level", "nan"], 2, "level"),
-        ([], 2, "scale, a level or a bound"),
+        ([], 2, "scale, a level or a limit"),
         (["--scale", "5mm", "--level", "2"], 2, "scale or a level"),
         (["--scale", "5mm", "--amount", "nan"], 2, "amount"),
         (["--scale", "5mm", "--amount", "2"], 2, "amount"),
@@ -144,7 +144,7 @@ def test_nothing_is_written_when_nobody_reads_the_result(samples, tmp_path):
     command = [sys.executable, "-m", "mracad_cli", *words]
     result = subprocess.run(command, stdout=writer, stderr=subprocess.PIPE, text=True, cwd=tmp_path)
     os.close(writer)
-    assert result.returncode == 3 and "went away" in result.stderr and not list(tmp_path.iterdir())
+    assert result.returncode == 3 and "standard output was closed" in result.stderr and not list(tmp_path.iterdir())
 
 
 def test_two_files_of_one_name(mracad, samples, tmp_path):

@@ -143,7 +143,7 @@ def test_an_edit_that_fails_for_a_face_that_had_to_stay_says_so(monkeypatch):
     monkeypatch.setattr(job, "torn", first_edited([1]))
     with pytest.raises(EditError, match="#2 cannot be edited: its seams would not hold; choose other faces"):
         job.run(chains(3), edit, Smooth(level=1))
-    with pytest.raises(EditError, match="off the faces to edit"):
+    with pytest.raises(EditError, match="not on the faces to edit"):
         job.run(chains(3), edit, Smooth(level=1, faces=("#1",)))
 
 

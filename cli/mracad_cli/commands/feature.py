@@ -61,7 +61,7 @@ def extract(reading: Reading, chosen: Extract, output: str, overwrite: bool, as_
 
     path = Path(output)
     if path.suffix != ".feature":
-        raise UsageError(f"cannot write {path}: unknown ending {path.suffix!r}", "end it in .feature")
+        raise UsageError(f"cannot write {path}: unknown extension {path.suffix!r}", "use .feature")
     check_target(path, overwrite)
     model, scope = looked_at(read(reading), chosen)
     found = feature_of(model, chosen, scope.chosen, chosen.feature)

@@ -41,18 +41,14 @@ def _powers(degree: int) -> tuple[Array, Array]:
     return i, j
 
 
-def monomials(a: Array, b: Array, degree: int, order: tuple[int, int] = (0, 0)) -> Array:
-    """Monomials ``(…, terms)`` at points, or a derivative of them."""
-    i, j = _powers(degree)
+def monomials(a: Array, b: Array, degree: int) -> Array:
+    """Monomials ``(…, terms)`` at points, by total degree."""
     tables = []
-    for x, power, r in ((a, i, order[0]), (b, j, order[1])):
+    for x, power in zip((a, b), _powers(degree), strict=True):
         table = np.ones((degree + 1, *np.shape(x)))
         for k in range(1, degree + 1):
             table[k] = table[k - 1] * x
-        factor = np.ones(len(power))
-        for k in range(r):
-            factor = factor * np.maximum(power - k, 0)
-        tables.append(np.moveaxis(table[np.maximum(power - r, 0)], 0, -1) * factor)
+        tables.append(np.moveaxis(table[power], 0, -1))
     return np.asarray(tables[0] * tables[1])
 
 

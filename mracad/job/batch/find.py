@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from mracad.errors import FileError, UsageError
-from mracad.formats import FORMATS, READABLE, by_ending
+from mracad.formats import FORMATS, READABLE, by_extension
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class Item:
 def find(words: Iterable[str], folder: Path, format: str = "") -> list[Item]:
     """The files of a batch from paths, folders (all models below them) and patterns.
 
-    Outputs have the names of their inputs, with the ending of ``format`` if one is given.  Files of a folder keep their
+    Outputs have the names of their inputs, with the extension of ``format`` if given.  Files of a folder keep their
     place below it; files of a pattern keep their place below the folder before its first wildcard.  Hidden files and
     the output folder are left out.
 
@@ -40,7 +40,7 @@ def find(words: Iterable[str], folder: Path, format: str = "") -> list[Item]:
     for word in words:
         for source, output in _expanded(word, own):
             if format:
-                output = str(Path(output).with_suffix(FORMATS[format].endings[0]))
+                output = str(Path(output).with_suffix(FORMATS[format].extensions[0]))
             other = found.setdefault(output, source)
             if Path(other).resolve() != Path(source).resolve():
                 raise UsageError(
@@ -55,8 +55,8 @@ def find(words: Iterable[str], folder: Path, format: str = "") -> list[Item]:
 
 
 def _format(output: str) -> str:
-    """The format in which a file is written: that of its input by its ending, else STEP."""
-    return by_ending(output).name if Path(output).suffix.lower() in READABLE else "step"
+    """The format in which a file is written: that of its input by its extension, else STEP."""
+    return by_extension(output).name if Path(output).suffix.lower() in READABLE else "step"
 
 
 def _expanded(word: str, own: Path) -> list[tuple[str, str]]:
@@ -78,5 +78,5 @@ def _expanded(word: str, own: Path) -> list[tuple[str, str]]:
         and not path.is_dir()
     ]
     if not pairs:
-        raise FileError(f"no models in '{word}'", f"they end in {', '.join(sorted(READABLE))}")
+        raise FileError(f"no models in '{word}'", f"models end in {', '.join(sorted(READABLE))}")
     return pairs

@@ -141,7 +141,7 @@ def test_a_failed_check_is_a_failure_and_writes_nothing(tmp_path):
     folder = models(tmp_path / "in", 1)
     path = recipe(tmp_path, '[[step]]\nuse = "check"\nfail-on = ["free-edges"]\n')
     code, out, _ = batch(path, folder, "-O", tmp_path / "out", "--junit", tmp_path / "j.xml")
-    assert code == 1 and "check: edge#1 of #1 is free (and 3 more)" in out
+    assert code == 1 and "check: edge#1 of #1 is a free edge (and 3 more)" in out
     assert outputs(tmp_path / "out") == {}
     assert ElementTree.parse(tmp_path / "j.xml").find(".//failure") is not None
 
