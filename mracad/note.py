@@ -35,8 +35,8 @@ class Note:
 _note: Note | None = None  # of this process, when it is a child
 
 
-def noting(note: Note) -> None:
-    """Let :func:`doing` write to a note, as in a child."""
+def set_note(note: Note) -> None:
+    """Make :func:`doing` write to a note, as in a child process."""
     global _note
     _note = note
 

@@ -45,7 +45,7 @@ PRICE = 0.05
 CANDIDATES = 3
 """Largest number of displacements that are judged closely after a first look."""
 
-BLENDS, PROMISE = 2, 1.05
+BLENDS, NEARER = 2, 1.05
 """How often the best displacements of joined surfaces are combined at most, and the factor by which the combination, or
 the result of each alone, has to come nearer to the target."""
 
@@ -60,7 +60,7 @@ def drive(scene: Scene, wish: Wish, progress: Callable[[int, int], None] | None 
         tell(len(result), len(scene.sheets))
         alone, tried = _alone(scene, wish, group)
         result |= alone
-        able = [i for i in group if i not in alone or alone[i].amount >= LEAST or alone[i].hindered]
+        able = [i for i in group if i not in alone or alone[i].amount >= LEAST or alone[i].held_back]
         for members in groups(able, scene.joints.among(able)):
             for part, joined in _together(scene, wish, members, alone, tried):
                 exact += [seam for seam in joined.exact if seam.a.surface != seam.b.surface]
@@ -129,7 +129,7 @@ def _less(together: Mapping[int, Moved], alone: Mapping[int, Moved]) -> bool:
     """
     every = next(iter(together.values()))
     gain, wanted = (sum(getattr(alone[i], name) for i in together if i in alone) for name in ("gain", "wanted"))
-    return bool(PROMISE * every.gain * wanted < gain * every.wanted)
+    return bool(NEARER * every.gain * wanted < gain * every.wanted)
 
 
 def _together(
@@ -247,8 +247,8 @@ def _tried(
     if trial.pose.share is not None:
         target = trial.pose.share * target
     wished = sum(trial.problem.gains(target, target, [1.0] * len(members)))
-    found, promising = [trial.nothing(least * wished)], trial.most(target) > least * wished
-    for batch in wish.ways(trial.problem, target, trial.width) if promising else ():
+    found, possible = [trial.nothing(least * wished)], trial.most(target) > least * wished
+    for batch in wish.ways(trial.problem, target, trial.width) if possible else ():
         first = len(found)
         for wanted in batch:
             found.append(trial.judged(trial.pose.faded(wanted), target, found))
@@ -260,7 +260,7 @@ def _tried(
     for _ in range(BLENDS if len(found) > 1 and len(members) > 1 else 0):
         chosen = [(max(found, key=lambda each: each.gains[i]), i) for i in range(len(members))]
         now = max(found, key=rank)
-        if sum(each.gains[i] for each, i in chosen) <= PROMISE * now.gain:
+        if sum(each.gains[i] for each, i in chosen) <= NEARER * now.gain:
             break
         found.append(trial.blended(chosen, target, found))
         if max(found, key=rank) is now:
@@ -272,7 +272,8 @@ def _explained(trial: Trial, moved: dict[int, Moved], target: Array) -> dict[int
     """Results, with what prevents more."""
     if len(moved) == 1 and target.any():
         moved = {
-            i: replace(each, hindered=each.amount < LEAST and trial.unhindered(target)) for i, each in moved.items()
+            i: replace(each, held_back=each.amount < LEAST and trial.allowed_unheld(target))
+            for i, each in moved.items()
         }
     if any(each.amount for each in moved.values()) or not trial.tolerances.fairer:
         return moved

@@ -45,7 +45,7 @@ class Moved:
         Whether the wanted change would reduce its roughness at all.
     sliding : bool
         Whether its edges slide.
-    hindered : bool
+    held_back : bool
         Whether only its held rims prevent the wanted change: together with others it may do more.
     """
 
@@ -59,7 +59,7 @@ class Moved:
     wanted: float = 0.0
     rough: bool = True
     sliding: bool = False
-    hindered: bool = False
+    held_back: bool = False
 
     @classmethod
     def whole(cls, sheet: Sheet, net: Net, offset: Array, free: int, amount: float = 1.0) -> Moved:

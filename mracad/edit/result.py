@@ -31,7 +31,7 @@ class Reason(Enum):
     ASKEW = "its parameter lines do not follow the direction"
     RIM = "cannot get fairer with its edges held"
     ROUGHER = "would get rougher"
-    SPOILED = "would come out worse"
+    WORSE = "would come out worse"
     HELD = "held"
     UNSELECTED = "not selected"
     ANALYTIC = "not a NURBS face"
@@ -105,7 +105,7 @@ class Edit:
         return [outcome for outcome in self.outcomes if outcome.status in status]
 
 
-def spared(face: Face, scope: Scope, movable: Collection[int]) -> FaceOutcome | None:
+def untouched(face: Face, scope: Scope, movable: Collection[int]) -> FaceOutcome | None:
     """The outcome for a face that the edit must not touch; None if it may."""
     if face.surface is None:
         return FaceOutcome(face.index, "analytic", Reason.ANALYTIC, face.kind)

@@ -99,7 +99,7 @@ def _between(breaks: Array) -> list[Array]:
     return [breaks[:-1] + part * np.diff(breaks) for part in (0.2, 0.5, 0.8)]
 
 
-def unslid(model: Model, edge: int) -> Cause:
+def cannot_slide(model: Model, edge: int) -> Cause:
     """Why an edge that could not slide stays."""
     kinds = [model.faces[side.face].kind for side in model.edges[edge].sides]
     return Cause(Still.UNSLID, next((kind for kind in kinds if kind not in NURBS), kinds[0]))

@@ -165,7 +165,7 @@ class Trial:
         found = self.watch.changes({i: displaced(space.net, part) for i, (space, part) in enumerate(both)})
         return [any(better(change, GAIN[0]) for change in faces.values()) for faces in found.values()]
 
-    def unhindered(self, target: Array) -> bool:
+    def allowed_unheld(self, target: Array) -> bool:
         """Whether the judge would allow a whole target if nothing were held."""
         every = Tried(self.watch, self.nets, self._split(target)).changes(dict.fromkeys(range(len(self.nets)), 1.0))
         return not any(worse(change, self.tolerances.growth) for faces in every.values() for change in faces.values())

@@ -9,8 +9,8 @@ from dataclasses import replace
 from mracad.edit.fair import faired
 from mracad.edit.moved import Moved, Result
 from mracad.edit.pose import Scene
-from mracad.edit.result import Edit, FaceOutcome, Reason, Status, spared
-from mracad.edit.slid import settled, unslid
+from mracad.edit.result import Edit, FaceOutcome, Reason, Status, untouched
+from mracad.edit.slid import cannot_slide, settled
 from mracad.edit.target import Wish
 from mracad.edit.tolerances import tolerances
 from mracad.inspect.roughness import Worse
@@ -50,7 +50,7 @@ def edited(
     movable = {i for i in scope.chosen if model.faces[i].surface is not None}
     allowed = tolerances(model, options)
     wishes = wished(model, options, scope)
-    lost = {edge: unslid(model, edge) for edge in scope.firm}
+    lost = {edge: cannot_slide(model, edge) for edge in scope.firm}
     for left in range(ROUNDS, -1, -1):
         result = faired(
             model,
@@ -67,7 +67,7 @@ def edited(
         if not failed:
             break
         every_one = (slide.edge for slide in result.joints.slides)
-        lost |= {edge: unslid(model, edge) for edge in (failed if left > 1 else every_one)}
+        lost |= {edge: cannot_slide(model, edge) for edge in (failed if left > 1 else every_one)}
     outcomes = tuple(_outcome(face, result, movable, scope, options) for face in model.faces)
     return Edit(result.displacement(), outcomes, edges=treatments(model, movable, result, options, lost))
 
@@ -102,7 +102,7 @@ def wished(model: Model, options: Fitting, scope: Scope) -> Wishes:
 
 def _outcome(face: Face, result: Result, movable: Collection[int], scope: Scope, options: Fitting) -> FaceOutcome:
     """The outcome for one face."""
-    outcome = spared(face, scope, movable)
+    outcome = untouched(face, scope, movable)
     if outcome:
         return outcome
     assert face.surface is not None

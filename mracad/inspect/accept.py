@@ -339,7 +339,7 @@ def match(document: Facts, file: Facts, parts: Collection[int] = ()) -> dict[int
     return partners
 
 
-def spoilt(faults: Iterable[Fault], edited: Collection[int], memory: Facts) -> set[int]:
+def blamed(faults: Iterable[Fault], edited: Collection[int], memory: Facts) -> set[int]:
     """The edited faces blamed for faults: those that they name, else their neighbours, else all."""
     named = {face for fault in faults for face in fault.faces}
     own = named & set(edited)

@@ -77,7 +77,7 @@ def unmended(
     if options.close_gaps:
         none = Mending("close-gaps", length(options.gap_tolerance, diagonal, "gap-tolerance"), math.inf)
         gaps = [_Defect(m.edge, m.gap, n.gap, m.mean_gap, n.mean_gap) for m, n in pairs if m.gap > none.least]
-        found.append(_became(none, gaps, max((m.gap for m, _ in pairs), default=0.0)))
+        found.append(_result(none, gaps, max((m.gap for m, _ in pairs), default=0.0)))
     if options.fit_g1 is not None:
         none = Mending("fit-g1", TANGENT, options.fit_g1)
         bent = [
@@ -85,7 +85,7 @@ def unmended(
             for m, n in pairs
             if none.least < m.angle <= none.most
         ]
-        found.append(_became(none, bent, min((m.angle for m, _ in pairs if m.angle > none.most), default=None)))
+        found.append(_result(none, bent, min((m.angle for m, _ in pairs if m.angle > none.most), default=None)))
     return tuple(filter(None, found))
 
 
@@ -100,7 +100,7 @@ class _Defect:
     mean_after: float
 
 
-def _became(none: Mending, defects: Sequence[_Defect], other: float | None) -> Mending | None:
+def _result(none: Mending, defects: Sequence[_Defect], other: float | None) -> Mending | None:
     """The result for defects; None if all are mended; with ``next`` set to ``other`` if there were none."""
     if not defects:
         return replace(none, next=other)

@@ -145,7 +145,7 @@ def _layered(
     why = "not written yet" if text is None else "only STEP files are looked at as parsed"
     measures = seams(model, every=True)
     flipped = layers.turned(file.uses) if file else set()
-    told = _told(file, document, model.diagonal) if file else {}
+    told = _matched(file, document, model.diagonal) if file else {}
     known = {told[face] for face in flipped if face in told}
     senses = file.senses if file else ()
     inward = {face for place, face in told.items() if senses[place] == model.faces[face].reversed} - known
@@ -169,7 +169,7 @@ def _layered(
     return Verdict(name, tuple(found), _valid(found, validity.solids))
 
 
-def _told(file: Stated, document: Document, diagonal: float) -> dict[int, int]:
+def _matched(file: Stated, document: Document, diagonal: float) -> dict[int, int]:
     """For each face of the file, its index in the document, matched by vertices."""
     from scipy.spatial import cKDTree
 

@@ -20,7 +20,7 @@ from mracad.inspect.deviation import Deviation, deviations
 from mracad.inspect.mended import Mending, unmended
 from mracad.inspect.seams import SeamMeasure, key, remeasured, seams
 from mracad.job.judge import Judged, Original
-from mracad.job.left import Left, Spoilt
+from mracad.job.left import Excluded, Left
 from mracad.job.words import numbers
 from mracad.model.brep import Model
 from mracad.spec.steps import Fitting, Selection
@@ -90,7 +90,7 @@ def play(
     original: Original | None = None,
     progress: Progress | None = None,
     apply: bool = True,
-    spoiled: Mapping[int, Spoilt] = MappingProxyType({}),
+    excluded: Mapping[int, Excluded] = MappingProxyType({}),
     firm: Collection[int] = (),
 ) -> list[Report | Judged]:
     """Take a document through steps, in memory, up to the first check that fails.
@@ -104,7 +104,7 @@ def play(
         Reads the document again as it was before any step, for comparisons.
     apply : bool
         False for a dry run, after which the document must not be written: the last step is not put into it.
-    spoiled : mapping
+    excluded : mapping
         Faces that no edit may change, and why.
     firm : collection of int
         Edges that must not slide.
@@ -126,7 +126,7 @@ def play(
         result: Report | Judged
         if isinstance(step.options, Selection):
             put = apply or step is not steps[-1]
-            result = run(document, function, step.options, progress=progress, apply=put, spoiled=spoiled, firm=firm)
+            result = run(document, function, step.options, progress=progress, apply=put, excluded=excluded, firm=firm)
         else:
             tell(progress, step.use)
             result = function(document, step.options, original)
@@ -143,7 +143,7 @@ def run(
     *,
     progress: Progress | None = None,
     apply: bool = True,
-    spoiled: Mapping[int, Spoilt] = MappingProxyType({}),
+    excluded: Mapping[int, Excluded] = MappingProxyType({}),
     firm: Collection[int] = (),
 ) -> Report:
     """Edit a document in memory.
@@ -158,7 +158,7 @@ def run(
         Options of the edit, including its selectors.
     apply : bool
         False for a dry run.
-    spoiled : mapping
+    excluded : mapping
         Faces that the edit may not change, and why.
     firm : collection of int
         Edges that must not slide.
@@ -181,7 +181,7 @@ def run(
     others = [view(read(file)) for file in options.models()]
     before: list[SeamMeasure] = []
     valid_before: Validity | None = None
-    left, allowed = Left(model.name, dict(spoiled), set(firm)), tolerances(model, options)
+    left, allowed = Left(model.name, dict(excluded), set(firm)), tolerances(model, options)
     while True:
         stage("editing")
         try:
@@ -205,7 +205,7 @@ def run(
             continue
         found = {i for i in found if model.faces[i].surface is not None} - left.faces.keys()
         if found:
-            left.leave(found, Spoilt.SEAMS, before, result)
+            left.leave(found, Excluded.SEAMS, before, result)
             continue
         if not (apply and offsets):
             break
@@ -213,7 +213,7 @@ def run(
         if not worse:
             break
         if not left.stopped(result.displacement.slid_at(model, worse)):
-            left.leave(worse, Spoilt.INVALID, before, result)
+            left.leave(worse, Excluded.INVALID, before, result)
     mended: tuple[Mending, ...] = ()
     if isinstance(options, Fitting):
         mended = unmended(options, model.diagonal, scope.chosen - left.faces.keys(), before, after)
@@ -276,14 +276,14 @@ def _refuse_if_asked(model: Model, result: Edit, named: Collection[int]) -> None
         )
 
 
-def _named(result: Edit, spoiled: Mapping[int, Spoilt]) -> Edit:
-    """The edit, with the reasons why ``spoiled`` faces stay unchanged."""
-    if not spoiled:
+def _named(result: Edit, excluded: Mapping[int, Excluded]) -> Edit:
+    """The edit, with the reasons why ``excluded`` faces stay unchanged."""
+    if not excluded:
         return result
     return replace(
         result,
         outcomes=tuple(
-            replace(o, status="left", reason=Reason.SPOILED, said=spoiled[o.face].value) if o.face in spoiled else o
+            replace(o, status="left", reason=Reason.WORSE, said=excluded[o.face].value) if o.face in excluded else o
             for o in result.outcomes
         ),
     )

@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 
 from mracad.errors import CrashError, LimitError, UsageError
 from mracad.job import wire
-from mracad.note import Note, noting
+from mracad.note import Note, set_note
 
 Result = TypeVar("Result")
 
@@ -63,7 +63,7 @@ def run(
     note = Note()
     child = os.fork()
     if not child:
-        noting(note)
+        set_note(note)
         _memory = memory
         os.close(reader)
         _child(work, writer, memory)
@@ -83,7 +83,7 @@ def run(
     if asked and not data.startswith(wire.DONE):
         _terminated()
     if data:
-        return wire.heard(data, returns)
+        return wire.unpacked(data, returns)
     if memory and _peak(usage.ru_maxrss) > 0.7 * memory:
         raise _out_of_memory(memory)
     number = os.WTERMSIG(status) if os.WIFSIGNALED(status) else 0

@@ -16,7 +16,7 @@ ROUNDS = 8
 to them are left too, and if that does not help the edit is refused."""
 
 
-class Spoilt(Enum):
+class Excluded(Enum):
     """Why an edit may not change a face: what would be worse."""
 
     SEAMS = "its seams would not hold"
@@ -35,11 +35,11 @@ class Left:
     """
 
     name: str
-    faces: dict[int, Spoilt]
+    faces: dict[int, Excluded]
     firm: set[int] = field(default_factory=set)
     rounds: int = 0
 
-    def leave(self, faces: set[int], reason: Spoilt, seams: Sequence[SeamMeasure], edit: Edit) -> None:
+    def leave(self, faces: set[int], reason: Excluded, seams: Sequence[SeamMeasure], edit: Edit) -> None:
         """Leave more faces, for a reason; after enough rounds also all edited faces that seams join to any of them."""
         self.rounds += 1
         if self.rounds > ROUNDS + 1:

@@ -16,7 +16,7 @@ from mracad.inspect.accept import Slack
 from mracad.inspect.faults import Fault, FaultKind, ReadBack
 from mracad.job.document import Progress, Report, play, tell
 from mracad.job.judge import Judged, Original
-from mracad.job.left import Spoilt
+from mracad.job.left import Excluded
 from mracad.job.words import of_fault
 from mracad.model.facts import Facts
 from mracad.spec.quantity import length
@@ -106,7 +106,7 @@ def produce(
     EditError
         When a step cannot be done, or a file would be worse whichever faces stay unchanged.
     """
-    spoiled: dict[int, Spoilt] = {}
+    excluded: dict[int, Excluded] = {}
     firm: set[int] = set()
     faults: tuple[tuple[Target, Fault], ...] = ()
     copies = _Copies(original)
@@ -115,7 +115,9 @@ def produce(
             document = original()
         try:
             put = bool(targets)
-            results = play(document, steps, original=original, progress=progress, apply=put, spoiled=spoiled, firm=firm)
+            results = play(
+                document, steps, original=original, progress=progress, apply=put, excluded=excluded, firm=firm
+            )
         except EditError as error:
             if faults:
                 raise _refused(document.name, faults) from error
@@ -136,11 +138,11 @@ def produce(
         if slid:
             firm |= slid
             continue
-        edited = memory.edited - spoiled.keys()
+        edited = memory.edited - excluded.keys()
         if not edited:
             break
-        left = accept.spoilt((fault for _, fault in faults), edited, memory.facts)
-        spoiled |= dict.fromkeys(left, Spoilt.FILE)
+        left = accept.blamed((fault for _, fault in faults), edited, memory.facts)
+        excluded |= dict.fromkeys(left, Excluded.FILE)
     raise _refused(document.name, faults)
 
 

@@ -56,7 +56,7 @@ def internal(error: BaseException) -> MracadError:
     return CrashError(f"internal error: {type(error).__name__}: {text}", "please report it with the output of --debug")
 
 
-def heard(data: bytes, kind: type[Value]) -> Value:
+def unpacked(data: bytes, kind: type[Value]) -> Value:
     """The result in a message of another process; an error in it is raised."""
     if data[:1] == DONE:
         return msgspec.msgpack.decode(data[1:], type=kind)

@@ -45,7 +45,7 @@ EVENLY = np.linspace(0.0, 1.0, 129)
 
 
 @dataclass(frozen=True, eq=False)
-class Sheetlike:
+class Freeform:
     """A NURBS face that stays, along which edges slide.
 
     Attributes
@@ -122,7 +122,7 @@ class Slide:
         The edge on the face that moves.
     border : (int, int) or None
         On a natural boundary, the axis across it and the end of the net (0, −1) on which it lies.
-    ground : Elementary or Sheetlike
+    ground : Elementary or Freeform
         The surface of the neighbour.
     pins : tuple of Pin
         Ends that do not just follow the faces.
@@ -134,7 +134,7 @@ class Slide:
     beside: int
     trace: Trace
     border: tuple[int, int] | None
-    ground: Elementary | Sheetlike
+    ground: Elementary | Freeform
     pins: tuple[Pin, ...]
     cause: Cause
 

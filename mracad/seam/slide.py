@@ -11,7 +11,7 @@ from mracad.bspline.vectors import cross
 from mracad.model.brep import Edge, Face, Model, Side, Trim
 from mracad.model.rails import Path
 from mracad.seam.cause import Cause, Still
-from mracad.seam.guide import Pin, Sheetlike, Slide
+from mracad.seam.guide import Freeform, Pin, Slide
 from mracad.seam.sides import views
 from mracad.seam.space import end
 from mracad.seam.trace import trace_of
@@ -84,9 +84,9 @@ def _slide(model: Model, edge: Edge, cause: Cause, sides: tuple[Side, Side], mee
     )
 
 
-def _sheet(model: Model, face: Face, side: Side) -> Sheetlike:
+def _sheet(model: Model, face: Face, side: Side) -> Freeform:
     assert face.surface is not None and side.uv is not None
-    return Sheetlike(model.surfaces[face.surface].net, face, side.uv)
+    return Freeform(model.surfaces[face.surface].net, face, side.uv)
 
 
 class _Meets:

@@ -15,7 +15,7 @@ from OCP.gp import gp_Ax3, gp_Vec
 from OCP.TopLoc import TopLoc_Location
 
 import mracad as library
-from mracad.job.left import Spoilt
+from mracad.job.left import Excluded
 from mracad.occ import step as writer
 from tests import zoo
 from tests.job.batch.runs import recipe
@@ -162,9 +162,9 @@ def test_faces_of_which_the_file_would_be_worse_are_left(mracad, samples: Path, 
     result = mracad("smooth", samples / "panel.step", *SMOOTH, "-o", target, "--report", report)
     assert result.code == 0, result.err
     found = json.loads(report.read_text())
-    left = {face["face"] for face in found["faces"] if face["said"] == Spoilt.FILE.value}
+    left = {face["face"] for face in found["faces"] if face["said"] == Excluded.FILE.value}
     assert {(f["status"], f["reason"]) for f in found["faces"] if f["face"] in left} == {
         ("left", "would come out worse")
     }
     assert 1 in left and 1 <= found["counts"]["edited"] == 6 - len(left)
-    assert found["read_back"]["out.step"]["valid"] and Spoilt.FILE.value in result.out.splitlines()[0]
+    assert found["read_back"]["out.step"]["valid"] and Excluded.FILE.value in result.out.splitlines()[0]

@@ -172,11 +172,11 @@ def test_faces_are_told_whatever_their_numbers() -> None:
 def test_faults_are_put_down_to_edited_faces() -> None:
     memory = facts(document(body().wrapped))
     fault = Fault(FaultKind.GAP, (0, 1))
-    assert accept.spoilt([fault], {1, 2}, memory) == {1}
+    assert accept.blamed([fault], {1, 2}, memory) == {1}
     far = replace(fault, faces=(0,))
-    near = accept.spoilt([far], set(range(1, memory.count)), memory)
+    near = accept.blamed([far], set(range(1, memory.count)), memory)
     assert near and near == {f for edge in memory.edges if 0 in edge.faces for f in edge.faces} - {0}
-    assert accept.spoilt([Fault(FaultKind.SOLIDS)], {3, 4}, memory) == {3, 4}
+    assert accept.blamed([Fault(FaultKind.SOLIDS)], {3, 4}, memory) == {3, 4}
 
 
 @pytest.mark.parametrize("height", [2e-3, 1.0])

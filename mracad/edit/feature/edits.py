@@ -21,7 +21,7 @@ from mracad.edit.feature.lay import Laid, laid
 from mracad.edit.feature.locate import Place, face_number, patch_of, place, standing
 from mracad.edit.feature.pattern import places
 from mracad.edit.feature.transfer import laid_on
-from mracad.edit.result import Edit, FaceOutcome, Reason, spared
+from mracad.edit.result import Edit, FaceOutcome, Reason, untouched
 from mracad.errors import EditError
 from mracad.model.brep import Face, Model
 from mracad.model.displacement import Displacement
@@ -151,7 +151,7 @@ def _edit(model: Model, scope: Scope, laid: Laid) -> Edit:
     """The edit with an outcome for every face and every edge of those under copies."""
     touched = {f for copy in laid.copies for f in copy.faces}
     outcomes = tuple(
-        spared(face, scope, _movable(model, scope)) or _outcome(model, face, laid, touched) for face in model.faces
+        untouched(face, scope, _movable(model, scope)) or _outcome(model, face, laid, touched) for face in model.faces
     )
     ways = {
         **dict.fromkeys(laid.frozen, "frozen"),

@@ -154,7 +154,7 @@ def _task(copies: Copies, shifts: Shifts, wishes: Wishes, removed: Mapping[int, 
                 nets[i], poles[i] = own.over(*knots), laid @ patch.turn
     under = {face.index for i in nets for face in ground.patches[i].faces}
     size = MISSED * copies.height, float(copies.reach.max())
-    joined = _told(ground, under, _sewn(joints(ground.model, under, wishes)))
+    joined = _explained(ground, under, _sewn(joints(ground.model, under, wishes)))
     return _Task(rest, known, removed, nets, poles, joined, size)
 
 
@@ -167,7 +167,7 @@ def _sewn(joined: Joints) -> Joints:
     return replace(joined, exact=exact, loose=loose, frozen={**joined.frozen, **apart})
 
 
-def _told(ground: Ground, under: Collection[int], joined: Joints) -> Joints:
+def _explained(ground: Ground, under: Collection[int], joined: Joints) -> Joints:
     """Joints with the cause for edges whose other face could move if a copy lay there too."""
     apart = ground.chosen - set(under)
     bare = Cause(Still.BARE)

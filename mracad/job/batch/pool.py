@@ -32,7 +32,7 @@ from mracad.errors import CrashError, LimitError, MracadError
 from mracad.job import wire
 from mracad.job.batch.settings import Limits
 from mracad.job.guard import end_with_parent
-from mracad.note import Note, noting
+from mracad.note import Note, set_note
 
 TICK = 0.05
 """Seconds between two checks of the workers."""
@@ -206,7 +206,7 @@ class _Worker:
             self.deadline = math.inf
         if len(answer) < size:
             raise self._loss()
-        return wire.heard(answer, returns)
+        return wire.unpacked(answer, returns)
 
     def lost(self) -> bool:
         return self.process.poll() is not None
@@ -272,7 +272,7 @@ def serve(page: int | None = None) -> None:
     """
     end_with_parent()
     if page is not None:
-        noting(Note(page))
+        set_note(Note(page))
     requests, replies = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
     os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
     os.dup2(2, 1)
