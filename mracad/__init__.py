@@ -18,7 +18,12 @@ from typing import TYPE_CHECKING, Any
 from mracad.version import __version__
 
 if TYPE_CHECKING:
+    from mracad.edit.compose import compose
+    from mracad.edit.details import Details
     from mracad.edit.feature.edits import move, repeat, transfer
+    from mracad.edit.level import level
+    from mracad.edit.mra import load as load_details
+    from mracad.edit.mra import save as save_details
     from mracad.edit.smooth import smooth
     from mracad.errors import MracadError
     from mracad.inspect.deviation import deviations
@@ -30,25 +35,31 @@ if TYPE_CHECKING:
     from mracad.occ.check import check
     from mracad.occ.files import read, write
     from mracad.occ.view import view as snapshot
-    from mracad.spec.steps import Move, Repeat, Smooth, Transfer
+    from mracad.spec.steps import Compose, Level, Move, Repeat, Smooth, Transfer
 
 _HOMES = {
+    "Details": "edit.details",
     "Displacement": "model.displacement",
     "Model": "model.brep",
     "MracadError": "errors",
     "apply": "occ.apply",
     "check": "occ.check",
     "deviations": "inspect.deviation",
+    "load_details": "edit.mra:load",
     "read": "occ.files",
     "read_back": "job.produce",
     "run": "job.document",
+    "save_details": "edit.mra:save",
     "seams": "inspect.seams",
     "snapshot": "occ.view:view",
     "write": "occ.files",
 }
 
 __all__ = [
+    "Compose",
+    "Details",
     "Displacement",
+    "Level",
     "Model",
     "Move",
     "MracadError",
@@ -58,12 +69,16 @@ __all__ = [
     "__version__",
     "apply",
     "check",
+    "compose",
     "deviations",
+    "level",
+    "load_details",
     "move",
     "read",
     "read_back",
     "repeat",
     "run",
+    "save_details",
     "seams",
     "smooth",
     "snapshot",

@@ -120,7 +120,7 @@ def deliver(files: Mapping[str, str | bytes | None], lines: Iterable[str], *, st
 
 
 def deliver_models(
-    writing: Writing, made: Sequence[Made], files: Mapping[str, str | None], lines: Iterable[str]
+    writing: Writing, made: Sequence[Made], files: Mapping[str, str | bytes | None], lines: Iterable[str]
 ) -> None:
     """End a command that made models, one for each output or none; see :func:`deliver`."""
     from mracad.output import holds

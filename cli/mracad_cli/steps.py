@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -18,6 +19,7 @@ from mracad_cli.progress import Progress
 from mracad_cli.say import json_text
 
 if TYPE_CHECKING:
+    from mracad.job.document import Report
     from mracad.job.produce import Production, Target
     from mracad.occ.document import Document
     from mracad.spec.recipe import Recipe, Step
@@ -40,11 +42,18 @@ def edit_command(use: str) -> click.Command:
     return command
 
 
-def run_edit(use: str, chosen: Options, reading: Reading, writing: Writing, editing: Editing) -> int:
-    """Do one edit on one file."""
+def run_edit(
+    use: str,
+    chosen: Options,
+    reading: Reading,
+    writing: Writing,
+    editing: Editing,
+    beside: Mapping[str, Callable[[Report], bytes]] = MappingProxyType({}),
+) -> int:
+    """Do one edit on one file; files ``beside`` the models are made of its report."""
     from mracad.spec.recipe import Step
 
-    return run_steps([Step(use, use, chosen)], reading, writing, editing)
+    return run_steps([Step(use, use, chosen)], reading, writing, editing, beside=beside)
 
 
 def run_recipe(
@@ -55,7 +64,12 @@ def run_recipe(
 
 
 def run_steps(
-    steps: Sequence[Step], reading: Reading, writing: Writing, editing: Editing, recipe: Recipe | None = None
+    steps: Sequence[Step],
+    reading: Reading,
+    writing: Writing,
+    editing: Editing,
+    recipe: Recipe | None = None,
+    beside: Mapping[str, Callable[[Report], bytes]] = MappingProxyType({}),
 ) -> int:
     """Take one file through steps; without a recipe they are the one edit of a command."""
     from mracad.spec.recipe import record_of, title
@@ -63,13 +77,14 @@ def run_steps(
 
     start = time.perf_counter()
     places = [f"{path}.toml" for path in writing.outputs if editing.record and path != "-"]
-    targets = check_outputs(writing, (editing.report, editing.depfile, *places), needed=not editing.dry_run)
+    targets = check_outputs(writing, (editing.report, editing.depfile, *places, *beside), needed=not editing.dry_run)
     records = {place: record_of(steps, place) for place in places}
     document, done = produced(reading, writing, [] if editing.dry_run else targets, steps, title(steps))
     body = _body(document.name, steps, done, recipe) | {"warnings": document.warnings, **json.written(done.made)}
-    files: dict[str, str | None] = {editing.report: json_text(body, 1) + "\n"} if editing.report else {}
+    files: dict[str, str | bytes | None] = {editing.report: json_text(body, 1) + "\n"} if editing.report else {}
     if done.made:
         files |= records
+        files |= {path: make(done.results[0]) for path, make in beside.items()}  # type: ignore[arg-type]  # it is an edit
         needs = [reading.file, *needed(steps, recipe)]
         files |= {editing.depfile: depfile_text(writing.outputs, needs)} if editing.depfile else {}
     seconds = None if editing.dry_run else time.perf_counter() - start

@@ -83,7 +83,7 @@ class Quiet:
         """The same in every direction."""
         return EVEN
 
-    def space(self, net: Net) -> Net:
+    def space(self, net: Net, faces: Sequence[Face]) -> Net:
         """The surface over its own knots."""
         return net
 

@@ -81,7 +81,7 @@ class Filter:
         both = self.scale / longest, self.across / longest
         return Stretch((both[lead], both[1 - lead]), lead)
 
-    def space(self, net: Net) -> Net:
+    def space(self, net: Net, faces: Sequence[Face]) -> Net:
         """The surface over its own knots."""
         return net
 

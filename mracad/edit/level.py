@@ -1,9 +1,9 @@
-"""Levels: remove the detail between rungs of the knot ladders of NURBS faces.
+"""Levels: the coarse shape of NURBS faces, without the detail between rungs of their knot ladders, or below a scale.
 
 On one surface, level j is the L2 projection on the splines over the knots left after j rungs, as in the wavelet
-transform.  A level of patches that seams join is a level of the surface that they form: with P the refinement from
-coarse spaces whose ladders the patches share (:mod:`mracad.seam.ladders`) and L the conditions of their seams, as
-smooth as these are,
+transform; for a scale, over those that :func:`mracad.wavelet.ladder.ladder_for_scale` leaves.  A level of patches that
+seams join is a level of the surface that they form: with P the refinement from coarse spaces whose ladders the patches
+share (:mod:`mracad.seam.ladders`) and L the conditions of their seams, as smooth as these are,
 
     y = argmin ‖P y − f‖_G   subject to   L (P y − f) = r,      δ = P y − f,
 
@@ -16,7 +16,7 @@ them exactly.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
@@ -26,17 +26,23 @@ from mracad.bspline.gram import gram
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.refine import refinement
 from mracad.bspline.surface import Net
+from mracad.edit.result import Edit
 from mracad.edit.target import Sheet, largest, stiffness
-from mracad.edit.tolerances import GROWTH
+from mracad.edit.tolerances import COARSE, GROWTH
+from mracad.edit.whole import edited
 from mracad.inspect.roughness import Growth
-from mracad.model.brep import Face
+from mracad.model.brep import Face, Model
 from mracad.seam.conditions import rows
 from mracad.seam.constrained import Constrained
 from mracad.seam.interface import Joints
+from mracad.seam.joint import Joint
 from mracad.seam.ladders import Creases, ladders
 from mracad.seam.natural import Seam
 from mracad.seam.solve import Problem
 from mracad.seam.stretch import EVEN, Stretch
+from mracad.spec.quantity import length
+from mracad.spec.select import Scope
+from mracad.spec.steps import Level
 from mracad.wavelet.ladder import arc_lengths
 from mracad.wavelet.project import projection
 
@@ -50,24 +56,39 @@ contradict each other a little at vertices, and must not be met at any price."""
 
 
 @dataclass(frozen=True)
-class Level:
-    """The wish of a smoothing by levels.
+class Coarser:
+    """The wish of a level.
 
     Attributes
     ----------
     level : float
         How many rungs to go down; a fraction blends two of them linearly.
+    scale : float, optional
+        Instead: a wavelength, mm.
+    fairs : bool
+        Whether faces must get fairer; otherwise the coarse shape itself is wanted.
     """
 
-    level: float
-    fairs: ClassVar[bool] = True
-    whole: ClassVar[bool] = False
+    level: float = 0.0
+    scale: float | None = None
+    fairs: bool = True
     limited: ClassVar[bool] = False
-    growth: ClassVar[Growth] = GROWTH
     spread: ClassVar[float] = math.inf  # waves beside what goes are part of a projection
 
+    @property
+    def whole(self) -> bool:
+        """Less of a coarse shape is none."""
+        return not self.fairs
+
+    @property
+    def growth(self) -> Growth:
+        """A coarse shape may be rougher anywhere, but must not fold."""
+        return GROWTH if self.fairs else COARSE
+
     def wavelength(self, net: Net, faces: Sequence[Face], creases: Creases) -> float:
-        """√2 spacings of the coarse knots, in the direction that gets coarser where they are closest."""
+        """The scale, or √2 spacings of the coarse knots, in the direction that gets coarser where they are closest."""
+        if self.scale is not None:
+            return self.scale
         own, found = (net.u, net.v), ladders({0: net}, {0: creases}, ())
         lengths = [float(arc_lengths(net, axis).sum()) for axis in (0, 1)]
         total = 0.0
@@ -82,7 +103,7 @@ class Level:
         """The same in every direction."""
         return EVEN
 
-    def space(self, net: Net) -> Net:
+    def space(self, net: Net, faces: Sequence[Face]) -> Net:
         """The surface over its own knots."""
         return net
 
@@ -96,8 +117,9 @@ class Level:
             {i: sheet.origin for i, sheet in sheets.items()},
             {i: sheet.creases for i, sheet in sheets.items()},
             joined.exact,
+            self.scale,
         )
-        smooth = [replace(seam, joint=seam.joint.smoother or seam.joint) for seam in joined.exact]
+        smooth = [replace(seam, joint=_of_coarse(seam.joint)) for seam in joined.exact]
         total = np.zeros_like(problem.f)
         for weight, level in self._steps():
             if level:
@@ -116,8 +138,17 @@ class Level:
 
     def _steps(self) -> list[tuple[float, int]]:
         """Weights and levels to blend."""
+        if self.scale is not None:
+            return [(1.0, 1)]
         whole, part = int(self.level), self.level % 1.0
         return [(1.0 - part, whole), (part, whole + 1)] if part else [(1.0, whole)]
+
+
+def _of_coarse(joint: Joint) -> Joint:
+    """The joint of coarse surfaces: as smooth as that of the surfaces themselves, but for second derivatives that jump
+    in it because parameters run unevenly there: coarse splines would have to do so over far longer spans."""
+    best = joint.smoother or joint
+    return replace(best, order=1, bend=0.0, shear=0.0) if best.order == 2 and (best.bend or best.shear) else best
 
 
 def projected(problem: Problem, coarse: Coarse, seams: Sequence[Seam]) -> Array:
@@ -148,3 +179,18 @@ def _joined(problem: Problem, coarse: Coarse, seams: Sequence[Seam], system: tup
     delta = np.where(mended[:, None], conditions @ (p @ y), conditions @ (p @ y - problem.f))
     solve = Constrained(form, conditions @ p, np.ones(len(y), dtype=bool), LOOSE)
     return solve(np.zeros_like(y), goal=-delta, exactly=False)
+
+
+def level(
+    model: Model,
+    options: Level,
+    *,
+    scope: Scope | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> Edit:
+    """Bring the NURBS faces of a model to a level; parameters and errors as for :func:`mracad.edit.whole.edited`."""
+    if options.level is not None:
+        return edited(model, options, Coarser(options.level, fairs=False), scope, progress)
+    assert options.scale is not None
+    scale = length(options.scale, model.diagonal, "scale")
+    return edited(model, options, Coarser(scale=scale, fairs=False), scope, progress)

@@ -66,7 +66,7 @@ class Outward:
         """The same in every direction."""
         return EVEN
 
-    def space(self, net: Net) -> Net:
+    def space(self, net: Net, faces: Sequence[Face]) -> Net:
         """The surface with spans divided until splines can hold d n."""
 
         def more(knots: Knots) -> Sequence[Array]:

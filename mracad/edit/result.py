@@ -27,10 +27,13 @@ class Reason(Enum):
     UNSURE = "noise that cannot be told from shape"
     AMOUNT = "amount 0"
     NO_COPY = "no copy on it"
+    NO_DETAIL = "no details for it"
     NO_FREE = "no free control points"
     ASKEW = "its parameter lines do not follow the direction"
     RIM = "cannot get fairer with its edges held"
+    STUCK = "can hardly move with its edges held"
     ROUGHER = "would get rougher"
+    FOLDED = "would fold"
     WORSE = "would come out worse"
     HELD = "held"
     UNSELECTED = "not selected"
@@ -92,13 +95,16 @@ class FaceOutcome:
 @dataclass(frozen=True, eq=False)
 class Edit:
     """A displacement, the outcome for each face in face order, the treatment of each edge, the result for each copy of
-    a feature, and the scale (mm) if the edit determined it."""
+    a feature, the scale (mm) if the edit determined it, notes for the report, and whether the edit restores what was
+    there before."""
 
     displacement: Displacement
     outcomes: tuple[FaceOutcome, ...]
     edges: tuple[Treatment, ...] = field(default=())
     copies: tuple[Copy, ...] = field(default=())
     scale: float | None = None
+    notes: tuple[str, ...] = ()
+    restored: bool = False
 
     def faces(self, *status: Status) -> list[FaceOutcome]:
         """Outcomes with one of the given statuses."""

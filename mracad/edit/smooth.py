@@ -8,7 +8,7 @@ from dataclasses import replace
 from mracad.edit.bound import widest
 from mracad.edit.fair import Filter
 from mracad.edit.heading import lead
-from mracad.edit.level import Level
+from mracad.edit.level import Coarser
 from mracad.edit.result import Edit, Reason
 from mracad.edit.tolerances import tolerances
 from mracad.edit.whole import edited, wished
@@ -30,7 +30,7 @@ def smooth(
     """Smooth the NURBS faces of a model; parameters and errors as for :func:`mracad.edit.whole.edited`."""
     scope = scope or scope_of(model, options)
     if options.level is not None:
-        return edited(model, options, Level(options.level), scope, progress)
+        return edited(model, options, Coarser(options.level), scope, progress)
     if options.scale is None:
         return _within(model, options, scope, progress)
     scale = length(options.scale, model.diagonal, "scale")

@@ -71,8 +71,8 @@ class Wish(Protocol):
         """Wavelengths by direction on the surface of the faces, relative to the longest."""
         ...
 
-    def space(self, net: Net) -> Net:
-        """The surface over knots that can hold the target; the surface itself if its own can."""
+    def space(self, net: Net, faces: Sequence[Face]) -> Net:
+        """The surface of faces over knots that can hold the target; the surface itself if its own can."""
         ...
 
     def detail(self, alone: Problem, sheet: Sheet) -> float:
@@ -158,7 +158,7 @@ def sheets(model: Model, movable: Collection[int], wish: Wish) -> dict[int, Shee
 
 
 def _sheet(index: int, origin: Net, every: tuple[Face, ...], faces: tuple[Face, ...], wish: Wish) -> Sheet:
-    net = wish.space(origin.over(origin.u.elevated(DEGREE), origin.v.elevated(DEGREE)))
+    net = wish.space(origin.over(origin.u.elevated(DEGREE), origin.v.elevated(DEGREE)), faces)
     points = quadrature(net, faces)
     sharp = creases(net, np.ones(net.poles.shape[:2], bool))
     wavelength = wish.wavelength(origin, faces, sharp)

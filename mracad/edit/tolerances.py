@@ -24,6 +24,12 @@ RESHAPED = Growth(np.inf, np.inf, np.inf, np.inf, 30.0, np.inf)
 
 TURNED = replace(RESHAPED, fold=90.0)
 """The same if normals may turn, too: not beyond a right angle."""
+COARSE = replace(RESHAPED, fold=135.0)
+"""Growth that the judge allows if the coarse shape of faces is wanted: it must not fold, which turns normals over, but
+where it leaves a nose out they turn by a right angle and more."""
+
+RESTORED = replace(RESHAPED, fold=np.inf)
+"""Growth that the judge allows if what was there before comes back: any."""
 
 MORE = 0.02
 """Share by which the gap of an edge may grow if it is already as wide as allowed."""

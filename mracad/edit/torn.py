@@ -28,11 +28,13 @@ def torn(
     before, after : sequence of SeamMeasure
         Seams in the same order.
     edit : Edit
-        The edit; edges that it does not mention stay.
+        The edit; edges that it does not mention stay, and one that restores what was there opens nothing.
     allowed : Tolerances
     keep : str
         Continuity to keep; with ``"g0"`` a kink is no fault.
     """
+    if edit.restored:
+        return set()
     steeper, found = math.degrees(allowed.angle), set()
     for (old, widest), new in zip(_widest(model, before, edit, allowed), after, strict=True):
         bent = keep != "g0" and old.smooth and new.angle > old.angle + steeper

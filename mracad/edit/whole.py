@@ -20,14 +20,20 @@ from mracad.seam.natural import Treatment
 from mracad.seam.wishes import Wishes
 from mracad.spec.select import Scope
 from mracad.spec.select import scope as scope_of
-from mracad.spec.steps import Fairing, Fitting
+from mracad.spec.steps import Fairing, Fitting, Shaped
 
 ROUNDS = 3
 """How often an edit is done at most with edges that slide: edges that cannot slide stay the next time, at last all."""
 
 
 def edited(
-    model: Model, options: Fitting, wish: Wish, scope: Scope | None, progress: Callable[[int, int], None] | None
+    model: Model,
+    options: Fitting,
+    wish: Wish,
+    scope: Scope | None,
+    progress: Callable[[int, int], None] | None,
+    *,
+    restored: bool = False,
 ) -> Edit:
     """Apply a wish to the NURBS faces of a model, as far as the judge allows.
 
@@ -40,6 +46,8 @@ def edited(
         Faces to edit, faces and edges to hold; by default those that the options name.
     progress : callable, optional
         Called with surfaces done and surfaces in all.
+    restored : bool
+        Whether the wish is what was there before: then seams may be as they come.
 
     Raises
     ------
@@ -49,6 +57,8 @@ def edited(
     scope = scope or scope_of(model, options)
     movable = {i for i in scope.chosen if model.faces[i].surface is not None}
     allowed = tolerances(model, options)
+    if restored:
+        allowed = replace(allowed, gap=math.inf, least=math.inf, angle=math.inf, bend=math.inf)
     wishes = wished(model, options, scope)
     lost = {edge: cannot_slide(model, edge) for edge in scope.firm}
     for left in range(ROUNDS, -1, -1):
@@ -69,7 +79,8 @@ def edited(
         every_one = (slide.edge for slide in result.joints.slides)
         lost |= {edge: cannot_slide(model, edge) for edge in (failed if left > 1 else every_one)}
     outcomes = tuple(_outcome(face, result, movable, scope, options) for face in model.faces)
-    return Edit(result.displacement(), outcomes, edges=treatments(model, movable, result, options, lost))
+    edges = treatments(model, movable, result, options, lost)
+    return Edit(result.displacement(), outcomes, edges=edges, restored=restored)
 
 
 def _amounts(result: Result, wish: Wish, options: Fitting) -> dict[int, Moved]:
@@ -97,6 +108,8 @@ def wished(model: Model, options: Fitting, scope: Scope) -> Wishes:
     free = isinstance(options, Fairing) and options.free_edges == "smooth"
     corners = isinstance(options, Fairing) and options.corners == "move"
     wishes = Wishes(options.keep, fit, options.close_gaps, held, scope.zones, free=free, corners=corners)
+    if isinstance(options, Shaped):
+        return replace(wishes, free=True, corners=True, jumps=False)
     return replace(wishes, slide=able, open=not isinstance(options, Fairing))
 
 
@@ -143,6 +156,8 @@ def _left(moved: Moved, options: Fitting) -> tuple[Status, Reason, str]:
         return "unchanged", Reason.FAIR, ""
     if not moved.free:
         return "left", Reason.NO_FREE, ""
+    if not isinstance(options, Fairing):
+        return "left", Reason.FOLDED if moved.limits else Reason.STUCK, ""
     if moved.limits:
         return "left", Reason.ROUGHER, _figures(moved.limits)
     return "left", Reason.RIM, ""

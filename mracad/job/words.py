@@ -173,7 +173,8 @@ _FAULTS = {
 def notes(report: Report) -> list[str]:
     """The notes of an edit, one line each."""
     reasons = {treatment.edge: str(treatment.reason) for treatment in report.edit.edges if treatment.reason}
-    return [_mending(each, reasons.get(-1 if each.edge is None else each.edge, "")) for each in report.unmended]
+    mending = [_mending(each, reasons.get(-1 if each.edge is None else each.edge, "")) for each in report.unmended]
+    return [*report.edit.notes, *mending]
 
 
 def _mending(mending: Mending, reason: str) -> str:

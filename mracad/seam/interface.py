@@ -136,7 +136,7 @@ def joints(model: Model, movable: Collection[int], wishes: Wishes) -> Joints:
         elif not seam.joint.order:
             exact.remove(seam)
             frozen |= dict.fromkeys((seam.edge, seam.twin), rest)
-    jumps = wishes.keep not in CONTINUITY
+    jumps = wishes.jumps and wishes.keep not in CONTINUITY
     joined = Joints(tuple(exact), tuple(loose), known.closing, frozen, known.meetings, jumps, zones=wishes.zones)
     if wishes.free:
         joined = replace(_freed(joined), cornered=not wishes.corners)

@@ -16,7 +16,7 @@ import numpy as np
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
 from mracad.seam.natural import Seam
-from mracad.wavelet.ladder import arc_lengths, rungs_by_level
+from mracad.wavelet.ladder import arc_lengths, ladder_for_scale, rungs_by_level
 
 Array = np.ndarray
 Direction = tuple[int, int]
@@ -44,12 +44,15 @@ class Ladder:
         Degrees of the coarse splines on the first level and on the others.
     creases : mapping of Direction to mapping of float to int
         Knots that a surface keeps on every level, and by how much their multiplicity exceeds the degree.
+    simple : bool
+        Whether all other knots of coarse levels are simple.
     """
 
     members: Mapping[Direction, Map]
     levels: Sequence[KnotVector]
     degrees: tuple[int, int]
     creases: Mapping[Direction, Mapping[float, int]]
+    simple: bool = True
 
     def coarse(self, direction: Direction, level: int, fine: KnotVector) -> KnotVector:
         """The knots of one direction on a level; beyond the last level, those of the last.
@@ -68,10 +71,11 @@ class Ladder:
         slope, shift = self.members[direction]
         at = (rung.breaks - shift) / slope
         near = np.abs(at[:, None] - fine.breaks).argmin(axis=1)
-        near = near[np.abs(fine.breaks[near] - at) <= SAME * rung.period / abs(slope)]
+        own = np.abs(fine.breaks[near] - at) <= SAME * rung.period / abs(slope)
+        near, copies = near[own], 1 if self.simple else rung.multiplicities[own]
         most = np.maximum(fine.multiplicities - (fine.degree - degree), 0)
         counts = np.zeros(len(fine.breaks), dtype=int)
-        counts[near] = most[near] if whole else 1
+        counts[near] = most[near] if whole else copies
         for knot, excess in self.creases[direction].items():
             counts[fine.breaks == knot] = degree + excess
         counts = np.minimum(counts, most)
@@ -83,7 +87,9 @@ class Ladder:
         return KnotVector.from_multiplicities(fine.breaks[kept], counts[kept], degree, fine.periodic)
 
 
-def ladders(nets: Mapping[int, Net], creases: Mapping[int, Creases], seams: Sequence[Seam]) -> dict[Direction, Ladder]:
+def ladders(
+    nets: Mapping[int, Net], creases: Mapping[int, Creases], seams: Sequence[Seam], scale: float | None = None
+) -> dict[Direction, Ladder]:
     """The ladder of every direction of some surfaces.
 
     Parameters
@@ -93,11 +99,13 @@ def ladders(nets: Mapping[int, Net], creases: Mapping[int, Creases], seams: Sequ
     creases : mapping of int to Creases
     seams : sequence of Seam
         Seams between these surfaces.
+    scale : float, optional
+        If given, the ladders have only one level besides all knots: that of a scale, mm.
     """
     knots = {(i, axis): each for i, net in nets.items() for axis, each in enumerate((net.u, net.v))}
     found: dict[Direction, Ladder] = {}
     for members in _linked(knots, seams):
-        found |= dict.fromkeys(members, _ladder(nets, creases, members))
+        found |= dict.fromkeys(members, _ladder(nets, creases, members, scale))
     return found
 
 
@@ -145,22 +153,30 @@ class _Placed:
         return float(np.log((rung.multiplicities[1:-1].sum() + 1) / self.lengths.sum()))
 
 
-def _ladder(nets: Mapping[int, Net], creases: Mapping[int, Creases], members: Mapping[Direction, Map]) -> Ladder:
-    """The ladder on the union of the members' own knots.
-
-    A level is the densest one that is no denser than the average of its members' levels, and of the lowest degree whose
-    splines they all contain.
-    """
+def _ladder(
+    nets: Mapping[int, Net], creases: Mapping[int, Creases], members: Mapping[Direction, Map], scale: float | None
+) -> Ladder:
+    """The ladder on the union of the members' own knots, of the lowest degree whose splines they all contain."""
     degrees = [(nets[i].u, nets[i].v)[axis].degree for i, axis in members]
     placed = [_placed(nets[m[0]], creases[m[0]][m[1]], m[1], way, min(degrees)) for m, way in members.items()]
     union, copies = _union(placed, [max(degrees) - degree for degree in degrees])
+    if scale is None:
+        levels = _levels(union, placed)
+    else:
+        levels = [union.knots, ladder_for_scale(union.knots, union.lengths, scale, union.kept)]
+    sharp = {m: one.sharp for m, one in zip(members, placed, strict=True)}
+    both = max(degrees), max(min(degrees), max(degrees) + 1 - copies)
+    return Ladder(members, levels, both, sharp, scale is None)
+
+
+def _levels(union: _Placed, placed: Sequence[_Placed]) -> list[KnotVector]:
+    """Levels of a union: the densest that are no denser than the average of its members'."""
     rungs, each = union.rungs(), [(one, one.rungs()) for one in placed]
     both, levels = [(rung, union.density(rung)) for rung in rungs], [rungs[0]]
     for level in range(1, max(len(those) for _, those in each)):
         wanted = np.mean([one.density(those[min(level, len(those) - 1)]) for one, those in each])
         levels.append(next((rung for rung, density in both if density <= wanted + SAME), rungs[-1]))
-    sharp = {m: one.sharp for m, one in zip(members, placed, strict=True)}
-    return Ladder(members, levels, (max(degrees), max(min(degrees), max(degrees) + 1 - copies)), sharp)
+    return levels
 
 
 def _placed(net: Net, creases: frozenset[float], axis: int, way: Map, degree: int) -> _Placed:

@@ -41,6 +41,8 @@ class Wishes:
         Whether free edges move, but poles stay.
     corners : bool
         Whether the corners between two free edges that move also move.
+    jumps : bool
+        Whether jumps of curvature must not grow where seams keep what they have.
     slide : frozenset of int
         Edges that may slide along a neighbour that stays.
     """
@@ -54,6 +56,7 @@ class Wishes:
     open: bool = False
     free: bool = False
     corners: bool = False
+    jumps: bool = True
     slide: frozenset[int] = frozenset()
 
     def order(self, angles: Array, one: Array, other: Array) -> int:

@@ -76,6 +76,7 @@ TOGETHER: Mapping[str, Sequence[tuple[str, Sequence[Words]]]] = {
             ],
         ),
     ],
+    "level": [("scale level", [("--scale", "4mm"), ("--level", "1.5")])],
     "move": [("base band", _LEVEL), ("to", [("--to", "5,7,0"), ("--to", "#1@0.6,0.7")])],
     "repeat": [
         ("base band", _LEVEL),
@@ -111,6 +112,7 @@ VALUES: Mapping[str, Sequence[Any]] = {
     "assignments": ["smooth.scale=3mm"],
     "chord": ["1mm"],
     "depfile": ["out.d"],
+    "details": ["out.mra"],
     "distance": ["0.01mm"],
     "encoding": ["utf-8"],
     "expect": ["1", "report.json"],
@@ -164,6 +166,7 @@ PIPELINE = "smooth --scale 20% ! check ! compare --max-deviation 1mm"
 ARGUMENTS = {
     "batch": ("recipe.toml", "IN"),
     "compare": ("REF", "IN"),
+    "compose": ("IN", "MRA"),
     "pipeline": (PIPELINE, "IN"),
     "recipe check": ("recipe.toml",),
     "recipe schema": (),
@@ -257,6 +260,10 @@ def small_models(folder: Path) -> list[Path]:
     for name, parts in shapes.items():
         paths.append(folder / f"{name}.step")
         mracad.write(document(*parts, names={0: "part", 1: "other"}), paths[-1])
+    model = mracad.snapshot(mracad.read(paths[0]))
+    edit = mracad.level(model, mracad.Level(scale="4mm"))
+    details = mracad.Details.of(model, edit.displacement)
+    paths[0].with_suffix(".mra").write_bytes(mracad.save_details(details))
     return paths
 
 

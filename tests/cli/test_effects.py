@@ -32,12 +32,14 @@ BASE = {
     "batch": ("batch", "recipe.toml", "sheet.step", "--folder", "out", "--json"),
     "check": ("check", "sheet.step", "--json"),
     "compare": ("compare", "sheet.step", "smooth.step", "--json"),
+    "compose": ("compose", "coarse.step", "sheet.mra", "-o", "a.step", "--json"),
     "convert": ("convert", "sheet.step", "-o", "a.step", "--json"),
     "denoise": ("denoise", "sheet.step", "--noise", "0.05mm", "-o", "a.step", "--json"),
     "equalize": ("equalize", "sheet.step", "--band", "0.5mm:3mm=2", "-o", "a.step", "--json"),
     "feature extract": ("feature", "extract", "sheet.step", *FEATURE, "-o", "a.feature", "--json"),
     "feature list": ("feature", "list", "sheet.step", "--json"),
     "info": ("info", "sheet.step", "--json"),
+    "level": ("level", "sheet.step", "--scale", "4mm", "-o", "a.step", "--json"),
     "move": ("move", "sheet.step", *FEATURE, "--to", "15,5,0", "-o", "a.step", "--json"),
     "offset": ("offset", "sheet.step", "--distance", "0.5mm", "-o", "a.step", "--json"),
     "pipeline": ("pipeline", declared.PIPELINE, "sheet.step", "-o", "a.step", "--json"),
@@ -73,6 +75,7 @@ WAYS = {
     "corners": ("--corners move", "--free-edges smooth"),
     "chord": ("--chord 1mm", "-o a.stl"),
     "clip": ("--clip", "--at 0.3,5,0"),
+    "details": ("--details a.mra",),
     "depfile": ("--depfile a.d",),
     "distance": ("--distance 0.6mm",),
     "dry_run": ("--dry-run",),
@@ -148,6 +151,10 @@ OWN = {
     "batch overwrite": ("--overwrite", "OLD out/sheet.step"),
     "check overwrite": ("--overwrite", "OLD a.xml --junit a.xml"),
     "compare overwrite": ("--overwrite", "OLD a.xml --junit a.xml"),
+    "compose gap_tolerance": ("--gap-tolerance 1mm", "IN coarsehalves.step DETAILS halves.mra --amount 0.9"),
+    "compose instance": ("--instance part", "IN coarsetwo.step DETAILS two.mra"),
+    "compose refine": ("--refine never", "IN strips.step"),
+    "compose keep": ("--keep g0", "IN coarsetangent.step DETAILS tangent.mra --amount 0.9"),
     "feature extract overwrite": ("--overwrite", "OLD a.feature"),
     "compare max_deviation": ("--max-deviation 1mm",),
     "smooth along": ("--along Y", "--across 9mm"),
@@ -158,6 +165,9 @@ OWN = {
     "equalize keep": ("--keep g2", "IN tangent.step"),
     "equalize gap_tolerance": ("--gap-tolerance 1mm", "IN halves.step --band 5mm:20mm=3"),
     "equalize refine": ("--refine never", "IN strips.step --band :8mm=0 --faces #2"),
+    "level gap_tolerance": ("--gap-tolerance 1mm", "IN halves.step --scale 40mm"),
+    "level keep": ("--keep g2", "IN tangent.step"),
+    "level refine": ("--refine never", "IN strips.step --scale 8mm --faces #2"),
     "offset gap_tolerance": ("--gap-tolerance 1mm", "IN halves.step --distance 2mm"),
     "offset refine": ("--refine never", "IN halves.step --distance 2mm"),
     "compare max_angle_growth": ("--max-angle-growth 0", "REF smooth.step IN sheet.step"),
@@ -224,6 +234,10 @@ def folder(small, tmp_path_factory):
         words = ["--scale", "20%", "--keep", "g0", "-o", str(place / f"smooth{name}.step")]
         assert main(["smooth", str(place / f"{name}.step"), *words]) == 0
     (place / "smoothsheet.step").rename(place / "smooth.step")
+    for name, scale in (("sheet", "4mm"), ("two", "4mm"), ("halves", "40mm"), ("tangent", "4mm")):
+        words = ["--scale", scale, "-o", str(place / f"coarse{name}.step"), "--details", str(place / f"{name}.mra")]
+        assert main(["level", str(place / f"{name}.step"), *words]) == 0
+    (place / "coarsesheet.step").rename(place / "coarse.step")
     return place
 
 
@@ -265,6 +279,8 @@ def words(case):
         elif word in ("IN", "REF"):
             place = next(i for i, w in enumerate(base) if w.endswith(".step"))
             base[place + (word == "IN" and command in ("compare", "transfer"))] = more.pop(0)
+        elif word == "DETAILS":
+            base[2] = more.pop(0)
         elif word == "LESS":
             at = base.index(more.pop(0))
             del base[at : at + 2]

@@ -25,7 +25,7 @@ def rows(command, small, every):
     found = list(declared.pairwise(ways))
     step = max(1, len(found) // ROWS)
     for (source,), *given in found if every else found[::step]:
-        named = {"IN": source, "REF": str(small[0])}
+        named = {"IN": source, "REF": str(small[0]), "MRA": str(small[0].with_suffix(".mra"))}
         arguments = declared.ARGUMENTS.get(command, ("IN",))
         yield [*command.split(), *(named.get(a, a) for a in arguments), *(word for words in given for word in words)]
 

@@ -5,7 +5,7 @@ import pytest
 
 from mracad.bspline.surface import Net
 from mracad.edit.fair import faired
-from mracad.edit.level import Level
+from mracad.edit.level import Coarser
 from mracad.edit.target import sheets
 from mracad.edit.tolerances import Tolerances
 from mracad.inspect.seams import seams
@@ -35,10 +35,10 @@ def rung(net, level):
 def wanted(net, level):
     """What a level wants of a surface of which nothing is held, and the surface in the space of that."""
     model = sheet(net)
-    one = sheets(model, {0}, Level(level))[0]
+    one = sheets(model, {0}, Coarser(level))[0]
     every = np.ones(one.net.poles.shape[:2], bool)
     problem = Problem({0: Space(one.net, forms(one.net, one.net, quadrature(one.net, model.faces)), every, every)})
-    return Level(level).target(problem, {0: one}, Joints()).reshape(one.net.poles.shape), one
+    return Coarser(level).target(problem, {0: one}, Joints()).reshape(one.net.poles.shape), one
 
 
 def nets():
@@ -78,9 +78,9 @@ def test_levels_are_projections():
     _, net = rough(spans=(24, 18))
     delta, _ = wanted(net, 2)
     model = sheet(Net(net.u, net.v, net.poles + delta))
-    one = sheets(model, {0}, Level(2))[0]
+    one = sheets(model, {0}, Coarser(2))[0]
     # ladders go by lengths only where knots cluster, so that both have the same
-    assert sheets(sheet(net), {0}, Level(2))[0].detail > 0.1 and one.detail < 1e-10
+    assert sheets(sheet(net), {0}, Coarser(2))[0].detail > 0.1 and one.detail < 1e-10
 
 
 def test_a_fraction_of_a_level_blends_two_of_them():
@@ -95,7 +95,7 @@ def test_a_fraction_of_a_level_blends_two_of_them():
 def test_the_wavelength_of_a_level_is_that_of_its_coarse_knots():
     _, net = rough(spans=(24, 20))
     u, v = (float(arc_lengths(net, axis).sum()) for axis in (0, 1))
-    found = [sheets(sheet(net), {0}, Level(level))[0].wavelength for level in (1, 2, 1.5)]
+    found = [sheets(sheet(net), {0}, Coarser(level))[0].wavelength for level in (1, 2, 1.5)]
     assert found[0] == pytest.approx(np.sqrt(2) * min(u / 12, v / 10)) and found[2] == pytest.approx(sum(found[:2]) / 2)
     assert found[1] == pytest.approx(np.sqrt(2) * min(u / 6, v / 5))
 
@@ -106,10 +106,10 @@ def test_held_rims_make_it_the_nearest_surface_that_keeps_them():
     middle[10:-10, 10:-10] = 1.0
     _, net = rough(spans=(40, 32), where=middle)
     model = sheet(net)
-    result = faired(model, {0}, Level(1), Wishes(), Tolerances(1e-3), refine=False)
+    result = faired(model, {0}, Coarser(1), Wishes(), Tolerances(1e-3), refine=False)
     moved = result.moved[0]
     assert moved.amount == 1.0
-    one = sheets(model, {0}, Level(1))[0]
+    one = sheets(model, {0}, Coarser(1))[0]
     mass = forms(net, one.metric, quadrature(net, model.faces)).mass.toarray()
     free = np.zeros(net.poles.shape[:2], bool)
     free[1:-1, 1:-1] = True
@@ -127,11 +127,11 @@ def figures(shape, keep, change=lambda patches: patches):
     clean, noisy = panels.whole(SPANS, NOISE, patches=shape)
     patches = panels.cut(noisy, shape)
     model = sheet(noisy)
-    whole = faired(model, {0}, Level(2), Wishes(keep), Tolerances(1e-3)).displacement().applied(model).surfaces[0].net
+    whole = faired(model, {0}, Coarser(2), Wishes(keep), Tolerances(1e-3)).displacement().applied(model).surfaces[0].net
     unsplit = panels.rms({k: p.net for k, p in panels.cut(whole, shape).items()}, patches, clean)
     patches = change(patches)
     model = view(panels.document(patches))
-    result = faired(model, set(range(len(patches))), Level(2), Wishes(keep), Tolerances(1e-3))
+    result = faired(model, set(range(len(patches))), Coarser(2), Wishes(keep), Tolerances(1e-3))
     after = result.displacement().applied(model)
     coupled = panels.rms({k: after.surfaces[i].net for i, k in enumerate(sorted(patches))}, patches, clean)
     found = seams(after)
@@ -168,7 +168,7 @@ def test_a_joint_of_varying_ratio_does_not_lock():
     for skew in (0.5, 0.0):
         clean, noisy = skewed(0.0, skew), skewed(NOISE, skew)
         model = view(panels.pair(*noisy))
-        result = faired(model, {0, 1}, Level(2), Wishes("g1"), Tolerances(1e-3))
+        result = faired(model, {0, 1}, Coarser(2), Wishes("g1"), Tolerances(1e-3))
         after = result.displacement().applied(model)
         (found,) = seams(after)
         assert len(result.joints.exact) == 1 and found.gap <= 1e-9 and found.angle <= 1e-5
@@ -183,7 +183,7 @@ def test_halves_that_meet_along_a_trim_curve_come_closer_together_than_alone():
     model = view(halves.document(left, right))
     errors = []
     for hold in (frozenset(), frozenset(range(len(model.edges)))):
-        result = faired(model, {0, 1}, Level(2), Wishes("g1", hold=hold), Tolerances(1e-3))
+        result = faired(model, {0, 1}, Coarser(2), Wishes("g1", hold=hold), Tolerances(1e-3))
         after = result.displacement().applied(model)
         assert len(result.joints.loose) == (not hold)
         errors.append(beside([surface.net for surface in after.surfaces], clean))

@@ -104,7 +104,7 @@ def test_what_would_fold_is_left():
     """A cylinder has no offset beyond its axis; less than was asked for is not done instead."""
     edit = offset(sheet(grounds.cylinder(40.0, 120.0)), OffsetFaces(distance="60mm", inward=True))
     (outcome,) = edit.outcomes
-    assert outcome.status == "left" and not edit.displacement.offsets and "fold" in outcome.said
+    assert outcome.status == "left" and not edit.displacement.offsets and "fold" in outcome.words
 
 
 def test_the_command_writes_what_is_asked_for(tmp_path):

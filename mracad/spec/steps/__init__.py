@@ -6,20 +6,21 @@ field holds its help.  This package imports no numerical library, so that the co
 
 from __future__ import annotations
 
-from mracad.spec.steps import checks, features, shape, smooth
+from mracad.spec.steps import checks, features, levels, shape, smooth
 from mracad.spec.steps.base import Options, Selection
 from mracad.spec.steps.checks import Check, Compare
 from mracad.spec.steps.features import Copied, Extract, Featured, Move, Repeat, Single, Transfer
+from mracad.spec.steps.levels import Compose, Level, Shaped
 from mracad.spec.steps.smooth import Fairing, Fitting, Smooth
 
 __all__ = [
-    "STEPS", "Check", "Compare", "Copied", "Extract", "Fairing", "Featured", "Fitting", "Move", "Options", "Repeat",
-    "Selection", "Single", "Smooth", "Transfer",
+    "STEPS", "Check", "Compare", "Compose", "Copied", "Extract", "Fairing", "Featured", "Fitting", "Level", "Move",
+    "Options", "Repeat", "Selection", "Shaped", "Single", "Smooth", "Transfer",
 ]  # fmt: skip
 
 STEPS: dict[str, type[Options]] = {
     struct.function.partition(":")[2]: struct
-    for module in (smooth, shape, features, checks)
+    for module in (smooth, shape, levels, features, checks)
     for struct in vars(module).values()
     if isinstance(struct, type) and issubclass(struct, Options) and "function" in vars(struct)
 }

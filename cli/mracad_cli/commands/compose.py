@@ -1,0 +1,24 @@
+"""Put the details of a model, as mracad level saves them, on its coarse shape, or on one that was edited since."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import click
+
+from mracad.spec.steps import Compose
+from mracad_cli import options
+from mracad_cli.command import Command
+from mracad_cli.steps import run_edit
+
+
+@click.command("compose", cls=Command, help=__doc__)
+@options.apply(
+    options.reading("COARSE"),
+    options.of(Compose, "chosen", arguments={"details": "DETAILS"}),
+    options.writing,
+    options.editing,
+    options.printing,
+)
+def command(chosen: Compose, **how: Any) -> int:
+    return run_edit("compose", chosen, **how)

@@ -1,0 +1,235 @@
+"""Composing: the details of a model put on its coarse shape, which may have been edited elsewhere.
+
+On the coarse surfaces that they were taken from, details are added as they are: the identity, whatever took them.  On
+others they are carried by the frames of these (:mod:`mracad.edit.carry`); the solver then finds the nearest admissible
+displacement, for frames on the two sides of a seam differ a little.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import ClassVar
+
+import numpy as np
+from msgspec import structs
+
+from mracad.bspline.knots import KnotVector
+from mracad.bspline.surface import Net
+from mracad.edit.carry import SAME, Laid, Piece, Way
+from mracad.edit.details import Detail, Details
+from mracad.edit.fair import DETAIL
+from mracad.edit.mra import load
+from mracad.edit.result import Edit, Reason
+from mracad.edit.target import Sheet, largest, stiffness
+from mracad.edit.tolerances import COARSE, RESTORED
+from mracad.edit.whole import edited
+from mracad.errors import EditError
+from mracad.inspect.roughness import Growth
+from mracad.model.brep import Face, Model, Surface
+from mracad.seam.interface import Joints
+from mracad.seam.ladders import Creases
+from mracad.seam.solve import Problem
+from mracad.seam.stretch import EVEN, Stretch
+from mracad.spec.select import Scope
+from mracad.spec.select import scope as scope_of
+from mracad.spec.steps import Compose
+
+Array = np.ndarray
+
+PLAIN = "coupled", "as-is", 1.0
+"""Edges, what seams keep and the amount that are asked for where details are just to come back."""
+
+PLACES = 3
+"""Points along u and along v by which surfaces are told apart."""
+
+ELSEWHERE = 100.0
+"""Surfaces have been numbered anew if others fit so many times better, in squared distances."""
+
+
+@dataclass(frozen=True, eq=False)
+class Detailed:
+    """The wish of composing.
+
+    Attributes
+    ----------
+    pieces : mapping of int to Piece
+        By surface.
+    refine : bool
+        Whether the knots of details are inserted where a surface lacks them.
+    restores : bool
+        Whether all of them come back to where they were.
+    laid : dict
+        What is known already, by surface and knots.
+    """
+
+    pieces: Mapping[int, Piece]
+    refine: bool = True
+    restores: bool = False
+    laid: dict[tuple[int, KnotVector, KnotVector], Laid] = field(default_factory=dict)
+    spread: ClassVar[float] = math.inf
+    fairs: ClassVar[bool] = False
+    whole: ClassVar[bool] = True
+    limited: ClassVar[bool] = False
+
+    @property
+    def growth(self) -> Growth:
+        """Details must not fold a face, unless it was so."""
+        return RESTORED if self.restores else COARSE
+
+    def wavelength(self, net: Net, faces: Sequence[Face], creases: Creases) -> float:
+        """That of the details."""
+        return self._piece(faces).wavelength
+
+    def stretch(self, faces: Sequence[Face]) -> Stretch:
+        """The same in every direction."""
+        return EVEN
+
+    def space(self, net: Net, faces: Sequence[Face]) -> Net:
+        """The surface over its knots and those of the details."""
+        return self._piece(faces).over(net) if self.refine else net
+
+    def detail(self, alone: Problem, sheet: Sheet) -> float:
+        """The largest change in the target; details count, however small they are."""
+        found = largest(self, alone, sheet)
+        return max(found, 2 * DETAIL[0], 2 * DETAIL[1] * sheet.wavelength) if found else 0.0
+
+    def target(self, problem: Problem, sheets: Mapping[int, Sheet], joined: Joints) -> Array:
+        """The details, as the surfaces carry them, ``(points, 3)``."""
+        return np.concatenate([self._on(i, space.net).offset.reshape(-1, 3) for i, space in problem.spaces.items()])
+
+    def ways(self, problem: Problem, target: Array, width: float) -> Iterable[Iterable[Array]]:
+        """As they are, if they come back; otherwise the nearest that seams allow, and smoother transitions to what is
+        held."""
+        if self.restores:
+            yield [target]
+            return
+        yield [problem.nearest(target, stiff) for stiff in ((0.0, stiffness(width / 4)) if problem.rimmed else (0.0,))]
+        if problem.rimmed:
+            yield problem.nearest(target, stiffness(width / 2)), problem.nearest(problem.fading(width) * target)
+
+    def way(self, surface: int) -> Way | None:
+        """How the details came on a surface at last."""
+        return next((each.way for (i, *_), each in reversed(self.laid.items()) if i == surface), None)
+
+    def _piece(self, faces: Sequence[Face]) -> Piece:
+        surface = faces[0].surface
+        assert surface is not None
+        return self.pieces[surface]
+
+    def _on(self, surface: int, net: Net) -> Laid:
+        key = surface, net.u, net.v
+        if key not in self.laid:
+            self.laid[key] = self.pieces[surface].laid(net)
+        return self.laid[key]
+
+
+def compose(
+    model: Model,
+    options: Compose,
+    *,
+    scope: Scope | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> Edit:
+    """Put details on the NURBS faces of a model; parameters and errors as for :func:`mracad.edit.whole.edited`.
+
+    Raises
+    ------
+    FileError
+        For a file that holds no details.
+    EditError
+        If none of them belongs to a face of the model.
+    """
+    scope = scope or scope_of(model, options)
+    details = load(options.details)
+    pieces = matched(model, details)
+    if not pieces and details.surfaces:
+        message = f"{model.name}: no face for the details of {options.details}"
+        raise EditError(message, f"give the model that was made with them of {details.model}")
+    bare = {i for surface in model.surfaces if surface.index not in pieces for i in surface.faces}
+    refine = options.refine == "auto"
+    same = all(piece.belongs(model.surfaces[i].net) for i, piece in pieces.items())
+    if same:
+        options = structs.replace(options, refine="never")  # nothing has to be made to fit
+    restored = same and _whole(model, options, scope, pieces)
+    wish = Detailed(pieces, refine, restored)
+    edit = edited(model, options, wish, replace(scope, faces=scope.faces - bare), progress, restored=restored)
+    left = bare & scope.chosen
+    outcomes = tuple(
+        replace(each, status="unchanged", reason=Reason.NO_DETAIL) if each.face in left else each
+        for each in edit.outcomes
+    )
+    return replace(edit, outcomes=outcomes, notes=_notes(edit, wish, len(details.surfaces)))
+
+
+def _whole(model: Model, options: Compose, scope: Scope, pieces: Mapping[int, Piece]) -> bool:
+    """Whether all details are to come, with nothing held."""
+    faces = {face for i in pieces for face in model.surfaces[i].faces}
+    held = scope.held or scope.edges or scope.zones or options.max_deviation is not None
+    return faces <= scope.chosen and not held and (options.edges, options.keep, options.amount) == PLAIN
+
+
+def _notes(edit: Edit, wish: Detailed, count: int) -> tuple[str, ...]:
+    """How the details came on the surfaces that changed, and what did not find its place."""
+    ways = Counter(wish.way(i) for i in edit.displacement.offsets)
+    said: dict[Way, str] = {
+        "added": "added as they were",
+        "carried": "carried by a surface that has changed",
+        "projected": "projected on other knots",
+    }
+    parts = [f"{ways[way]} {words}" for way, words in said.items() if ways[way]]
+    lost = count - len(wish.pieces)
+    parts += [f"{lost} without a face here"] if lost > 0 else []
+    return (f"details of {count} surface{'s' * (count != 1)}: {', '.join(parts)}",) if parts else ()
+
+
+def matched(model: Model, details: Details) -> dict[int, Piece]:
+    """The details of each surface of a model, by index: first those that are where they were; then those with the same
+    faces and as many control points, if these have not been numbered anew; then the nearest."""
+    surfaces, every = model.surfaces, details.surfaces
+    if not (surfaces and every):
+        return {}
+    own, there = _places([each.net for each in surfaces]), _places([each.net for each in every])
+    apart = ((own[:, None] - there[None]) ** 2).mean(axis=2)
+    size = max(float(np.ptp(each.net.poles, axis=(0, 1)).max()) for each in every)
+    found = {i: int(k) for i, k in enumerate(apart.argmin(axis=1)) if apart[i, k] <= (SAME * size) ** 2}
+    rest = [i for i in range(len(surfaces)) if i not in found]
+    others = [k for k in range(len(every)) if k not in found.values()]
+    found |= _assigned(surfaces, every, rest, others, apart)
+    return {i: _piece(every[k]).placed(surfaces[i].net) for i, k in found.items()}
+
+
+def _assigned(
+    surfaces: Sequence[Surface], every: Sequence[Detail], rest: Sequence[int], others: Sequence[int], apart: Array
+) -> dict[int, int]:
+    """Details for surfaces that are not where they were."""
+    from scipy.optimize import linear_sum_assignment
+
+    if not (rest and others):
+        return {}
+    unlike = np.array([[_shape(surfaces[i].net) != _shape(every[k].net) for k in others] for i in rest])
+    cost = apart[np.ix_(rest, others)]
+    rows, columns = linear_sum_assignment(cost + unlike * (cost.sum() + 1.0))
+    nearest = {rest[i]: others[k] for i, k in zip(rows, columns, strict=True)}
+    home = {surfaces[i].faces: i for i in rest}
+    same = {home[every[k].faces]: k for k in others if every[k].faces in home}
+    alike = len(same) == len(others) and all(_shape(surfaces[i].net) == _shape(every[k].net) for i, k in same.items())
+    far, near = (sum(apart[i, k] for i, k in each.items()) for each in (same, nearest))
+    return same if alike and far <= ELSEWHERE * near else nearest
+
+
+def _shape(net: Net) -> tuple[int, ...]:
+    return net.u.degree, net.v.degree, net.u.count, net.v.count
+
+
+def _places(nets: Sequence[Net]) -> Array:
+    """Points of each surface, ``(surfaces, coordinates)``."""
+    share = np.linspace(0.0, 1.0, PLACES)
+    at = [[k.domain[0] + share * k.period for k in (net.u, net.v)] for net in nets]
+    return np.array([net.grid(u, v).ravel() for net, (u, v) in zip(nets, at, strict=True)])
+
+
+def _piece(detail: Detail) -> Piece:
+    return Piece(detail.net, detail.motion, detail.wavelength)

@@ -1,0 +1,76 @@
+"""Options of edits that take faces to a level of detail, and of their details."""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar, Literal
+
+from msgspec import Meta
+
+from mracad.errors import UsageError
+from mracad.spec.files import File
+from mracad.spec.quantity import Length
+from mracad.spec.steps.smooth import Fitting
+
+
+class Shaped(Fitting, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What edits share that bring a whole shape, of which free edges are part."""
+
+    edges: Annotated[
+        Literal["coupled", "frozen"],
+        Meta(
+            description="Edges between two edited faces: coupled lets them move, as smooth as before where possible; "
+            "frozen keeps them in place."
+        ),
+    ] = "coupled"
+
+
+class Level(Shaped, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Bring the NURBS faces of a model to a level: the coarse shape that they form together, without its details."""
+
+    function: ClassVar[str] = "mracad.edit.level:level"
+
+    level: Annotated[
+        Annotated[float, Meta(gt=0.0)] | None,
+        Meta(
+            description="How many levels of the faces' own knot ladders to go down, 2.5 for half-way between two and "
+            "three."
+        ),
+    ] = None
+    scale: Annotated[
+        Length | None,
+        Meta(
+            description="Instead of --level: a wavelength (5mm, or 2% of the model's diagonal). Knots end up half of "
+            "it to all of it apart."
+        ),
+    ] = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.level is None and self.scale is None:
+            raise UsageError("level needs a level or a scale", "give --level 2.5 or --scale 5mm")
+        if self.level is not None and self.scale is not None:
+            raise UsageError("level takes a level or a scale, not both", "leave out --level or --scale")
+
+    @property
+    def done(self) -> str:
+        return f"brought to {self.scale}" if self.level is None else f"brought to level {self.level:g}"
+
+    @property
+    def quiet(self) -> str:
+        return "without detail to leave out" if self.amount else "left as they are: amount 0"
+
+
+class Compose(Shaped, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Put the details of a model, as mracad level saves them, on its coarse shape, or on one that was edited since."""
+
+    function: ClassVar[str] = "mracad.edit.compose:compose"
+
+    details: Annotated[File, Meta(description="The file of the details (.mra).")]
+
+    @property
+    def done(self) -> str:
+        return "given their details"
+
+    @property
+    def quiet(self) -> str:
+        return "without details" if self.amount else "left as they are: amount 0"
