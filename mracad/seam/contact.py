@@ -19,18 +19,15 @@ from typing import Any
 
 import numpy as np
 
-from mracad.bspline.basis import gauss_pieces
 from mracad.bspline.functions import functions
 from mracad.bspline.surface import Net
 from mracad.seam.conditions import laid_out
-from mracad.seam.trace import Trace, crossings, derived, directions
+from mracad.seam.trace import Trace, derived, directions, pieces
 
 Array = np.ndarray
 
 MORE = 2
 """Conditions in each piece of a contact between knot lines, beyond the highest degree of its sides."""
-
-_EVENLY = np.linspace(0.0, 1.0, 129)
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,10 +134,10 @@ def rows(nets: Mapping[int, Net], contacts: Sequence[Contact]) -> Rows:
     orders, widths, owners, count = [np.empty(0, int)], [np.empty(0)], [np.empty(0, int)], 0
     for number, contact in enumerate(contacts):
         sides = [contact.a] + ([contact.b] if contact.b else [])
-        share, part = _sites(sides, nets)
+        highest = max(knots.degree for side in sides for knots in (nets[side.surface].u, nets[side.surface].v))
+        share, part = pieces(sides, nets, highest + MORE)
         ways = directions(nets, contact.a, contact.b or contact.a, share)
-        curve = nets[contact.a.surface].evaluate(contact.a.places(_EVENLY))
-        width = np.linalg.norm(np.diff(curve, axis=0), axis=1).sum() * part
+        width = contact.a.length(nets[contact.a.surface]) * part
         for order, along in _asked(contact):
             row = count + np.arange(len(share))
             for side, (way, bend, tangent), sign in zip(sides, ways, (1.0, -1.0), strict=False):
@@ -162,12 +159,3 @@ def _asked(contact: Contact) -> list[tuple[int, bool]]:
     """The orders of the conditions on a contact, across it and along it."""
     orders = range(contact.since, contact.order + 1)
     return [*((order, False) for order in orders), *((order, True) for order in orders if order == 1 and not contact.b)]
-
-
-def _sites(sides: Sequence[Trace], nets: Mapping[int, Net]) -> tuple[Array, Array]:
-    """Gauss points of the pieces of a contact, fractions, and their shares of it."""
-    breaks = np.unique(np.concatenate([crossings(t, (nets[t.surface].u, nets[t.surface].v)) for t in sides]))
-    breaks = breaks[np.append(True, np.diff(breaks) > 1e-9)]
-    highest = max(knots.degree for side in sides for knots in (nets[side.surface].u, nets[side.surface].v))
-    place, weight = gauss_pieces(breaks, highest + MORE)
-    return (breaks[:-1, None] + place).ravel(), weight.ravel()

@@ -23,7 +23,6 @@ from typing import Any
 
 import numpy as np
 
-from mracad.bspline.basis import gauss_pieces
 from mracad.bspline.closest import feet
 from mracad.bspline.functions import functions
 from mracad.bspline.knots import KnotVector
@@ -34,14 +33,12 @@ from mracad.model.rails import Elementary, Path
 from mracad.seam.cause import Cause
 from mracad.seam.conditions import laid_out
 from mracad.seam.guided import Guides
-from mracad.seam.trace import LOOKS, Trace, crossings
+from mracad.seam.trace import LOOKS, Trace, pieces
 
 Array = np.ndarray
 
 POINTS = 3
 """Conditions in each piece of an edge between knot lines, off natural boundaries."""
-
-EVENLY = np.linspace(0.0, 1.0, 129)
 
 
 @dataclass(frozen=True, eq=False)
@@ -233,11 +230,9 @@ def led(nets: Mapping[int, Net], slides: Sequence[Slide], limit: float, weight: 
             uv = _along(net, slide)
             slack.append(np.zeros(len(uv)))
         else:
-            share, part = _pieces(net, slide.trace)
+            share, part = pieces([slide.trace], nets, POINTS)
             uv = slide.trace.places(share)
-            curve = net.evaluate(slide.trace.places(EVENLY))
-            length = float(np.linalg.norm(np.diff(curve, axis=0), axis=1).sum())
-            slack.append(limit**2 / (weight * length * part))
+            slack.append(limit**2 / (weight * slide.trace.length(net) * part))
         spots.append((slide, None, uv))
         for pin in slide.pins:
             spots.append((slide, pin, pin.uv[None]))
@@ -263,10 +258,3 @@ def _along(net: Net, slide: Slide) -> Array:
     along = KnotVector.from_multiplicities([low, *breaks[inner].tolist(), high], times, knots.degree).greville()
     at = (net.u, net.v)[axis].domain[place]
     return np.stack([np.full_like(along, at), along][:: 1 - 2 * axis], axis=1)
-
-
-def _pieces(net: Net, trace: Trace) -> tuple[Array, Array]:
-    """Gauss points of the pieces of an edge between knot lines, fractions, and their shares of it."""
-    breaks = crossings(trace, (net.u, net.v))
-    place, weight = gauss_pieces(breaks, POINTS)
-    return (breaks[:-1, None] + place).ravel(), weight.ravel()

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mracad.bspline.vectors import between
+from mracad.bspline.vectors import between, components
 from mracad.model.brep import Model
 from mracad.seam.border import SHARES, Border, Jet, outward
 from mracad.seam.cause import Cause, Still
@@ -94,7 +94,7 @@ def joint_of(
     if order == 0:
         return Joint(0, np.ones(1), np.empty(0), close=close)
     fit = bool(between(*normals).max() <= wishes.fit)
-    across, along = _components(sn, st, tn)
+    across, along = components(sn, st, tn).T
     size = np.linalg.norm(tn, axis=1)
     for limit in (EXACT, CLOSE):
         for degree, shear in _SHAPES:
@@ -112,7 +112,7 @@ def _bent(joint: Joint, sn: Array, st: Array, snn: Array, tnn: Array) -> Joint:
     """The joint with its second derivatives, if they have a law."""
     if joint.varying:
         return joint
-    bend, shear = _components(sn, st, tnn - joint.across[0] ** 2 * snn)
+    bend, shear = components(sn, st, tnn - joint.across[0] ** 2 * snn).T
     scale = np.linalg.norm(tnn, axis=1).max() + 1e-300
     fitted = [
         float(x.mean()) if np.abs(x[:, None] * d).max() > EXACT * scale else 0.0 for x, d in ((bend, sn), (shear, st))
@@ -121,14 +121,6 @@ def _bent(joint: Joint, sn: Array, st: Array, snn: Array, tnn: Array) -> Joint:
     if np.linalg.norm(off, axis=1).max() > CLOSE * scale:
         return joint
     return replace(joint, order=2, bend=fitted[0], shear=fitted[1])
-
-
-def _components(sn: Array, st: Array, vector: Array) -> tuple[Array, Array]:
-    """``x`` and ``y`` of the part x S_n + y S_t of ``vector`` in the tangent plane."""
-    nn, nt, tt = ((p * q).sum(axis=1) for p, q in ((sn, sn), (sn, st), (st, st)))
-    vn, vt = ((vector * p).sum(axis=1) for p in (sn, st))
-    det = nn * tt - nt * nt
-    return (vn * tt - vt * nt) / det, (vt * nn - vn * nt) / det
 
 
 def _polynomial(values: Array, degree: int) -> Array:

@@ -7,11 +7,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from mracad.bspline.basis import gauss_pieces
 from mracad.bspline.curve import Curve
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.knots import Side as Limit
 from mracad.bspline.surface import Net
-from mracad.bspline.vectors import unit
+from mracad.bspline.vectors import components, unit
 from mracad.model.brep import Face, Model, Trim
 from mracad.model.region import meeting
 from mracad.model.sampling import shares
@@ -89,6 +90,11 @@ class Trace:
         whole = share if self.law is None else np.interp(share, *self.law)
         return replace(self, law=(np.linspace(0.0, 1.0, len(share)), whole))
 
+    def length(self, net: Net) -> float:
+        """Length of the trace on a surface, mm."""
+        points = net.evaluate(self.places(EVENLY[::8]))
+        return float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
+
     def way(self, share: Array) -> Array:
         """Derivative of the curve by its own fraction, in the sense of the seam, ``(q, 2)``."""
         start, stop = self.curve.knots.domain
@@ -134,6 +140,15 @@ def crossings(trace: Trace, spaces: tuple[KnotVector, KnotVector]) -> Array:
     return np.asarray(every[np.append(True, np.diff(every) > NEAR)])
 
 
+def pieces(traces: Sequence[Trace], nets: Mapping[int, Net], points: int) -> tuple[Array, Array]:
+    """Gauss points of the pieces of a seam between knot lines of its traces: fractions, and their shares of it."""
+    found = [crossings(trace, (nets[trace.surface].u, nets[trace.surface].v)) for trace in traces]
+    breaks = np.sort(np.concatenate(found))
+    breaks = breaks[np.append(True, np.diff(breaks) > NEAR)]
+    place, weight = gauss_pieces(breaks, points)
+    return (breaks[:-1, None] + place).ravel(), weight.ravel()
+
+
 def derived(table: Sequence[Array], way: Array, bend: Array, order: int) -> Array:
     """D_c of some order of basis functions, plus D_z for order 2.
 
@@ -165,11 +180,11 @@ def directions(ground: Mapping[int, Net], a: Trace, b: Trace, share: Array) -> l
     tangent = unit(su * way[:, :1] + sv * way[:, 1:])
     conormal = unit(np.cross(np.cross(su, sv), tangent))
     _, tu, tv, *other = b.on(ground[b.surface], share, 2)
-    ways = _components(su, sv, conormal), _components(tu, tv, conormal)
+    ways = components(su, sv, conormal), components(tu, tv, conormal)
     bends = [_twice(x, y) for x, y in zip(ways, (second, other), strict=True)]
     return [
-        (ways[0], np.zeros_like(way), _components(su, sv, tangent)),
-        (ways[1], _components(tu, tv, bends[0] - bends[1]), _components(tu, tv, tangent)),
+        (ways[0], np.zeros_like(way), components(su, sv, tangent)),
+        (ways[1], components(tu, tv, bends[0] - bends[1]), components(tu, tv, tangent)),
     ]
 
 
@@ -177,10 +192,3 @@ def _twice(way: Array, second: Sequence[Array]) -> Array:
     """Second derivative in a direction, from those along u and v."""
     x, y = way[:, :1], way[:, 1:]
     return np.asarray(x * x * second[0] + 2 * x * y * second[1] + y * y * second[2])
-
-
-def _components(su: Array, sv: Array, vector: Array) -> Array:
-    """``(x, y)`` with x S_u + y S_v the part of ``vector`` in the tangent plane."""
-    e, f, g, p, q = ((x * y).sum(axis=1) for x, y in ((su, su), (su, sv), (sv, sv), (su, vector), (sv, vector)))
-    determinant = np.maximum(e * g - f * f, 1e-300)
-    return np.asarray(np.stack([p * g - q * f, q * e - p * f], axis=1) / determinant[:, None])

@@ -11,19 +11,17 @@ across the edge), z the direction in which the second derivatives of the input d
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mracad.bspline.basis import gauss_pieces
-from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import curvature
 from mracad.bspline.vectors import across, between
 from mracad.model.brep import Edge, Face, Model, Trim
 from mracad.seam.cause import Cause, Still
 from mracad.seam.natural import Seam, runs_back
-from mracad.seam.trace import EVENLY, LOOKS, NEAR, Trace, along, crossings, trace_of
+from mracad.seam.trace import EVENLY, LOOKS, Trace, along, pieces, trace_of
 from mracad.seam.wishes import Wishes
 
 Array = np.ndarray
@@ -153,8 +151,8 @@ def _trim(face: Face, edge: Edge) -> Trim:
 
 def judged(model: Model, traces: tuple[Trace, Trace]) -> Array:
     """Fractions of an edge at which a seam is judged: those of the report, and the Gauss points of all spans."""
-    spaces = {t.surface: (model.surfaces[t.surface].net.u, model.surfaces[t.surface].net.v) for t in traces}
-    return np.sort(np.concatenate([LOOKS, fine_sites(traces, spaces)[0]]))
+    nets = {trace.surface: model.surfaces[trace.surface].net for trace in traces}
+    return np.sort(np.concatenate([LOOKS, pieces(traces, nets, GAUSS)[0]]))
 
 
 def parted(model: Model, a: Trace, b: Trace, share: Array) -> Array:
@@ -178,11 +176,3 @@ def _opened(model: Model, traces: tuple[Trace, Trace], share: Array) -> tuple[Ar
     angle = between(*normals)
     angle[np.minimum(*(np.linalg.norm(n, axis=1) for n in normals)) == 0.0] = np.nan
     return np.linalg.norm(apart, axis=1), angle, bends
-
-
-def fine_sites(traces: tuple[Trace, Trace], spaces: Mapping[int, tuple[KnotVector, KnotVector]]) -> tuple[Array, Array]:
-    """Fractions of the conditions on fine spaces, and their weights: Gauss points of all spans."""
-    breaks = np.sort(np.concatenate([crossings(trace, spaces[trace.surface]) for trace in traces]))
-    breaks = breaks[np.append(True, np.diff(breaks) > NEAR)]
-    place, weight = gauss_pieces(breaks, GAUSS)
-    return (breaks[:-1, None] + place).ravel(), weight.ravel()
