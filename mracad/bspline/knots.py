@@ -284,6 +284,13 @@ class KnotVector:
             return self, (0, 0)
         return KnotVector(np.pad(self.knots, (before, after), "edge"), self.degree), (before, after)
 
+    def repeated(self) -> tuple[Array, Array]:
+        """Breaks and their multiplicities; of a periodic vector over five periods, the domain being the third."""
+        if not self.periodic:
+            return self.breaks, self.multiplicities
+        turns = self.period * np.arange(-2, 3)
+        return (self.breaks[:-1] + turns[:, None]).ravel(), np.tile(self.multiplicities[:-1], len(turns))
+
     def unrolled(self) -> KnotVector:
         """The same flat knots as a non-periodic vector: function ``i`` is control point ``i mod count`` of this one."""
         return KnotVector(self.knots, self.degree) if self.periodic else self

@@ -1,7 +1,7 @@
 """Details carried by the frames of surfaces.
 
-On the surface that they were taken from, details are what they were, to the bit.  On another one, with R the rotation
-from the tangent frame of the surface that they belong to to that of the new one at the same parameters,
+On the surface from which they were taken, details stay as they were, to the bit.  On another surface, with R the
+rotation from the tangent frame of their own surface to that of the new one at the same parameters,
 
     d' = d + spline through (R − I) d at the Greville points,
 
@@ -23,15 +23,15 @@ from mracad.bspline.vectors import cross, unit
 
 Array = np.ndarray
 Way = Literal["added", "carried", "projected"]
-"""Details come as they were; turned with the surface, over knots that hold them; or over knots that do not."""
+"""Details are added as they were; turned with the surface, over knots that hold them; or over knots that do not."""
 
 SAME = 1e-9
-"""Share of a domain within which knots are the same, and of the size of a surface within which points are."""
+"""Share of a domain within which knots are equal, and share of the size of a surface within which points are equal."""
 
 
 @dataclass(frozen=True, eq=False)
 class Laid:
-    """Details on a surface: control points of the displacement (mm), ``(nu, nv, 3)``, and how they came there."""
+    """Details on a surface: control points of the displacement (mm), ``(nu, nv, 3)``, and how they were placed."""
 
     offset: Array
     way: Way
@@ -39,14 +39,14 @@ class Laid:
 
 @dataclass(frozen=True, eq=False)
 class Piece:
-    """Details to be laid.
+    """Details to be placed on a surface.
 
     Attributes
     ----------
     net, motion : Net
-        The surface that they belong to, and they themselves over the same knots.
+        The surface to which they belong, and the details over the same knots.
     wavelength : float
-        About their longest waves, mm.
+        Approximate length of their longest waves, mm.
     """
 
     net: Net
@@ -54,7 +54,7 @@ class Piece:
     wavelength: float
 
     def placed(self, net: Net) -> Piece:
-        """They over the domain of a surface; knots that are its own but for rounding are made so."""
+        """The details over the domain of a surface; knots that equal its own up to rounding are replaced by them."""
         u, v = _placed(self.net.u, net.u), _placed(self.net.v, net.v)
         if (u, v) == (self.net.u, self.net.v):
             return self
@@ -62,18 +62,18 @@ class Piece:
         return Piece(own, motion, self.wavelength)
 
     def over(self, net: Net) -> Net:
-        """A surface over its knots and theirs."""
+        """A surface over its own knots and those of the details."""
         return net.over(_union(net.u, self.net.u), _union(net.v, self.net.v))
 
     def belongs(self, net: Net) -> bool:
-        """Whether a surface is the one that they belong to, but for more knots."""
+        """Whether a surface is the one to which the details belong, possibly with more knots."""
         if not _holds(self.net, net):
             return False
         off = np.abs(self.net.over(net.u, net.v).poles - net.poles).max()
         return bool(off <= SAME * np.ptp(net.poles, axis=(0, 1)).max())
 
     def laid(self, net: Net) -> Laid:
-        """They on a surface, over its knots."""
+        """The details on a surface, over its knots."""
         if self.belongs(net):
             return Laid(self.motion.over(net.u, net.v).poles, "added")
         places = net.u.greville(), net.v.greville()
@@ -86,7 +86,7 @@ class Piece:
 
 
 def _holds(net: Net, fine: Net) -> bool:
-    """Whether the offsets of one surface are those of another, with the same weights over more knots."""
+    """Whether the offsets of one surface can be those of another, with the same weights over more knots."""
     if not (is_nested(net.u, fine.u) and is_nested(net.v, fine.v)):
         return False
     one, two = net.over(fine.u, fine.v).weights, fine.weights
@@ -97,9 +97,9 @@ def _holds(net: Net, fine: Net) -> bool:
 
 def turns(before: Net, after: Net) -> Array:
     """The rotations from the tangent frames of one surface to those of another at the Greville points of the other,
-    ``(nu, nv, 3, 3)``: in the tangent plane the one that turns both tangents by the least.
+    ``(nu, nv, 3, 3)``; in the tangent plane, the one that turns both tangents least.
 
-    Where a surface has no normal, that of the whole is taken.
+    Where a surface has no normal, the rotation of the whole surface is taken.
     """
     places = after.u.greville(), after.v.greville()
     uv = pairs(*places)
@@ -127,13 +127,13 @@ def turns(before: Net, after: Net) -> Array:
 
 
 def _turn(before: Array, after: Array) -> Array:
-    """The rotation that brings points closest to others."""
+    """The rotation that best maps points to others."""
     u, _, vt = np.linalg.svd((after - after.mean(axis=0)).T @ (before - before.mean(axis=0)))
     return np.asarray(u @ np.diag([1.0, 1.0, np.sign(np.linalg.det(u @ vt)) or 1.0]) @ vt)
 
 
 def _union(own: KnotVector, other: KnotVector) -> KnotVector:
-    """The knots of both, of the higher degree."""
+    """The knots of both vectors, of the higher degree."""
     degree = max(own.degree, other.degree)
     own, other = own.elevated(degree), other.elevated(degree)
     place = np.minimum(np.searchsorted(own.breaks, other.breaks), own.spans)
@@ -143,7 +143,7 @@ def _union(own: KnotVector, other: KnotVector) -> KnotVector:
 
 
 def _placed(own: KnotVector, there: KnotVector) -> KnotVector:
-    """Knots in the domain of others."""
+    """Knots mapped to the domain of others."""
     low, high = own.domain
     knots = there.domain[0] + (own.knots - low) * (there.period / (high - low))
     near = there.breaks[np.abs(knots[:, None] - there.breaks).argmin(axis=1)]

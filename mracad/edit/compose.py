@@ -1,8 +1,8 @@
 """Composing: the details of a model put on its coarse shape, which may have been edited elsewhere.
 
-On the coarse surfaces that they were taken from, details are added as they are: the identity, whatever took them.  On
-others they are carried by the frames of these (:mod:`mracad.edit.carry`); the solver then finds the nearest admissible
-displacement, for frames on the two sides of a seam differ a little.
+On the coarse surfaces from which they were taken, details are added as they are, which gives the input.  On others they
+are carried by the frames of the surfaces (:mod:`mracad.edit.carry`); the solver then finds the nearest admissible
+displacement, because frames on the two sides of a seam differ a little.
 """
 
 from __future__ import annotations
@@ -40,13 +40,13 @@ from mracad.spec.steps import Compose
 Array = np.ndarray
 
 PLAIN = "coupled", "as-is", 1.0
-"""Edges, what seams keep and the amount that are asked for where details are just to come back."""
+"""Edges, continuity and amount with which details are simply put back."""
 
 PLACES = 3
-"""Points along u and along v by which surfaces are told apart."""
+"""Number of points along u and along v by which surfaces are distinguished."""
 
 ELSEWHERE = 100.0
-"""Surfaces have been numbered anew if others fit so many times better, in squared distances."""
+"""Surfaces count as renumbered if others fit better by this factor, in squared distances."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,13 +56,13 @@ class Detailed:
     Attributes
     ----------
     pieces : mapping of int to Piece
-        By surface.
+        Details by surface.
     refine : bool
-        Whether the knots of details are inserted where a surface lacks them.
+        Whether knots of the details are inserted where a surface lacks them.
     restores : bool
-        Whether all of them come back to where they were.
+        Whether all details are put back where they were.
     laid : dict
-        What is known already, by surface and knots.
+        Results so far, by surface and knots.
     """
 
     pieces: Mapping[int, Piece]
@@ -76,11 +76,11 @@ class Detailed:
 
     @property
     def growth(self) -> Growth:
-        """Details must not fold a face, unless it was so."""
+        """Details must not fold a face, unless it was folded before."""
         return RESTORED if self.restores else COARSE
 
     def wavelength(self, net: Net, faces: Sequence[Face], creases: Creases) -> float:
-        """That of the details."""
+        """The wavelength of the details, mm."""
         return self._piece(faces).wavelength
 
     def stretch(self, faces: Sequence[Face]) -> Stretch:
@@ -92,17 +92,17 @@ class Detailed:
         return self._piece(faces).over(net) if self.refine else net
 
     def detail(self, alone: Problem, sheet: Sheet) -> float:
-        """The largest change in the target; details count, however small they are."""
+        """The largest change in the target; even the smallest details count."""
         found = largest(self, alone, sheet)
         return max(found, 2 * DETAIL[0], 2 * DETAIL[1] * sheet.wavelength) if found else 0.0
 
     def target(self, problem: Problem, sheets: Mapping[int, Sheet], joined: Joints) -> Array:
-        """The details, as the surfaces carry them, ``(points, 3)``."""
+        """The details as carried by the surfaces, ``(points, 3)``."""
         return np.concatenate([self._on(i, space.net).offset.reshape(-1, 3) for i, space in problem.spaces.items()])
 
     def ways(self, problem: Problem, target: Array, width: float) -> Iterable[Iterable[Array]]:
-        """As they are, if they come back; otherwise the nearest that seams allow, and smoother transitions to what is
-        held."""
+        """The details as they are, if they are put back; else the nearest displacement that seams allow, and smoother
+        transitions to what is held."""
         if self.restores:
             yield [target]
             return
@@ -111,7 +111,7 @@ class Detailed:
             yield problem.nearest(target, stiffness(width / 2)), problem.nearest(problem.fading(width) * target)
 
     def way(self, surface: int) -> Way | None:
-        """How the details came on a surface at last."""
+        """How the details were placed on a surface in the end."""
         return next((each.way for (i, *_), each in reversed(self.laid.items()) if i == surface), None)
 
     def _piece(self, faces: Sequence[Face]) -> Piece:
@@ -138,21 +138,21 @@ def compose(
     Raises
     ------
     FileError
-        For a file that holds no details.
+        For a file that is not one of details.
     EditError
-        If none of them belongs to a face of the model.
+        If no details belong to a face of the model.
     """
     scope = scope or scope_of(model, options)
     details = load(options.details)
     pieces = matched(model, details)
     if not pieces and details.surfaces:
-        message = f"{model.name}: no face for the details of {options.details}"
+        message = f"{model.name}: no face fits the details in {options.details}"
         raise EditError(message, f"give the model that was made with them of {details.model}")
     bare = {i for surface in model.surfaces if surface.index not in pieces for i in surface.faces}
     refine = options.refine == "auto"
     same = all(piece.belongs(model.surfaces[i].net) for i, piece in pieces.items())
     if same:
-        options = structs.replace(options, refine="never")  # nothing has to be made to fit
+        options = structs.replace(options, refine="never")  # nothing needs more knots
     restored = same and _whole(model, options, scope, pieces)
     wish = Detailed(pieces, refine, restored)
     edit = edited(model, options, wish, replace(scope, faces=scope.faces - bare), progress, restored=restored)
@@ -165,14 +165,14 @@ def compose(
 
 
 def _whole(model: Model, options: Compose, scope: Scope, pieces: Mapping[int, Piece]) -> bool:
-    """Whether all details are to come, with nothing held."""
+    """Whether all details are put back, with nothing held."""
     faces = {face for i in pieces for face in model.surfaces[i].faces}
     held = scope.held or scope.edges or scope.zones or options.max_deviation is not None
     return faces <= scope.chosen and not held and (options.edges, options.keep, options.amount) == PLAIN
 
 
 def _notes(edit: Edit, wish: Detailed, count: int) -> tuple[str, ...]:
-    """How the details came on the surfaces that changed, and what did not find its place."""
+    """How details were placed on the surfaces that changed, and how many have no face."""
     ways = Counter(wish.way(i) for i in edit.displacement.offsets)
     said: dict[Way, str] = {
         "added": "added as they were",
@@ -186,8 +186,8 @@ def _notes(edit: Edit, wish: Detailed, count: int) -> tuple[str, ...]:
 
 
 def matched(model: Model, details: Details) -> dict[int, Piece]:
-    """The details of each surface of a model, by index: first those that are where they were; then those with the same
-    faces and as many control points, if these have not been numbered anew; then the nearest."""
+    """The details of each surface of a model, by index: first those in their old place; then those with the same faces
+    and as many control points, if these were not renumbered; then the nearest."""
     surfaces, every = model.surfaces, details.surfaces
     if not (surfaces and every):
         return {}
@@ -204,7 +204,7 @@ def matched(model: Model, details: Details) -> dict[int, Piece]:
 def _assigned(
     surfaces: Sequence[Surface], every: Sequence[Detail], rest: Sequence[int], others: Sequence[int], apart: Array
 ) -> dict[int, int]:
-    """Details for surfaces that are not where they were."""
+    """Details for surfaces that are not in their old place."""
     from scipy.optimize import linear_sum_assignment
 
     if not (rest and others):

@@ -1,12 +1,12 @@
-"""Details: what an edit took from the surfaces of a model, level by level, with the coarse surfaces left.
+"""Details: what an edit removed from the surfaces of a model, level by level, and the coarse surfaces that remain.
 
 With c the control points of a coarse surface and f those of the surface before, over the same knots, d = f − c is a
-displacement; of a rational surface, too, whose weights stay.  On the ladder of these knots, and with S the L2
+displacement, also of a rational surface, whose weights stay.  On the ladder of these knots, and with S the L2
 projections between its rungs, it is the sum of the splines
 
     d₀ − S d₀,   d₁ − S d₁,   …,   d_L      with d₀ = d and d_{j+1} = S d_j,
 
-which are orthogonal over the parameters: what wavelets on these knots would span.
+which are orthogonal over the parameters: they lie in the spaces that wavelets on these knots span.
 """
 
 from __future__ import annotations
@@ -28,10 +28,10 @@ from mracad.wavelet.project import projection
 Array = np.ndarray
 
 MOST = 0.99
-"""Share of the energy of details by which their wavelength is told."""
+"""Share of the energy of details that determines their wavelength."""
 
 ROUNDING = 1e-15
-"""Share of the details below which what levels leave of them is nothing."""
+"""Share of the details below which the remainder of their levels counts as zero."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,14 +41,14 @@ class Detail:
     Attributes
     ----------
     net : Net
-        The surface without them, over knots that hold both.
+        The surface without the details, over knots that hold both.
     levels : sequence of Net
         The details of each level, without weights, over the knots of the level: from the finest, which are those of the
         surface, to the coarsest, with all that is coarser still.
     rest : ndarray (nu, nv, 3), optional
-        What rounding lost of them on the way.
+        Rounding loss of the levels, mm.
     wavelength : float
-        About the longest waves in them, mm.
+        Approximate length of the longest waves in them, mm.
     faces : tuple of int
         Indices of the faces on the surface.
     product : str
@@ -66,7 +66,7 @@ class Detail:
 
     @classmethod
     def of(cls, net: Net, offset: Array) -> Detail:
-        """The details ``(nu, nv, 3)`` that make a surface out of a coarse one."""
+        """The details of a coarse surface, from their control points ``(nu, nv, 3)``."""
         lengths = [arc_lengths(net, axis) for axis in (0, 1)]
         ladders = [rungs_by_level(k, lengths=each) for k, each in zip((net.u, net.v), lengths, strict=True)]
         rungs = zip_longest(*(ladder[1:] for ladder in ladders))
@@ -88,7 +88,7 @@ class Detail:
 
     @property
     def motion(self) -> Net:
-        """They as a net of their own."""
+        """The details as a net of their own."""
         return self.net.with_poles(self.offset)
 
 
@@ -103,7 +103,7 @@ class Details:
     diagonal : float
         mm.
     made : str
-        What was done to it.
+        What was done to the model.
     surfaces : tuple of Detail
     """
 
@@ -114,7 +114,7 @@ class Details:
 
     @classmethod
     def of(cls, model: Model, displacement: Displacement, made: str = "") -> Details:
-        """What an edit took from a model."""
+        """The details that an edit removed from a model."""
         found = []
         for index, offset in displacement.offsets.items():
             surface = model.surfaces[index]
@@ -134,7 +134,7 @@ def summed(levels: Sequence[Net]) -> Array:
 
 
 def _taken(net: Net, offset: Offset) -> Detail:
-    """What an offset took from a surface."""
+    """The details that an offset removed from a surface."""
     fine = offset.over(net)
     coarse = fine.with_poles(fine.poles + offset.poles)
     wanted = fine.poles - coarse.poles

@@ -45,7 +45,7 @@ class Gains:
     Attributes
     ----------
     bands : sequence of (float, float, float)
-        Least and largest wavelength, mm, and gain, in ascending order; they do not overlap.
+        Smallest and largest wavelength, mm, and gain, in ascending order; bands do not overlap.
     """
 
     bands: Sequence[tuple[float, float, float]]
@@ -64,7 +64,7 @@ class Gains:
 
     @property
     def growth(self) -> Growth:
-        """Unless it smooths, it makes faces rougher by intent, but folds none."""
+        """Unless it smooths, it may make faces rougher, but must not fold them."""
         return GROWTH if self.smooths else TURNED
 
     def wavelength(self, net: Net, faces: Sequence[Face], creases: Creases) -> float:
@@ -91,13 +91,13 @@ class Gains:
             shares[high] = shares.get(high, 0.0) + 1.0 - gain
         total = np.zeros_like(problem.f)
         for cut, share in shares.items():
-            if cut and share:  # that of L_0 is what the others lack to 0
+            if cut and share:  # L_0 f = f adds nothing to δ, because all shares sum to 0
                 above = _above(problem, sheets, TREND * cut)
                 total += share * problem.filtered(stiffness(cut), problem.seen, above, order=4)
         return np.asarray(total)
 
     def ways(self, problem: Problem, target: Array, width: float) -> Iterable[Iterable[Array]]:
-        """The displacement nearest to the target, and ever smoother transitions from it to what is held."""
+        """The displacement nearest to the target, and smoother transitions from it to what is held."""
         if not problem.rimmed:
             yield [target]
             return
@@ -108,7 +108,7 @@ class Gains:
 def _above(problem: Problem, sheets: Mapping[int, Sheet], scale: float) -> Array:
     """The heights of surfaces above their parts coarser than a scale (mm), as vectors along normals, ``(points, 3)``.
 
-    What lies along the surface is the parameterization: waves must not move with it.
+    The part along the surface is only parameterisation, which waves must not change.
     """
     found = []
     for i, space in problem.spaces.items():

@@ -52,7 +52,7 @@ Coarse = Mapping[int, tuple[KnotVector, KnotVector]]
 
 LOOSE = 1e-4
 """Relative weight of fitting against the conditions of seams on coarse splines: where joints are imperfect, conditions
-contradict each other a little at vertices, and must not be met at any price."""
+contradict each other a little at vertices, and should not be met exactly."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ class Coarser:
 
     @property
     def whole(self) -> bool:
-        """Less of a coarse shape is none."""
+        """Part of the way to a coarse shape is not one."""
         return not self.fairs
 
     @property
@@ -145,8 +145,8 @@ class Coarser:
 
 
 def _of_coarse(joint: Joint) -> Joint:
-    """The joint of coarse surfaces: as smooth as that of the surfaces themselves, but for second derivatives that jump
-    in it because parameters run unevenly there: coarse splines would have to do so over far longer spans."""
+    """The joint of coarse surfaces: as smooth as that of the surfaces themselves, except for second derivatives that
+    jump only because parameters run unevenly: coarse splines would have to jump over far longer spans."""
     best = joint.smoother or joint
     return replace(best, order=1, bend=0.0, shear=0.0) if best.order == 2 and (best.bend or best.shear) else best
 

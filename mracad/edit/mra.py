@@ -1,4 +1,4 @@
-"""Files of details (``.mra``): a zip of numpy arrays and a header; ``docs/mra.md`` says what they hold."""
+"""Files of details (``.mra``): a zip file of numpy arrays and a header; see ``docs/mra.md``."""
 
 from __future__ import annotations
 
@@ -28,19 +28,19 @@ HEADER = "header.json"
 HINT = "make one with mracad level --details"
 
 MOST = 1 << 30
-"""Most bytes in all parts of a file: those of some ten million control points."""
+"""Largest number of bytes in all parts of a file: enough for about ten million control points."""
 
 MOST_HEADER, MOST_KNOTS = 1 << 25, 1 << 20
-"""Most bytes of a header, and most knots of a knot vector."""
+"""Largest number of bytes of a header, and of knots of a knot vector."""
 
 SPARE = 4096
-"""Most bytes of an array beside its numbers."""
+"""Largest number of bytes of an array besides its numbers."""
 
 BAD = (
     zipfile.BadZipFile, zlib.error, msgspec.MsgspecError, EOFError, KeyError, NotImplementedError, RuntimeError,
     OverflowError, ValueError, SyntaxError,
 )  # fmt: skip
-"""What reading a damaged zip file, header or array raises."""
+"""Exceptions that reading a damaged zip file, header or array raises."""
 
 
 _Degree = Annotated[int, Meta(ge=1, le=25)]
@@ -59,7 +59,7 @@ class _Surface(msgspec.Struct, forbid_unknown_fields=True):
 
 
 class _Header(msgspec.Struct, forbid_unknown_fields=True):
-    """What stands in ``header.json``; lengths in mm."""
+    """The content of ``header.json``; lengths in mm."""
 
     format: str
     unit: str
@@ -88,7 +88,7 @@ def save(details: Details) -> bytes:
 
 
 def _put(archive: zipfile.ZipFile, name: str, data: bytes) -> None:
-    """Add a part; without the time, so that the same details give the same bytes."""
+    """Add a part without its time, so that the same details give the same bytes."""
     info = zipfile.ZipInfo(name)
     archive.writestr(info, data, zipfile.ZIP_DEFLATED, compresslevel=1)
 
@@ -109,7 +109,7 @@ def load(path: str | os.PathLike[str]) -> Details:
     Raises
     ------
     FileError
-        For a file that cannot be read, is none of details, is damaged, or has more than :data:`MOST` bytes in it.
+        For a file that cannot be read, is not one of details, is damaged, or contains more than :data:`MOST` bytes.
     """
     file = Path(path)
     try:
@@ -125,14 +125,14 @@ def load(path: str | os.PathLike[str]) -> Details:
 
 
 class _Reader:
-    """Reads the parts of an archive, none larger than it must be."""
+    """Reads the parts of an archive, and refuses those that are too large."""
 
     def __init__(self, archive: zipfile.ZipFile) -> None:
         self.archive = archive
         self.left = MOST
 
     def details(self) -> Details:
-        """All of it."""
+        """All details in the file."""
         header = msgspec.json.decode(self._part(HEADER, MOST_HEADER), type=_Header)
         if header.format != FORMAT or header.unit != "mm":
             raise FileError(f"its format is {header.format!r} in {header.unit!r}, not {FORMAT!r} in 'mm'")
@@ -161,7 +161,7 @@ class _Reader:
         return f"{name}.npy" in self.archive.NameToInfo
 
     def _array(self, name: str, shape: tuple[int, ...]) -> Array:
-        """An array of a shape that is known."""
+        """An array of a known shape."""
         found = self._read(name, math.prod(shape))
         if found.shape != shape:
             raise FileError(f"{name} has the shape {found.shape}, not {shape}")
@@ -175,7 +175,7 @@ class _Reader:
         return found
 
     def _read(self, name: str, most: int) -> Array:
-        """An array of so many numbers at most."""
+        """An array of at most ``most`` numbers."""
         stream = io.BytesIO(self._part(f"{name}.npy", 8 * most + SPARE))
         version = np.lib.format.read_magic(stream)
         header = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
@@ -189,7 +189,7 @@ class _Reader:
         return found
 
     def _part(self, name: str, most: int) -> bytes:
-        """The bytes of a part, so many at most."""
+        """The bytes of a part, at most ``most``."""
         info = self.archive.getinfo(name)
         if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
             raise FileError(f"{name} is compressed in an unknown way")

@@ -16,6 +16,7 @@ import numpy as np
 from mracad.inspect.faults import Fault, FaultKind, ReadBack
 from mracad.inspect.seams import SeamMeasure, seams
 from mracad.model.facts import Facts, Line
+from mracad.model.sampling import length
 
 Array = np.ndarray
 
@@ -254,9 +255,9 @@ def _borders(facts: Facts) -> Array:
     """Uncertainty of each face's area by the tolerances of its edges, ``(f,)``, mm²."""
     found = np.zeros(facts.count)
     for edge in facts.edges:
-        length = float(np.linalg.norm(np.diff(edge.points[0, :, :3], axis=0), axis=1).sum())
+        uncertain = 2 * max(edge.tolerance, SLACK) * length(edge.points[0, :, :3])
         for face in edge.faces:
-            found[face] += 2 * max(edge.tolerance, SLACK) * length
+            found[face] += uncertain
     return found
 
 

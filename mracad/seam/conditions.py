@@ -99,10 +99,7 @@ def _elevated(nets: Mapping[int, Net], seams: Sequence[Seam]) -> dict[int, Net]:
 
 def _inner(knots: KnotVector, border: Border) -> dict[float, int]:
     """Fractions of the knots along a seam, and their multiplicities."""
-    breaks, counts = knots.breaks, knots.multiplicities
-    if knots.periodic:
-        turns = knots.period * np.arange(-2, 3)
-        breaks, counts = (breaks[:-1] + turns[:, None]).ravel(), np.tile(counts[:-1], len(turns))
+    breaks, counts = knots.repeated()
     share = (breaks - border.start) / (border.stop - border.start)
     order = np.argsort(share)
     return {float(x): int(n) for x, n in zip(share[order], counts[order], strict=True) if SAME < x < 1 - SAME}

@@ -247,10 +247,7 @@ def _along(net: Net, slide: Slide) -> Array:
     knots = (net.u, net.v)[1 - axis]
     ends = slide.trace.places(np.array([0.0, 1.0]))[:, 1 - axis]
     low, high = sorted(float(x) for x in ends)
-    breaks, counts = knots.breaks, knots.multiplicities
-    if knots.periodic:
-        turns = knots.period * np.arange(-2, 3)
-        breaks, counts = (breaks[:-1] + turns[:, None]).ravel(), np.tile(counts[:-1], len(turns))
+    breaks, counts = knots.repeated()
     near = 1e-9 * (high - low)
     inner = (breaks > low + near) & (breaks < high - near)
     most = knots.degree + 1

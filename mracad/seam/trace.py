@@ -15,7 +15,7 @@ from mracad.bspline.surface import Net
 from mracad.bspline.vectors import components, unit
 from mracad.model.brep import Face, Model, Trim
 from mracad.model.region import meeting
-from mracad.model.sampling import shares
+from mracad.model.sampling import length, shares
 from mracad.seam.border import Border
 from mracad.seam.hold import local_span
 from mracad.seam.sides import from_inside
@@ -92,8 +92,7 @@ class Trace:
 
     def length(self, net: Net) -> float:
         """Length of the trace on a surface, mm."""
-        points = net.evaluate(self.places(EVENLY[::8]))
-        return float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
+        return length(net.evaluate(self.places(EVENLY[::8])))
 
     def way(self, share: Array) -> Array:
         """Derivative of the curve by its own fraction, in the sense of the seam, ``(q, 2)``."""

@@ -218,7 +218,7 @@ def test_a_model_that_the_details_are_not_of_is_refused(tmp_path):
     path = tmp_path / "a.mra"
     coarse(sheet(rough(spans=(24, 18))[1]), path)
     empty = mracad.Model("empty.step", (), (), (), 100.0)
-    with pytest.raises(EditError, match=r"empty\.step: no face for the details"):
+    with pytest.raises(EditError, match=r"empty\.step: no face fits the details"):
         compose(empty, Compose(details=str(path)))
 
 

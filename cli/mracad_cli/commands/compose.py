@@ -1,4 +1,4 @@
-"""Put the details of a model, as mracad level saves them, on its coarse shape, or on one that was edited since."""
+"""Put the details that mracad level saved back on the coarse model, or on one that was edited since."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Bring the NURBS faces of a model to a level: the coarse shape that they form together, without its details."""
+"""Reduce the NURBS faces of a model to a level: the coarse shape that they form together, without its details."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 )
 def command(chosen: Level, details: str | None, **how: Any) -> int:
     if details and not details.endswith(".mra"):
-        raise UsageError(f"cannot write {details}: details need another ending", "end it in .mra")
+        raise UsageError(f"cannot write {details}: unknown extension", "use .mra for details")
 
     def taken(report: Report) -> bytes:
         from mracad.edit.details import Details

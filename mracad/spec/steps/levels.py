@@ -1,4 +1,4 @@
-"""Options of edits that take faces to a level of detail, and of their details."""
+"""Options of edits that separate and restore levels of detail."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from mracad.spec.steps.smooth import Fitting
 
 
 class Shaped(Fitting, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What edits share that bring a whole shape, of which free edges are part."""
+    """Options of edits that change a whole shape, including its free edges."""
 
     edges: Annotated[
         Literal["coupled", "frozen"],
@@ -25,22 +25,22 @@ class Shaped(Fitting, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
 
 class Level(Shaped, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Bring the NURBS faces of a model to a level: the coarse shape that they form together, without its details."""
+    """Reduce the NURBS faces of a model to a level: the coarse shape that they form together, without its details."""
 
     function: ClassVar[str] = "mracad.edit.level:level"
 
     level: Annotated[
         Annotated[float, Meta(gt=0.0)] | None,
         Meta(
-            description="How many levels of the faces' own knot ladders to go down, 2.5 for half-way between two and "
+            description="How many levels of the faces' own knot ladders to remove; 2.5 is halfway between two and "
             "three."
         ),
     ] = None
     scale: Annotated[
         Length | None,
         Meta(
-            description="Instead of --level: a wavelength (5mm, or 2% of the model's diagonal). Knots end up half of "
-            "it to all of it apart."
+            description="Instead of --level: a wavelength (5mm, or 2% of the model's diagonal). Knots are then half to "
+            "one wavelength apart."
         ),
     ] = None
 
@@ -53,19 +53,19 @@ class Level(Shaped, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
     @property
     def done(self) -> str:
-        return f"brought to {self.scale}" if self.level is None else f"brought to level {self.level:g}"
+        return f"reduced to {self.scale}" if self.level is None else f"reduced to level {self.level:g}"
 
     @property
     def quiet(self) -> str:
-        return "without detail to leave out" if self.amount else "left as they are: amount 0"
+        return "without detail to remove" if self.amount else "left as they are: amount 0"
 
 
 class Compose(Shaped, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Put the details of a model, as mracad level saves them, on its coarse shape, or on one that was edited since."""
+    """Put the details that mracad level saved back on the coarse model, or on one that was edited since."""
 
     function: ClassVar[str] = "mracad.edit.compose:compose"
 
-    details: Annotated[File, Meta(description="The file of the details (.mra).")]
+    details: Annotated[File, Meta(description="File with the details (.mra).")]
 
     @property
     def done(self) -> str:
