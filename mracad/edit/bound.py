@@ -14,14 +14,13 @@ import numpy as np
 
 from mracad.bspline.surface import Net
 from mracad.edit.driver import groups
-from mracad.edit.fair import DETAIL, Filter
+from mracad.edit.fair import Filter
 from mracad.edit.modes import Axis, inside, modes, outside
 from mracad.edit.pose import Scene, pose
 from mracad.edit.result import Edit
 from mracad.edit.target import TREND, sheets, stiffness
 from mracad.edit.tolerances import Tolerances
 from mracad.edit.trial import heights
-from mracad.errors import EditError
 from mracad.model.brep import Model
 from mracad.seam.interface import joints
 from mracad.seam.wishes import Wishes
@@ -69,19 +68,12 @@ def widest(
         Its ``deviation`` is the bound, mm.
     edit : callable
         The edit at a scale, mm.
-
-    Raises
-    ------
-    EditError
-        If no face has anything to smooth, at any scale.
     """
     bound, curve = allowed.deviation, _curve(model, movable, allowed.deviation)
     known: dict[float, float] = {}
     scale = _at(curve, bound, known)
     for _ in range(LOOKS):
         found = known[scale] = _deviation(model, movable, Filter(scale, limited=limited), wishes, allowed)
-        if scale >= model.diagonal and found <= DETAIL[0]:
-            raise EditError(f"{model.name}: nothing to smooth, at any scale", "choose other faces")
         if (scale >= model.diagonal or found >= CLOSE * bound) and found <= bound:
             break
         scale = _at(curve, AIM * bound, known)
@@ -111,7 +103,7 @@ def _curve(model: Model, movable: Collection[int], bound: float) -> Array:
     scale, found = min((2 * axis.step for axes in every for axis in axes), default=model.diagonal) / 4, [(0.0, 0.0)]
     while scale < model.diagonal and found[-1][1] < BEYOND * bound:
         both = zip(nets, every, strict=True)
-        found.append((scale, max(found[-1][1], *(_filtered(net, axes, scale) for net, axes in both))))
+        found.append((scale, max([found[-1][1], *(_filtered(net, axes, scale) for net, axes in both)])))
         scale *= 2 ** (1 / STEPS)
     return np.array([*found, (model.diagonal, max(found[-1][1], 1e-300))]).T
 
@@ -149,5 +141,5 @@ def _deviation(model: Model, movable: Collection[int], wish: Filter, wishes: Wis
         if problem.free.any():
             delta = problem.nearest(wish.target(problem, members, within))
             parts = zip(problem.spaces.values(), problem.split(delta).values(), strict=True)
-            most = max(most, *(float(heights(space.net, part, POINTS)[space.seen].max()) for space, part in parts))
+            most = max([most, *(float(heights(space.net, part, POINTS)[space.seen].max()) for space, part in parts)])
     return most

@@ -1,16 +1,18 @@
 """A bound of the deviation instead of a scale: the largest scale that stays within it."""
 
+import cadquery
 import numpy as np
 import pytest
 
 from mracad.bspline.knots import KnotVector
 from mracad.edit import bound as bound_module
 from mracad.edit.smooth import smooth
-from mracad.errors import EditError, UsageError
+from mracad.errors import UsageError
 from mracad.occ.view import view
 from mracad.spec.steps import Smooth
 from tests.edit import panels
 from tests.edit.models import fitted, sheet
+from tests.occ import shapes
 
 
 def deviation(model, edit):
@@ -68,10 +70,12 @@ def test_a_bound_that_no_scale_reaches_takes_the_largest():
     assert edit.scale == model.diagonal and 0 < deviation(model, edit) < 1
 
 
-def test_nothing_to_smooth_is_said():
+def test_models_with_nothing_to_smooth_come_out_as_they_are():
     knots = KnotVector.clamped(np.linspace(0, 1, 21), 3)
-    with pytest.raises(EditError, match="nothing to smooth, at any scale"):
-        smooth(sheet(fitted(knots, knots, lambda x, y: 0.3 * x + 0 * y)), Smooth(max_deviation="0.1mm"))
+    flat = sheet(fitted(knots, knots, lambda x, y: 0.3 * x + 0 * y))
+    for model in (flat, view(shapes.document(cadquery.Solid.makeBox(3, 2, 1).wrapped))):
+        edit = smooth(model, Smooth(max_deviation="0.1mm"))
+        assert edit.scale == model.diagonal and not edit.displacement.offsets
 
 
 @pytest.mark.parametrize(
