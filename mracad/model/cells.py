@@ -24,6 +24,9 @@ ENOUGH = 16
 
 HALVINGS = 5
 
+NARROW = 8
+"""Margins that a face is wide at least."""
+
 ASIDE = 1e-3
 """Fraction of a piece by which points on its ends are moved inside, because boundaries run along ends."""
 
@@ -103,7 +106,8 @@ def quadrature(
 
     Notes
     -----
-    Exact over faces bounded by parameter lines; elsewhere points count as wholly inside or outside the boundary.
+    Exact over faces bounded by parameter lines; elsewhere points count as wholly inside or outside the boundary.  A
+    face too narrow to contain a point counts as the box around it.
     """
     shapes = [outline(face, net) for face in faces]
     for halvings in range(HALVINGS + 1):
@@ -114,11 +118,29 @@ def quadrature(
         on = [inside_grid(face, net, _drawn_in(u), _drawn_in(v)) for face in faces]
         if all(shape.natural or mask.sum() >= ENOUGH for shape, mask in zip(shapes, on, strict=True)):
             break
+    on = [mask if mask.any() else _boxed(shape, net, u, v) for shape, mask in zip(shapes, on, strict=True)]
     mask = np.logical_or.reduce(on)
     cells = mask.reshape(*u.shape, *v.shape).any(axis=(1, 3))
     keep_u, keep_v = cells.any(axis=1), cells.any(axis=0)
     mask = mask[np.repeat(keep_u, u.shape[1])][:, np.repeat(keep_v, v.shape[1])]
     return Quadrature(u[keep_u], v[keep_v], wu[keep_u], wv[keep_v], mask)
+
+
+def _boxed(shape: Outline, net: Net, u: Array, v: Array) -> Array:
+    """Which products of the points of pieces lie in the box around a boundary."""
+    on = []
+    for axis, (kv, x) in enumerate(((net.u, u), (net.v, v))):
+        low, high = limits = _limits(shape, kv, axis)
+        copies = _copies(kv, x.ravel(), limits)
+        on.append(((copies >= low) & (copies <= high)).any(axis=0))
+    return np.asarray(on[0][:, None] & on[1])
+
+
+def _limits(shape: Outline, kv: KnotVector, axis: int) -> Array:
+    """First and last parameter of a boundary, ``(2,)``; some margins apart even if it has no width."""
+    low, high = shape.box[:, axis]
+    short = max(NARROW * MARGIN * kv.period - (high - low), 0.0) / 2
+    return np.array([low - short, high + short])
 
 
 def _within(kv: KnotVector, x: Array) -> Array:
@@ -193,7 +215,7 @@ def _breaks(kv: KnotVector, axis: int, shapes: Sequence[Outline], pieces: int) -
     trimmed = [shape for shape in shapes if not shape.natural]
     if not trimmed:
         return np.stack([kv.breaks[:-1], kv.breaks[1:]], axis=1)
-    limits = np.array([shape.box[:, axis] for shape in trimmed])
+    limits = np.array([_limits(shape, kv, axis) for shape in trimmed])
     low, high = kv.domain
     extra = kv.wrap(np.concatenate([limits.ravel(), *(shape.lines(axis) for shape in trimmed)]))
     extra = np.unique(extra[(extra > low) & (extra < high)])

@@ -107,6 +107,17 @@ def test_a_sliver_has_points():
     assert quadrature(plane(1), [sliver]).mask.any()
 
 
+@pytest.mark.parametrize("ends", [False, True])
+@pytest.mark.parametrize("corners", [[(0.2, 0.3), (0.7, 0.6), (0.7, 0.6 + 1e-9)], [(0.4, 0.2), (0.4, 0.7), (0.4, 0.9)]])
+def test_a_face_too_narrow_for_points_counts_as_its_box(corners, ends):
+    rule = quadrature(plane(5), [face(polygon(*corners))], ends=ends)
+    assert rule.mask.any()
+    low, high = np.min(corners, axis=0), np.max(corners, axis=0)
+    for axis, x in enumerate((rule.u, rule.v)):
+        on = x.ravel()[rule.mask.any(axis=1 - axis)]
+        assert on.min() >= low[axis] - 1e-6 and on.max() <= high[axis] + 1e-6
+
+
 @pytest.mark.parametrize("start", [0.0, 0.3, -0.7, 0.9, 2.4])
 @pytest.mark.parametrize("width", [0.25, 1.0])
 def test_windows_of_a_periodic_cylinder(start, width):
