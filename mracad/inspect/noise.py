@@ -3,27 +3,36 @@
 Divided differences with weights of unit norm keep the standard deviation of white noise on control points, whatever
 their order; those of a smooth surface are small, and change with the order.  The noise is the least of the estimates
 by differences of order 3 along both axes and of order 4 along each, or the mean of those that agree with it, if those
-of neighbouring orders do.
+of neighbouring orders do.  Only noise along the normal shows, and scanners make little other: an estimate is that of
+the differences along normals, if it differs from that of all three coordinates by more than chance.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from mracad.bspline.surface import Net
+from mracad.bspline.surface import Net, pairs
 
 Array = np.ndarray
 Orders = tuple[int, int]
+Deviation = Callable[[Net, Orders, Array, Array], float]
+"""Of some differences of a net of given orders."""
 
 KINDS: tuple[tuple[Orders, ...], ...] = ((3, 3), (2, 2)), ((4, 0), (3, 0), (5, 0)), ((0, 4), (0, 3), (0, 5))
 """Orders of differences along u and v: of each kind the one that counts, and its neighbours."""
 
 MEDIAN = 1.5381723
 """Median length of a vector of three standard normal numbers: of χ with three degrees of freedom."""
+
+NORMAL = 0.6744898
+"""Median of the absolute value of a standard normal number."""
+
+CHANCE = 3.0
+"""Times 1 / √n: most by which estimates along normals and in all coordinates differ where noise has no direction."""
 
 AGREE = 1.15
 """An estimate above this times the least contains shape."""
@@ -78,21 +87,25 @@ def noise(net: Net, points: Array, seen: Array) -> Noise | None:
     seen : ndarray of bool (nu, nv)
         Those that follow the surface at all.
     """
-    size = _size(net, points, seen, seen)
-    if not size:
+    mean = _size(net, points, seen, seen, _mean)
+    if not mean:
         return None
-    where = seen & ~_runs(_around(net, seen) <= (CALM * size) ** 2)
-    size = _size(net, where & points, seen, where)
+    where = seen & ~_runs(_around(net, seen) <= (CALM * mean) ** 2)
+    size = _size(net, where & points, seen, where, _along_normals)
     at = net.u.greville(), net.v.greville()
     return Noise(size, where, at) if size > ROUNDING * float(np.abs(net.poles).max()) else None
 
 
-def _size(net: Net, points: Array, seen: Array, noisy: Array) -> float:
+def _size(net: Net, points: Array, seen: Array, noisy: Array, deviation: Deviation) -> float:
     """Standard deviation by the differences about ``points``, if ``noisy`` ones have noise; 0 for none."""
-    every = [
-        [_estimate(net, orders, points, seen, noisy, BESIDE if k else FEWEST) for k, orders in enumerate(kind)]
-        for kind in KINDS
-    ]
+
+    def estimate(orders: Orders, fewest: int) -> float:
+        found, share, within = _differences(net, orders, points, seen, noisy)
+        use = within & (share > 0)
+        return deviation(net, orders, found / np.sqrt(share)[..., None], use) if use.sum() >= fewest else np.inf
+
+    with np.errstate(divide="ignore", invalid="ignore"):
+        every = [[estimate(orders, BESIDE if k else FEWEST) for k, orders in enumerate(kind)] for kind in KINDS]
     found = [each for each in every if np.isfinite(each[0])]
     if not found:
         return 0.0
@@ -103,10 +116,22 @@ def _size(net: Net, points: Array, seen: Array, noisy: Array) -> float:
     return float(main[main <= AGREE * main.min()].mean())
 
 
-def _estimate(net: Net, orders: Orders, points: Array, seen: Array, noisy: Array, fewest: int) -> float:
-    lengths, share, within = _differences(net, orders, points, seen, noisy)
-    use = within & (share > 0)
-    return float(np.median(lengths[use] / np.sqrt(share[use])) / MEDIAN) if use.sum() >= fewest else np.inf
+def _mean(net: Net, orders: Orders, found: Array, use: Array) -> float:
+    """The deviation of differences, the mean of all coordinates."""
+    return float(np.median(np.linalg.norm(found[use], axis=1)) / MEDIAN)
+
+
+def _along_normals(net: Net, orders: Orders, found: Array, use: Array) -> float:
+    """That along normals, where it differs from the mean by more than chance."""
+    us, vs = (kv.greville()[k // 2 :][:n] for kv, k, n in zip((net.u, net.v), orders, use.shape, strict=True))
+    normals = net.normals(pairs(us, vs)).reshape(found.shape)
+    heights = np.abs((found * normals).sum(axis=2)[use])
+    heights = heights[np.isfinite(heights)]
+    mean = _mean(net, orders, found, use)
+    if not len(heights):
+        return mean
+    along = float(np.median(heights)) / NORMAL
+    return along if abs(along - mean) > CHANCE / np.sqrt(len(heights)) * mean else mean
 
 
 def _around(net: Net, seen: Array) -> Array:
@@ -115,10 +140,10 @@ def _around(net: Net, seen: Array) -> Array:
 
     least = np.full(seen.shape, np.inf)
     for axis, orders in enumerate(((4, 0), (0, 4))):
-        lengths, _, within = _differences(net, orders, seen, seen, seen)
+        found, _, within = _differences(net, orders, seen, seen, seen)
         counted = np.zeros((2, *seen.shape))
-        middle = tuple(slice(k // 2, k // 2 + n) for k, n in zip(orders, lengths.shape, strict=True))
-        counted[0][middle], counted[1][middle] = np.where(within, lengths**2 / 3, 0.0), within
+        middle = tuple(slice(k // 2, k // 2 + n) for k, n in zip(orders, within.shape, strict=True))
+        counted[0][middle], counted[1][middle] = np.where(within, (found**2).mean(axis=2), 0.0), within
         total, count = uniform_filter1d(counted, LOCAL, axis=1 + axis, mode="constant")
         least = np.where(count > 2.5 / LOCAL, np.minimum(least, total / np.maximum(count, 1e-300)), least)
     return least
@@ -132,22 +157,21 @@ def _runs(points: Array) -> Array:
 
 
 def _differences(net: Net, orders: Orders, points: Array, seen: Array, noisy: Array) -> tuple[Array, Array, Array]:
-    """Lengths of differences, the share of each that noise on ``noisy`` control points has, and whether it is about
+    """Differences ``(…, 3)``, the share of each that noise on ``noisy`` control points has, and whether it is about
     some of ``points`` alone and follows the surface."""
     window = orders[0] + 1, orders[1] + 1
     if any(count < size for count, size in zip(points.shape, window, strict=True)):
-        return np.zeros((0, 0)), np.zeros((0, 0)), np.zeros((0, 0), bool)
+        return np.zeros((0, 0, 3)), np.zeros((0, 0)), np.zeros((0, 0), bool)
     found, share = net.poles, noisy.astype(float)
     for axis, order in enumerate(orders):
         if order:
             weights = _weights((net.u, net.v)[axis].greville(), order)
             found, share = _applied(weights, found, axis), _applied(weights**2, share, axis)
-    lengths = np.linalg.norm(found, axis=2)
-    within = sliding_window_view(seen, window).all(axis=(2, 3)) & np.isfinite(lengths)
+    within = sliding_window_view(seen, window).all(axis=(2, 3)) & np.isfinite(found).all(axis=2)
     for i in _middle(orders[0]):
         for j in _middle(orders[1]):
-            within &= points[i : i + lengths.shape[0], j : j + lengths.shape[1]]
-    return lengths, share, within
+            within &= points[i : i + within.shape[0], j : j + within.shape[1]]
+    return found, share, within
 
 
 def _middle(order: int) -> Sequence[int]:

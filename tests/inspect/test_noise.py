@@ -35,6 +35,15 @@ def test_white_noise_is_found_whatever_the_shape_degree_and_knots(degree):
     assert max(abs(each / 0.05 - 1) for each in found) < 0.1 and abs(np.mean(found) / 0.05 - 1) < 0.04
 
 
+@pytest.mark.parametrize("turn", [0.0, 0.7])
+def test_noise_along_normals_counts_in_full_and_along_the_surface_hardly(turn):
+    """A scanner's noise, upwards; and noise of the parametrisation, which does not show."""
+    clean, turned = net(0.0), rotation([1, 2, 3], turn)
+    shake = 0.05 * np.random.default_rng(3).standard_normal(clean.poles.shape)
+    up, along = (Net(clean.u, clean.v, (clean.poles + shake * each) @ turned.T) for each in ([0, 0, 1], [1, 1, 0]))
+    assert size(up) == pytest.approx(0.05, rel=0.1) and size(along) < 0.02
+
+
 def test_a_smooth_net_has_next_to_none():
     assert size(net(0.0)) < 1e-3
 
