@@ -23,7 +23,7 @@ from mracad.edit.details import Detail, Details
 from mracad.edit.fair import DETAIL
 from mracad.edit.mra import load
 from mracad.edit.result import Edit, Reason
-from mracad.edit.target import Sheet, largest, stiffness
+from mracad.edit.target import Sheet, Wish, largest, stiffness
 from mracad.edit.tolerances import COARSE, RESTORED
 from mracad.edit.whole import edited
 from mracad.errors import EditError
@@ -32,7 +32,6 @@ from mracad.model.brep import Face, Model, Surface
 from mracad.seam.interface import Joints
 from mracad.seam.ladders import Creases
 from mracad.seam.solve import Problem
-from mracad.seam.stretch import EVEN, Stretch
 from mracad.spec.select import Scope
 from mracad.spec.select import scope as scope_of
 from mracad.spec.steps import Compose
@@ -50,7 +49,7 @@ ELSEWHERE = 100.0
 
 
 @dataclass(frozen=True, eq=False)
-class Detailed:
+class Detailed(Wish):
     """The wish of composing.
 
     Attributes
@@ -82,10 +81,6 @@ class Detailed:
     def wavelength(self, net: Net, faces: Sequence[Face], creases: Creases) -> float:
         """The wavelength of the details, mm."""
         return self._piece(faces).wavelength
-
-    def stretch(self, faces: Sequence[Face]) -> Stretch:
-        """The same in every direction."""
-        return EVEN
 
     def space(self, net: Net, faces: Sequence[Face]) -> Net:
         """The surface over its knots and those of the details."""

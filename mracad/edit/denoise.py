@@ -18,7 +18,7 @@ from mracad.bspline.surface import Net
 from mracad.edit.estimate import Asked, Noisy, best
 from mracad.edit.result import Edit, FaceOutcome, Reason
 from mracad.edit.search import FIRST, alone
-from mracad.edit.target import Sheet, stiffness
+from mracad.edit.target import Sheet, Wish, stiffness
 from mracad.edit.tolerances import NOISY
 from mracad.edit.whole import edited
 from mracad.inspect.noise import Noise, noise
@@ -28,7 +28,6 @@ from mracad.seam.hold import separate
 from mracad.seam.interface import Joints
 from mracad.seam.ladders import Creases
 from mracad.seam.solve import Problem
-from mracad.seam.stretch import EVEN, Stretch
 from mracad.spec.quantity import length
 from mracad.spec.select import Scope
 from mracad.spec.select import scope as scope_of
@@ -42,7 +41,7 @@ RARE = 3.0
 
 
 @dataclass(frozen=True)
-class Quiet:
+class Quiet(Wish):
     """The wish of a denoising.
 
     Attributes
@@ -78,14 +77,6 @@ class Quiet:
             return size - 2 * variance * removed if self.asked.shrink else size / max(removed, 1e-100) ** 2
 
         return alone(net, noise.over(net), creases, score)
-
-    def stretch(self, faces: Sequence[Face]) -> Stretch:
-        """The same in every direction."""
-        return EVEN
-
-    def space(self, net: Net, faces: Sequence[Face]) -> Net:
-        """The surface over its own knots."""
-        return net
 
     def detail(self, alone: Problem, sheet: Sheet) -> float:
         """What noise moves few control points by."""

@@ -22,7 +22,7 @@ from msgspec import structs
 from mracad.bspline.fit import through
 from mracad.bspline.surface import Net, pairs
 from mracad.edit.result import Edit
-from mracad.edit.target import TREND, Sheet, largest, stiffness
+from mracad.edit.target import TREND, Sheet, Wish, stiffness
 from mracad.edit.tolerances import GROWTH, TURNED
 from mracad.edit.whole import edited
 from mracad.inspect.roughness import Growth
@@ -30,7 +30,6 @@ from mracad.model.brep import Face, Model
 from mracad.seam.interface import Joints
 from mracad.seam.ladders import Creases
 from mracad.seam.solve import Problem
-from mracad.seam.stretch import EVEN, Stretch
 from mracad.spec.select import Scope
 from mracad.spec.steps.shape import Equalize, bands_apart
 from mracad.wavelet.project import at_scale
@@ -39,7 +38,7 @@ Array = np.ndarray
 
 
 @dataclass(frozen=True)
-class Gains:
+class Gains(Wish):
     """The wish of an equalization.
 
     Attributes
@@ -70,18 +69,6 @@ class Gains:
     def wavelength(self, net: Net, faces: Sequence[Face], creases: Creases) -> float:
         """The longest wavelength of a band."""
         return max(high for _, high, _ in self.bands)
-
-    def stretch(self, faces: Sequence[Face]) -> Stretch:
-        """The same in every direction."""
-        return EVEN
-
-    def space(self, net: Net, faces: Sequence[Face]) -> Net:
-        """The surface over its own knots."""
-        return net
-
-    def detail(self, alone: Problem, sheet: Sheet) -> float:
-        """The largest change in the target."""
-        return largest(self, alone, sheet)
 
     def target(self, problem: Problem, sheets: Mapping[int, Sheet], joined: Joints) -> Array:
         """Σ (g − 1) (L_a − L_b) f, if no rim were held, ``(points, 3)``."""

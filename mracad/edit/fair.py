@@ -23,7 +23,7 @@ from mracad.edit.driver import drive
 from mracad.edit.mend import Mended, mended
 from mracad.edit.moved import Result
 from mracad.edit.pose import Scene
-from mracad.edit.target import Sheet, Wish, eased, largest, sheets, stiffness
+from mracad.edit.target import Sheet, Wish, eased, sheets, stiffness
 from mracad.edit.tolerances import GROWTH, Tolerances
 from mracad.inspect.curvature import forms
 from mracad.inspect.roughness import Growth
@@ -44,7 +44,7 @@ DETAIL = 1e-7, 1e-6
 
 
 @dataclass(frozen=True)
-class Filter:
+class Filter(Wish):
     """The wish of a smoothing by scale.
 
     Attributes
@@ -80,14 +80,6 @@ class Filter:
         longest, lead = max(self.scale, self.across), self.leads[surface]
         both = self.scale / longest, self.across / longest
         return Stretch((both[lead], both[1 - lead]), lead)
-
-    def space(self, net: Net, faces: Sequence[Face]) -> Net:
-        """The surface over its own knots."""
-        return net
-
-    def detail(self, alone: Problem, sheet: Sheet) -> float:
-        """The largest change in the target."""
-        return largest(self, alone, sheet)
 
     def target(self, problem: Problem, sheets: Mapping[int, Sheet], joined: Joints) -> Array:
         """The displacement by smoothing if no rim were held, ``(points, 3)``."""

@@ -27,7 +27,7 @@ from mracad.bspline.knots import KnotVector
 from mracad.bspline.refine import refinement
 from mracad.bspline.surface import Net
 from mracad.edit.result import Edit
-from mracad.edit.target import Sheet, largest, stiffness
+from mracad.edit.target import Sheet, Wish, stiffness
 from mracad.edit.tolerances import COARSE, GROWTH
 from mracad.edit.whole import edited
 from mracad.inspect.roughness import Growth
@@ -39,7 +39,6 @@ from mracad.seam.joint import Joint
 from mracad.seam.ladders import Creases, ladders
 from mracad.seam.natural import Seam
 from mracad.seam.solve import Problem
-from mracad.seam.stretch import EVEN, Stretch
 from mracad.spec.quantity import length
 from mracad.spec.select import Scope
 from mracad.spec.steps import Level
@@ -56,7 +55,7 @@ contradict each other a little at vertices, and should not be met exactly."""
 
 
 @dataclass(frozen=True)
-class Coarser:
+class Coarser(Wish):
     """The wish of a level.
 
     Attributes
@@ -98,18 +97,6 @@ class Coarser:
             changed = [s for s, each, knots in zip(spacing, coarse, own, strict=True) if each != knots]
             total += weight * math.sqrt(2) * min(changed or spacing)
         return total
-
-    def stretch(self, faces: Sequence[Face]) -> Stretch:
-        """The same in every direction."""
-        return EVEN
-
-    def space(self, net: Net, faces: Sequence[Face]) -> Net:
-        """The surface over its own knots."""
-        return net
-
-    def detail(self, alone: Problem, sheet: Sheet) -> float:
-        """The largest change in the target."""
-        return largest(self, alone, sheet)
 
     def target(self, problem: Problem, sheets: Mapping[int, Sheet], joined: Joints) -> Array:
         """The level of the surface that the sheets form, less that surface, ``(points, 3)``."""

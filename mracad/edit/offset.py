@@ -15,7 +15,7 @@ import numpy as np
 from mracad.bspline.fit import Knots, divided, middles, missing, offsets_over, spans, through
 from mracad.bspline.surface import Net, pairs
 from mracad.edit.result import Edit
-from mracad.edit.target import Sheet, largest, stiffness
+from mracad.edit.target import Sheet, Wish, stiffness
 from mracad.edit.tolerances import RESHAPED
 from mracad.edit.whole import edited
 from mracad.inspect.roughness import Growth
@@ -24,7 +24,6 @@ from mracad.seam.interface import Joints
 from mracad.seam.ladders import Creases
 from mracad.seam.solve import Problem
 from mracad.seam.space import MOST_POINTS
-from mracad.seam.stretch import EVEN, Stretch
 from mracad.spec.quantity import length
 from mracad.spec.select import Scope
 from mracad.spec.steps.smooth import OffsetFaces
@@ -39,7 +38,7 @@ FADE = 8.0
 
 
 @dataclass(frozen=True)
-class Outward:
+class Outward(Wish):
     """The wish of an offset.
 
     Attributes
@@ -62,10 +61,6 @@ class Outward:
         """The width within which it fades, mm."""
         return FADE * abs(self.distance)
 
-    def stretch(self, faces: Sequence[Face]) -> Stretch:
-        """The same in every direction."""
-        return EVEN
-
     def space(self, net: Net, faces: Sequence[Face]) -> Net:
         """The surface with spans divided until splines can hold d n."""
 
@@ -79,10 +74,6 @@ class Outward:
             return extra if points <= MOST_POINTS else ()
 
         return net.over(*divided((net.u, net.v), more)) if self.refine else net
-
-    def detail(self, alone: Problem, sheet: Sheet) -> float:
-        """The largest change in the target."""
-        return largest(self, alone, sheet)
 
     def target(self, problem: Problem, sheets: Mapping[int, Sheet], joined: Joints) -> Array:
         """d n, ``(points, 3)``."""

@@ -18,7 +18,7 @@ from mracad.seam.interface import Joints
 from mracad.seam.ladders import Creases
 from mracad.seam.metric import SMOOTHER, creases, seen, smoothed
 from mracad.seam.solve import Problem, Space
-from mracad.seam.stretch import Limit, Stretch
+from mracad.seam.stretch import EVEN, Limit, Stretch
 from mracad.wavelet.ladder import arc_lengths
 from mracad.wavelet.project import at_scale
 
@@ -32,7 +32,7 @@ TREND, BASE = 2.5, 6.0
 
 
 class Wish(Protocol):
-    """The target of an edit.
+    """The target of an edit, to be subclassed.
 
     Attributes
     ----------
@@ -68,16 +68,17 @@ class Wish(Protocol):
         ...
 
     def stretch(self, faces: Sequence[Face]) -> Stretch:
-        """Wavelengths by direction on the surface of the faces, relative to the longest."""
-        ...
+        """Wavelengths by direction on the surface of the faces, relative to the longest; all are equal by default."""
+        return EVEN
 
     def space(self, net: Net, faces: Sequence[Face]) -> Net:
-        """The surface of faces over knots that can hold the target; the surface itself if its own can."""
-        ...
+        """The surface of faces over knots that can hold the target; by default its own."""
+        return net
 
     def detail(self, alone: Problem, sheet: Sheet) -> float:
-        """About the largest change of a control point of a surface if nothing were held, mm; see :func:`largest`."""
-        ...
+        """About the largest change of a control point of a surface if nothing were held, mm; that in the target by
+        default."""
+        return largest(self, alone, sheet)
 
     def target(self, problem: Problem, sheets: Mapping[int, Sheet], joined: Joints) -> Array:
         """The displacement of surfaces that seams join if no rim were held, ``(points, 3)``."""
