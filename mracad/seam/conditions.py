@@ -100,6 +100,7 @@ def _elevated(nets: Mapping[int, Net], seams: Sequence[Seam]) -> dict[int, Net]:
 def _inner(knots: KnotVector, border: Border) -> dict[float, int]:
     """Fractions of the knots along a seam, and their multiplicities."""
     breaks, counts = knots.repeated()
+    counts = np.minimum(counts, knots.degree)  # an end of a surface may lie inside a seam
     share = (breaks - border.start) / (border.stop - border.start)
     order = np.argsort(share)
     return {float(x): int(n) for x, n in zip(share[order], counts[order], strict=True) if SAME < x < 1 - SAME}

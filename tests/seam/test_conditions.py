@@ -293,6 +293,14 @@ def test_knots_are_handed_on_through_a_strip():
     assert len({net.v for net in found.values()}) == 1 and found[0].u == nets[0].u
 
 
+def test_the_end_of_a_side_inside_the_seam_does_not_cut_the_other_in_two():
+    """Where one side ends a little before the seam, the other gets no more knots there than leave it in one piece."""
+    other = Border(1, 1, 0, 0.0, "right", 0.0, 1.0 + 1e-5)
+    every = {0: LEFT, **{i: chart(lambda u, v: (u, v)) for i in range(1, 6)}}
+    nets = matched(every, [joined(border(0, False), other, Joint(0, np.ones(1), NONE))])
+    assert nets[0].v.multiplicities[1:-1].max() == 3
+
+
 def test_defects_to_be_mended_are_named():
     seam = joined(border(0, False), border(1, True), Joint(1, np.ones(1), NONE, close=True))
     nets = matched({0: LEFT, 1: chart(lambda u, v: (u, v))}, [seam])
