@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from mracad.errors import MracadError
     from mracad.inspect.deviation import deviations
     from mracad.inspect.seams import seams
+    from mracad.inspect.spectrum import spectra
     from mracad.job.document import run
     from mracad.model.brep import Model
     from mracad.model.displacement import Displacement
@@ -52,6 +53,7 @@ _HOMES = {
     "save_details": "edit.mra:save",
     "seams": "inspect.seams",
     "snapshot": "occ.view:view",
+    "spectra": "inspect.spectrum",
     "write": "occ.files",
 }
 
@@ -82,6 +84,7 @@ __all__ = [
     "seams",
     "smooth",
     "snapshot",
+    "spectra",
     "transfer",
     "write",
 ]  # fmt: skip

@@ -47,6 +47,7 @@ BASE = {
     "repeat": ("repeat", "sheet.step", *FEATURE, "--at", "14,5,0", "-o", "a.step", "--json"),
     "run": ("run", "recipe.toml", "sheet.step", "-o", "a.step", "--json"),
     "smooth": ("smooth", "sheet.step", "--scale", "4mm", "-o", "a.step", "--json"),
+    "spectrum": ("spectrum", "sheet.step", "--json"),
     "transfer": (
         "transfer",
         "sheet.step",
@@ -155,6 +156,8 @@ OWN = {
     "compose instance": ("--instance part", "IN coarsetwo.step DETAILS two.mra"),
     "compose refine": ("--refine never", "IN strips.step"),
     "compose keep": ("--keep g0", "IN coarsetangent.step DETAILS tangent.mra --amount 0.9"),
+    "spectrum output": ("-o b.csv",),
+    "spectrum overwrite": ("--overwrite", "OLD a.csv -o a.csv"),
     "feature extract overwrite": ("--overwrite", "OLD a.feature"),
     "compare max_deviation": ("--max-deviation 1mm",),
     "smooth along": ("--along Y", "--across 9mm"),

@@ -1,0 +1,53 @@
+"""Show how high the waves on NURBS faces are, by wavelength and direction, and where the shape begins."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from mracad.errors import UsageError
+from mracad.spec.steps import Selection
+from mracad_cli import options
+from mracad_cli.command import Command
+from mracad_cli.options import Reading
+from mracad_cli.outputs import check_target, deliver, read
+from mracad_cli.progress import Progress
+from mracad_cli.say import json_text
+
+OTHERS = "instance hold keep edges"
+"""Options of edits that mean nothing where nothing is edited."""
+
+ENDINGS = ".csv", ".json"
+
+
+@click.command("spectrum", cls=Command, help=__doc__)
+@options.apply(
+    options.reading(),
+    options.of(Selection, "chosen", OTHERS),
+    click.option(
+        "-o", "--output", metavar="F", type=options.path, help="Write all bands of all faces to a .csv or .json file."
+    ),
+    options.overwrite,
+    options.printing,
+)
+def command(reading: Reading, chosen: Selection, output: str | None, overwrite: bool, as_json: bool) -> None:
+    if output:
+        if Path(output).suffix not in ENDINGS:
+            raise UsageError(f"cannot write {output}: unknown extension {Path(output).suffix!r}", "use .csv or .json")
+        check_target(Path(output), overwrite)
+    from mracad.inspect.spectrum import spectra
+    from mracad.job.look import looked_at
+    from mracad_cli.render import spectrum
+
+    with Progress() as progress:
+        progress("reading", 0, 1)
+        model, scope = looked_at(read(reading), chosen)
+        every = [i for i in sorted(scope.chosen) if model.faces[i].surface is not None]
+        found = []
+        for done, face in enumerate(every):
+            progress("measuring waves", done, len(every))
+            found += spectra(model, [face])
+    body = json_text(spectrum.body(model.name, found))
+    files = {output: spectrum.csv(found) if output.endswith(".csv") else body + "\n"} if output else {}
+    deliver(files, [body] if as_json else spectrum.lines(model.name, found))
