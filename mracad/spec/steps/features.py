@@ -220,8 +220,8 @@ class Transfer(Copied, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
     @property
     def done(self) -> str:
-        return "edited with the detail of another face"
+        return "edited with transferred detail"
 
     @property
     def quiet(self) -> str:
-        return "left as they are"
+        return "unchanged"

@@ -57,7 +57,7 @@ class Level(Shaped, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
     @property
     def quiet(self) -> str:
-        return "without detail to remove" if self.amount else "left as they are: amount 0"
+        return "without detail to remove" if self.amount else "unchanged: amount 0"
 
 
 class Compose(Shaped, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -73,4 +73,4 @@ class Compose(Shaped, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
     @property
     def quiet(self) -> str:
-        return "without details" if self.amount else "left as they are: amount 0"
+        return "without details" if self.amount else "unchanged: amount 0"

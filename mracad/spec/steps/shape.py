@@ -26,14 +26,14 @@ class Equalize(Fairing, frozen=True, kw_only=True, forbid_unknown_fields=True):
     band: Annotated[
         tuple[Annotated[str, _band], ...],
         Meta(
-            description="A band of wavelengths and its gain: 2mm:10mm=0 takes waves between 2 and 10 mm out, :10mm=3 "
+            description="A band of wavelengths and its gain: 2mm:10mm=0 removes waves between 2 and 10 mm, :10mm=3 "
             "makes waves up to 10 mm three times as high; repeatable. Waves in no band stay."
         ),
     ] = ()
     amount: Annotated[
         float,
         Meta(
-            description="How much of the edit to apply: a gain g counts as 1 + amount (g - 1). 0 is none, and above 1 "
+            description="How much of the edit to apply: a gain g counts as 1 + amount (g - 1). 0 is none; above 1 "
             "exaggerates.",
             ge=0.0,
         ),
@@ -47,13 +47,13 @@ class Equalize(Fairing, frozen=True, kw_only=True, forbid_unknown_fields=True):
         least = min(gain for *_, gain in bands)
         if 1.0 + self.amount * (least - 1.0) < 0.0:
             most = 1.0 / (1.0 - least)
-            message = f"amount: {self.amount:g} would turn waves over: a gain of {least:g} allows up to {most:g}"
+            message = f"amount: {self.amount:g} would invert waves: a gain of {least:g} allows up to {most:g}"
             raise UsageError(message, "give a smaller amount, or gains above 1", "amount")
         if not any("%" in text for text in self.band):
             bands_apart(bands)
 
     def gains(self, diagonal: float | None) -> list[tuple[float, float, float]]:
-        """Least and largest wavelength (mm) and gain of each band, in ascending order, on a model of a diagonal;
+        """Smallest and largest wavelength (mm) and gain of each band, in ascending order, for a model with a diagonal;
         see :func:`mracad.spec.quantity.band_of`."""
         return sorted(gain_of(text, diagonal) for text in self.band)
 
@@ -63,7 +63,7 @@ class Equalize(Fairing, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
     @property
     def quiet(self) -> str:
-        return "without waves in these bands" if self.amount else "left as they are: amount 0"
+        return "without waves in these bands" if self.amount else "unchanged: amount 0"
 
 
 def bands_apart(bands: Sequence[tuple[float, float, float]]) -> None:

@@ -121,7 +121,7 @@ class Smooth(Fairing, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
     @property
     def quiet(self) -> str:
-        return f"already fair at {self._place}" if self.amount else "left as they are: amount 0"
+        return f"already fair at {self._place}" if self.amount else "unchanged: amount 0"
 
     @property
     def _place(self) -> str:
@@ -192,7 +192,7 @@ class Denoise(Fairing, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
     @property
     def quiet(self) -> str:
-        return "without noise that can be told from shape" if self.amount else "left as they are: amount 0"
+        return "without noise that can be told from shape" if self.amount else "unchanged: amount 0"
 
 
 class OffsetFaces(Fitting, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -216,4 +216,4 @@ class OffsetFaces(Fitting, frozen=True, kw_only=True, forbid_unknown_fields=True
 
     @property
     def quiet(self) -> str:
-        return "left as they are"
+        return "unchanged"
