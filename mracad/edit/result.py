@@ -29,7 +29,7 @@ class Reason(Enum):
     NO_COPY = "no copy on it"
     NO_DETAIL = "no details for it"
     NO_FREE = "no free control points"
-    ASKEW = "its parameter lines do not follow the direction"
+    ASKEW = "parameter lines do not follow the direction"
     RIM = "cannot get fairer with its edges held"
     STUCK = "can hardly move with its edges held"
     ROUGHER = "would get rougher"
