@@ -14,16 +14,16 @@ from mracad.wavelet.ladder import arc_lengths
 Array = np.ndarray
 
 LINES = 48
-"""Profiles along each direction."""
+"""Number of profiles along each direction."""
 
 SIZES = 64, 128, 256, 512, 1024
-"""Numbers of points of profiles: the first that gives :data:`PER_SPAN` points a span, or the last."""
+"""Numbers of points of profiles: the first that gives :data:`PER_SPAN` points per span, or the last."""
 
 PER_SPAN, DENSE = 4, 8
-"""Points a span of profiles, and of the curves on which they are laid."""
+"""Points per span of profiles, and of the curves from which they are interpolated."""
 
 SHORTEST = 6
-"""Fewest points of a curve that make a profile."""
+"""Least number of points of a curve that make a profile."""
 
 CLOSED = 1e-6
 """Share of its length within which the ends of a closed profile meet."""
@@ -58,14 +58,14 @@ def profiles(net: Net, face: Face, axis: int) -> Iterator[tuple[Array, Array, fl
 
 
 def _runs(on: Array) -> list[tuple[int, int]]:
-    """First and last places of runs of at least :data:`SHORTEST` that are on."""
+    """First and last positions of runs of at least :data:`SHORTEST` points that are on the face."""
     change = np.flatnonzero(np.diff(np.concatenate([[0], on.astype(int), [0]])))
     pairs = zip(change[::2].tolist(), (change[1::2] - 1).tolist(), strict=True)
     return [(first, last) for first, last in pairs if last - first + 1 >= SHORTEST]
 
 
 def _extent(net: Net, face: Face, axis: int) -> tuple[float, float]:
-    """The parameters between which a face lies."""
+    """The smallest and largest parameter of a face along an axis."""
     knots = (net.u, net.v)[axis]
     if not face.trims:
         return knots.domain
@@ -77,7 +77,7 @@ def _extent(net: Net, face: Face, axis: int) -> tuple[float, float]:
 
 
 def lines(net: Net, face: Face, axis: int) -> tuple[Array, float]:
-    """Parameters of lines at even lengths across a face, and how far they are apart, mm."""
+    """Parameters of lines at even lengths across a face, and their distance, mm."""
     knots, ends = (net.u, net.v)[axis], _extent(net, face, axis)
     lengths = np.append(0.0, np.cumsum(arc_lengths(net, axis)))
     turns = range(-1, 2) if knots.periodic else range(1)

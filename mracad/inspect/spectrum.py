@@ -1,18 +1,18 @@
 """The spectrum of faces: how high their waves are, by wavelength, along u and along v.
 
-Profiles are taken along parameter lines, inside the trims, at even steps of arc length.  What a profile has above its
-slow part, along the normals of that, is expanded in the modes of a free beam: waves of the bending energy that the
-solver's filters have, whose wavelength is 2π over the fourth root of their energy.  They are orthonormal, so the
-squares of the coefficients add up to the mean square of the profile.
+Profiles are taken along parameter lines, inside the trims, at even steps of arc length.  The height of a profile above
+its slow part, along the normals of that part, is expanded in the modes of a free beam: eigenfunctions of the bending
+energy of the solver's filters, whose wavelength is 2π over the fourth root of their energy.  They are orthonormal, so
+the squares of the coefficients add up to the mean square of the profile.
 
-A wave whose length is none of a mode's, or that ends in the middle, excites its neighbours, too.  By how much is known
-on average over its phases: with P[k, j] the share that a wave of the length λ_j leaves in mode k, the energies E of the
-modes are explained by those of waves, p ≥ 0, of the largest likelihood,
+A wave whose length differs from that of all modes, or that ends within the profile, also excites neighbouring modes.
+The amount is known on average over its phases: with P[k, j] the share that a wave of length λ_j leaves in mode k, the
+energies E of the modes are explained by energies p ≥ 0 of waves with the largest likelihood,
 
     p ← p · Pᵀ(E / P p),        Σ p = Σ E in every pass,
 
-so that short profiles, and those with a shape under their waves, have sharp bands as well.  Closed profiles have the
-modes of a ring, which need none of this.
+so that short profiles, and those with a shape under their waves, also have sharp bands.  Closed profiles have the modes
+of a ring, which do not need this.
 """
 
 from __future__ import annotations
@@ -34,33 +34,33 @@ from mracad.seam.hold import separate
 Array = np.ndarray
 
 EDGE = 10.0
-"""An edge between bands, mm; the others are its multiples by powers of two."""
+"""A boundary between bands, mm; all others are its multiples by powers of two."""
 
 SLOW = 0.5
-"""Waves longer than this share of a profile are slow: normals are those of what is slow."""
+"""Waves longer than this share of a profile are slow; normals are those of the slow part."""
 
 FINE, PASSES = 12, 60
-"""Waves per octave that explain the modes, and the passes in which they do."""
+"""Number of waves per octave that explain the modes, and number of passes."""
 
 LONGEST, LEAST = 2.0, 2.5
-"""The longest of these waves, in lengths of a profile, and the shortest, in steps."""
+"""Length of the longest of these waves, in lengths of a profile, and of the shortest, in steps."""
 
 ALIKE = 1.04
 """Factor within which lengths of profiles count as one."""
 
 KEPT = 2.0
-"""Smoothing at a scale keeps all but 0.4 % of waves so many times as long."""
+"""Number of scales in a wave of which smoothing keeps all but 0.4 %."""
 
 NOTHING = 1e-7, 1e-6
-"""Heights that count as none: mm, and shares of the longest wavelength."""
+"""Largest heights that count as zero: mm, and share of the longest wavelength."""
 
 FORM = 8.0
-"""Waves longer than the longest over this are shape: few of them fit on a profile."""
+"""Waves longer than the longest wavelength over this are shape: few of them fit on a profile."""
 
 
 @dataclass(frozen=True)
 class Band:
-    """Waves of some lengths in one direction.
+    """The waves in a range of lengths, in one direction.
 
     Attributes
     ----------
@@ -71,7 +71,7 @@ class Band:
     energy : float
         Integral of the squared height over the area, mm⁴.
     share : float
-        Of the energy of all bands.
+        Share of the energy of all bands.
     """
 
     low: float
@@ -90,7 +90,7 @@ class Direction:
     bands : tuple of Band
         Octaves, from the shortest waves to the longest.
     shape : float
-        Wavelength at which the shape begins, mm; 0 where there is nothing shorter.
+        Wavelength at which the shape begins, mm; 0 if nothing shorter stands out.
     """
 
     bands: tuple[Band, ...]
@@ -98,7 +98,7 @@ class Direction:
 
     @property
     def detail(self) -> float:
-        """Root mean square height of what is shorter than the shape, mm."""
+        """Root mean square height of the waves shorter than the shape, mm."""
         return float(np.sqrt(sum(band.rms**2 for band in self.bands if band.low < self.shape)))
 
 
@@ -111,10 +111,10 @@ class Spectrum:
     faces : tuple of int
         Indices in ``Model.faces``.
     area : float
-        mm².
+        Area, mm².
     u, v : Direction
     noise : float
-        Standard deviation of the coordinates of control points, mm; 0 where there is none that can be told.
+        Standard deviation of the coordinates of control points, mm; 0 if none is found.
     """
 
     faces: tuple[int, ...]
@@ -125,7 +125,7 @@ class Spectrum:
 
     @property
     def scale(self) -> float | None:
-        """A scale that removes what is shorter than the shape and keeps that, mm; None where there is nothing."""
+        """A scale that removes waves shorter than the shape and keeps the shape, mm; None if there are none."""
         found = [way.shape for way in (self.u, self.v) if way.shape]
         return min(found) / KEPT if found else None
 
@@ -139,11 +139,11 @@ class _Modes:
     shapes : ndarray (n, n)
         Orthonormal columns, from the slowest.
     lengths : ndarray (n,)
-        Their wavelengths, over the length of the beam; infinite for rigid motions.
+        Wavelengths of the modes, over the length of the beam; infinite for rigid motions.
     waves : ndarray (j,)
-        Lengths of the waves that explain them, over the same.
+        Lengths of the waves that explain them, over the length of the beam.
     table : ndarray (n - 2, j)
-        The shares that these leave in the modes that are no rigid motions; columns add up to 1.
+        The shares that these leave in the modes other than rigid motions; columns add up to 1.
     """
 
     shapes: Array
@@ -228,7 +228,7 @@ def _along(net: Net, face: Face, axis: int) -> tuple[dict[int, float], float]:
 
 
 def _explained(energy: Array, count: int) -> tuple[Array, Array]:
-    """Wavelengths over the length, and the energies of waves of these that explain those of modes."""
+    """Wavelengths over the length, and the energies of such waves that explain those of modes."""
     modes = _modes(count)
     found = np.full(len(modes.waves), energy.sum() / len(modes.waves))
     for _ in range(PASSES):
@@ -237,7 +237,7 @@ def _explained(energy: Array, count: int) -> tuple[Array, Array]:
 
 
 def _of_beam(points: Array, normals: Array) -> Array:
-    """Energies of the modes of a profile that are no rigid motions, mm²."""
+    """Energies of the modes of a profile other than rigid motions, mm²."""
     modes = _modes(len(points))
     slow = int((modes.lengths > SLOW).sum())
     shapes = modes.shapes[:, :slow]
@@ -251,7 +251,7 @@ def _of_beam(points: Array, normals: Array) -> Array:
 
 
 def _of_ring(points: Array, normals: Array) -> Array:
-    """Energies of the waves of a closed profile, one, two, three … of them around, mm²."""
+    """Energies of the waves of a closed profile, with one, two, three … periods, mm²."""
     count = len(points)
     found = np.fft.rfft(points, axis=0)
     slow = np.where(np.arange(len(found))[:, None] <= 1.0 / SLOW, found, 0.0)
@@ -286,7 +286,7 @@ def _direction(energies: Mapping[int, float], area: float) -> Direction:
 
 def _begin(bands: Sequence[Band]) -> float:
     """The wavelength at which the shape begins: the middle of the band from which energy rises to the longest waves, if
-    it rises to shorter ones, too."""
+    it also rises to shorter ones."""
     energy, longest = [band.rms**2 for band in bands], bands[-1].high
     first = max((k for k, band in enumerate(bands) if FORM * band.low <= longest), default=0)
     while first and energy[first - 1] < energy[first]:

@@ -16,7 +16,7 @@ from mracad_cli.progress import Progress
 from mracad_cli.say import json_text
 
 OTHERS = "instance hold keep edges"
-"""Options of edits that mean nothing where nothing is edited."""
+"""Options of edits that do not apply here."""
 
 ENDINGS = ".csv", ".json"
 

@@ -12,10 +12,10 @@ if TYPE_CHECKING:
     from mracad.inspect.spectrum import Band, Direction, Spectrum
 
 WIDTH = 20
-"""Characters of the longest bar."""
+"""Number of characters of the longest bar."""
 
 DECADES = 5.0
-"""Decades of height that bars show."""
+"""Number of decades of height that bars show."""
 
 HEAD = "face,direction,from_mm,to_mm,rms_mm,energy_mm4,share"
 
@@ -44,7 +44,7 @@ def _way(way: Direction) -> dict[str, Any]:
 
 
 def csv(each: Sequence[Spectrum]) -> str:
-    """A line for each band of each face in each direction; for the whole model the face is empty."""
+    """One line per band, face and direction; for the whole model the face is empty."""
     from mracad.inspect.spectrum import together
 
     rows = [("", together(each))] if each else []
@@ -71,7 +71,7 @@ def lines(name: str, each: Sequence[Spectrum]) -> list[str]:
 
 
 def _table(spectrum: Spectrum) -> list[str]:
-    """Bands in lines, both directions side by side."""
+    """One line per band, with both directions side by side."""
     ways = spectrum.u, spectrum.v
     both: dict[float, list[Band | None]] = {low: [None, None] for low in sorted(b.low for w in ways for b in w.bands)}
     for k, way in enumerate(ways):
@@ -88,7 +88,7 @@ def _table(spectrum: Spectrum) -> list[str]:
 
 
 def _cell(band: Band | None, most: float) -> str:
-    """A band: its height, its share, and a bar as long as the decades above the least that is shown."""
+    """A band: its height, its share, and a bar with the number of decades above the smallest height shown."""
     if band is None:
         return " " * (WIDTH + 19)
     share = max(0.0, 1.0 + math.log10(max(band.rms, 1e-300) / most) / DECADES) if most > 0.0 else 0.0
@@ -97,8 +97,8 @@ def _cell(band: Band | None, most: float) -> str:
 
 
 def _words(spectrum: Spectrum) -> str:
-    """What stands out in a spectrum."""
-    noise = f"noise {mm(spectrum.noise)}" if spectrum.noise else "no noise that can be told"
+    """The main results of a spectrum in words."""
+    noise = f"noise {mm(spectrum.noise)}" if spectrum.noise else "no noise found"
     if spectrum.scale is None:
         return f"{noise}; nothing shorter stands out from the shape"
     ways = [f"{mm(w.shape)} along {n}" for n, w in (("u", spectrum.u), ("v", spectrum.v)) if w.shape]
