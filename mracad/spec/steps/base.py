@@ -10,6 +10,15 @@ from msgspec import Meta, Struct, structs
 
 from mracad.spec.fields import fields
 
+Edges = Annotated[
+    Literal["coupled", "frozen"],
+    Meta(
+        description="Edges between two edited faces: coupled lets them move, as smooth as before where possible; "
+        "frozen keeps them in place."
+    ),
+]
+"""The type of ``edges`` for edits whose edges do not slide."""
+
 
 class Options(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Options of a step.

@@ -2,26 +2,21 @@
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, ClassVar
 
 from msgspec import Meta
 
 from mracad.errors import UsageError
 from mracad.spec.files import File
 from mracad.spec.quantity import Length
+from mracad.spec.steps.base import Edges
 from mracad.spec.steps.smooth import Fitting
 
 
 class Shaped(Fitting, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Options of edits that change a whole shape, including its free edges."""
 
-    edges: Annotated[
-        Literal["coupled", "frozen"],
-        Meta(
-            description="Edges between two edited faces: coupled lets them move, as smooth as before where possible; "
-            "frozen keeps them in place."
-        ),
-    ] = "coupled"
+    edges: Edges = "coupled"
 
 
 class Level(Shaped, frozen=True, kw_only=True, forbid_unknown_fields=True):

@@ -9,7 +9,7 @@ from msgspec import Meta
 from mracad.errors import UsageError
 from mracad.spec import places
 from mracad.spec.quantity import Angle, Length, Share
-from mracad.spec.steps.base import Selection
+from mracad.spec.steps.base import Edges, Selection
 
 
 class Fitting(Selection, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -201,13 +201,7 @@ class OffsetFaces(Fitting, frozen=True, kw_only=True, forbid_unknown_fields=True
     function: ClassVar[str] = "mracad.edit.offset:offset"
 
     distance: Annotated[Length, Meta(description="How far to move, outward.")]
-    edges: Annotated[
-        Literal["coupled", "frozen"],
-        Meta(
-            description="Edges between two edited faces: coupled lets them move, as smooth as before where possible; "
-            "frozen keeps them in place."
-        ),
-    ] = "coupled"
+    edges: Edges = "coupled"
     inward: Annotated[bool, Meta(description="Move inward instead.")] = False
 
     @property
