@@ -1,9 +1,9 @@
-"""Batches: what two workers gain, what a file costs beside its work, memory, kills and lost workers.
+"""Batches: speed-up by two workers, overhead per file, memory, kills and lost workers.
 
 Usage: python benchmarks/batch.py [FILES [NAME…]]     (default: 200, and every measurement below)
 
-Both sides of every ratio are measured in this run.  The files are the samples, each made different by a comment; the
-recipe smooths and checks them.  On a machine with other work look at the processor time, too.
+Both sides of every ratio are measured in the same run.  The files are the samples, each made different by a comment;
+the recipe smooths and checks them.  On a busy machine compare processor times as well.
 """
 
 from __future__ import annotations
@@ -75,7 +75,7 @@ def workers(folder: Path, files: int) -> None:
 
 
 def overhead(folder: Path, files: int) -> None:
-    """Wall time beside the work itself, one warm worker."""
+    """Wall time besides the work itself, with one warm worker."""
     items = find([str(models(folder / "in", files + 1))], folder / "out")
     with Manifest(folder / "out") as manifest, Pool(1, Limits(), warm) as pool:
         list(run(load(recipe(folder, RECIPE)), items[:1], manifest, pool, Settings()))
@@ -84,8 +84,8 @@ def overhead(folder: Path, files: int) -> None:
         wall, used = time.perf_counter() - start, time.process_time() - used
     beside = (wall - sum(outcome.seconds for outcome in outcomes)) / files
     print(
-        f"overhead: {beside * 1e3:.1f} ms a file beside {wall / files * 1e3:.0f} ms; "
-        f"processor time of the client {used / files * 1e3:.1f} ms a file"
+        f"overhead: {beside * 1e3:.1f} ms per file, of {wall / files * 1e3:.0f} ms; "
+        f"processor time of the client {used / files * 1e3:.1f} ms per file"
     )
 
 

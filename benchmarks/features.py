@@ -37,7 +37,7 @@ def make_face(path: Path) -> None:
 
 
 def peak() -> float:
-    """The most memory that this process has held, MB (Linux); what it was forked from does not count."""
+    """The peak memory of this process, MB (Linux), without that of its parent."""
     status = Path("/proc/self/status").read_text()
     return int(status.split("VmHWM:")[1].split()[0]) / 1024
 
@@ -70,10 +70,10 @@ def measure(source: Path, copies: int) -> None:
     read, edit, write = np.diff(times)
     worst = max(c.deviation for c in report.edit.copies)
     shape = report.edit.displacement.offsets[0].poles.shape[:2]
-    print(f"one copy, libraries loaded on the way: {first:.1f} s with reading")
+    print(f"one copy, including loading libraries: {first:.1f} s with reading")
     print(
         f"{copies} copies: read {read:.1f} s, edited in {edit:.1f} s, written in {write:.1f} s; "
-        f"{more:.0f} MB more at the most; off by ≤ {worst:.1e} mm; {shape[0]} × {shape[1]} control points"
+        f"{more:.0f} MB more at peak; deviation ≤ {worst:.1e} mm; {shape[0]} × {shape[1]} control points"
     )
 
 

@@ -1,7 +1,8 @@
 """Time and memory of a model whose seams all move: panels of 16, 49 and 100 patches of 60 × 60 control points.
 
-Of every panel the solve of all patches in one group, beside the elimination of its whole system by SuperLU (up to 49
-patches: it takes 3 GB and minutes beyond), and the whole job beside reading and writing.  All times are CPU seconds.
+For every panel: the solve of all patches in one group, compared with the elimination of its whole system by SuperLU (up
+to 49 patches: more takes 3 GB and minutes), and the whole job compared with reading and writing.  All times are CPU
+seconds.
 
 Usage: python benchmarks/seams.py [SIDE[×SPANS] …], of panels of SIDE × SIDE patches of SPANS spans (57) each way
 """
@@ -20,17 +21,17 @@ ROOT = Path(__file__).resolve().parents[1]
 SPANS = 57
 SCALE = 12.0
 WHOLE = 7
-"""Most patches along a side of which the whole system is eliminated, too."""
+"""Largest number of patches along a side for which the whole system is also eliminated."""
 
 
 def peak() -> float:
-    """The most memory that this process has held, MB (Linux)."""
+    """The peak memory of this process, MB (Linux)."""
     status = Path("/proc/self/status").read_text()
     return int(status.split("VmHWM:")[1].split()[0]) / 1024
 
 
 def timed(call: Callable[[], Any]) -> tuple[Any, float]:
-    """A result, and the CPU seconds that it takes."""
+    """The result of a call, and its CPU seconds."""
     start = time.process_time()
     return call(), time.process_time() - start
 
@@ -45,7 +46,7 @@ def make_panel(path: Path, side: int, spans: int) -> None:
 
 
 def group(model: Any) -> Any:
-    """All faces as one problem, edges that bound one face free."""
+    """All faces as one problem, with free edges not held."""
     from mracad.model.cells import quadrature
     from mracad.seam.conditions import matched, rows
     from mracad.seam.energy import forms

@@ -1,7 +1,7 @@
 """Speed of the wavelet transform against PyWavelets' ``bior4.4``, one thread each.
 
-Run as a script.  Decomposes and recomposes a cubic net of 1027 × 1027 poles on uneven knots over five levels, then nets
-of growing size, and prints one line of ratios.
+Run as a script.  Decomposes and recomposes a cubic net of 1027 × 1027 control points on uneven knots over five levels,
+then nets of growing size, and prints one line of ratios.
 """
 
 # ruff: noqa: E402
@@ -28,7 +28,7 @@ SIZES = (515, SIZE, 2003)
 
 
 def best(*runs: Callable[[], object], repeats: int = 7) -> list[float]:
-    """Least processor time of each run, s; in turn, so that other load on the machine meets all of them."""
+    """Least processor time of each run, s; runs alternate, so that other load on the machine affects all of them."""
     times = []
     for _ in range(repeats):
         for run in runs:
@@ -62,7 +62,7 @@ def main() -> None:
     here = growth[SIZES.index(SIZE)]
     print(
         f"{SIZE}×{SIZE}×3, {LEVELS} levels: {here:.3f} s, PyWavelets bior4.4 {reference:.3f} s, "
-        f"ratio {here / reference:.2f}; error {error:.1e}; ns a pole by size {each}"
+        f"ratio {here / reference:.2f}; error {error:.1e}; ns per control point by size {each}"
     )
 
 

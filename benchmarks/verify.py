@@ -1,6 +1,6 @@
-"""What verification costs beside one read of the file: python benchmarks/verify.py FILE…
+"""The cost of verification compared with one read of the file: python benchmarks/verify.py FILE…
 
-Processor time of reading a model, of reading back what is written of it, and of judging that.
+Processor time of reading a model, of reading its output back, and of judging that.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ def measure(path: Path) -> tuple[float, float, float]:
 
 def main() -> None:
     files = [Path(word) for word in sys.argv[1:]]
-    measure(files[0])  # what is loaded on first use
+    measure(files[0])  # loads libraries
     ratios = []
     for path in files:
         read, back, judged = (min(each) for each in zip(*(measure(path) for _ in range(3)), strict=True))

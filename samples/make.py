@@ -1,9 +1,9 @@
 """Write the sample models: ``python samples/make.py [OUTDIR] [names…]``.
 
-The models are built from poles and knots here, not with mracad, so that they can judge it. The same bytes come out each
-time: noise is from a seeded PCG64, products and header are named, and whatever a mathematics library may round
-differently on another machine (sines, the kernel's evaluations) is put on a dyadic grid, which also keeps the text
-short. Lengths are millimetres.
+The models are built from control points and knots here, not with mracad, so that they can judge it. The bytes are
+reproducible: noise is from a seeded PCG64, products and header are named, and everything that a mathematics library may
+round differently on another machine (sines, the kernel's evaluations) is put on a dyadic grid, which also keeps the
+text short. Lengths are millimetres.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Compare models with committed reference figures: ``python samples/regress.py FILE…`` (``make regress``).
 
-The figures of every file lie in ``figures.json`` beside this script: what ``mracad check --json`` says of it, and its
-size.  They are small, and say what changed where a golden file could only say that something did.  For your own models
-copy this script beside them; ``--update`` writes the figures anew.
+The figures of every file are in ``figures.json`` beside this script: results of ``mracad check --json``, and its size.
+They are small, and tell what changed, where a golden file could only tell that something did.  For your own models copy
+this script beside them; ``--update`` writes new figures.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from mracad.occ.contents import contents
 from mracad.occ.measure import mass
 
 FIGURES = Path(__file__).with_name("figures.json")
-SLACK = 1e-6  # relative; lengths that are zero may be off by as many millimetres
+SLACK = 1e-6  # relative; for lengths that are zero, millimetres
 
 
 def figures(path: Path) -> dict:
-    """What a model is, in a few numbers."""
+    """A model in a few numbers."""
     document = mracad.read(path)
     model, facts, size, seen = mracad.snapshot(document), check(document), mass(document), contents(document)
     along = summary(seams(model))
@@ -45,7 +45,7 @@ def figures(path: Path) -> dict:
 
 
 def differences(ref: object, new: object, where: str) -> Iterator[str]:
-    """Where two figures differ, in words."""
+    """The differences between two figures, in words."""
     if isinstance(ref, dict) and isinstance(new, dict):
         for key in sorted(ref.keys() | new.keys()):
             yield from differences(ref.get(key), new.get(key), f"{where} {key}")
@@ -73,7 +73,7 @@ def main(arguments: list[str]) -> int:
         return 0
     reference = json.loads(FIGURES.read_text())
     wrong = [line for name, new in found.items() for line in differences(reference.get(name, {}), new, name)]
-    print("\n".join(wrong) if wrong else f"{len(found)} models are as they were")
+    print("\n".join(wrong) if wrong else f"{len(found)} models are unchanged")
     return 1 if wrong else 0
 
 

@@ -26,7 +26,7 @@ def emboss(x: np.ndarray, y: np.ndarray) -> np.ndarray:
 
 
 def ripple(x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """A knurl of 0.15 mm, 10 mm long, even at the borders: it goes on mirrored."""
+    """A knurl of 0.15 mm, 10 mm long, symmetric at the borders, where it continues mirrored."""
     return 0.15 * np.cos(2 * np.pi * x / 10) * np.cos(2 * np.pi * y / 10)
 
 

@@ -92,18 +92,18 @@ def panel_shell(rows: Sequence[Sequence[tuple[np.ndarray, np.ndarray, np.ndarray
 
 
 def panel_clean() -> Document:
-    """The panel as it should be: 3 × 2 bicubic patches of 35 × 35 poles on uneven knots, C2 across every seam."""
+    """The true panel: 3 × 2 bicubic patches of 35 × 35 control points on uneven knots, C2 across every seam."""
     return single(panel_shell(panel_patches(*panel_net())), "panel clean")
 
 
 def panel() -> Document:
-    """The panel with noise on every pole, put on before cutting: patches are rough but still C2 across the seams."""
+    """The panel with noise on every control point, added before cutting: patches are rough but C2 across the seams."""
     u, v, poles = panel_net()
     return single(panel_shell(panel_patches(u, v, settle(poles + panel_noise(poles.shape), 6))), "panel")
 
 
 def panel_inside() -> Document:
-    """The panel with noise inside the patches only: two rows of poles round each are clean, so every seam is G1."""
+    """The panel with noise inside the patches only: two rows of points round each are clean, so every seam is G1."""
     rows = panel_patches(*panel_net())
     noise = panel_noise((*PATCHES, PATCH_SPANS + 3, PATCH_SPANS + 3, 3))
     for i, row in enumerate(rows):

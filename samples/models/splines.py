@@ -9,7 +9,7 @@ import numpy as np
 
 
 def settle(values: np.ndarray, bits: int = 7) -> np.ndarray:
-    """Round to multiples of ``2**-bits``: the last bits of a sine differ between machines, these do not."""
+    """Round to multiples of ``2**-bits``, because the last bits of a sine differ between machines."""
     return np.round(np.asarray(values) * 2.0**bits) / 2.0**bits
 
 
