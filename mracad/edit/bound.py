@@ -78,15 +78,15 @@ def widest(
             break
         scale = _at(curve, AIM * bound, known)
     first = replace(edit(scale), scale=scale)
-    reached = known[scale] = _reached(model, first)
+    far = known[scale] = reached(model, first)
     larger = _at(curve, AIM * bound, known)
-    if reached >= NEAR * bound or larger <= scale:
+    if far >= NEAR * bound or larger <= scale:
         return first
     other = replace(edit(larger), scale=larger)
-    return other if _reached(model, other) > reached else first
+    return other if reached(model, other) > far else first
 
 
-def _reached(model: Model, edit: Edit) -> float:
+def reached(model: Model, edit: Edit) -> float:
     """The largest deviation along the normal that an edit makes, mm."""
     most = 0.0
     for i, offset in edit.displacement.offsets.items():

@@ -244,14 +244,14 @@ def _tried(
     members = {i: scene.sheets[i] for i in surfaces}
     trial = Trial(scene, members, joined, finer)
     target = wish.target(trial.problem, members, joined)
-    if trial.pose.share is not None:
+    if wish.fades and trial.pose.share is not None:
         target = trial.pose.share * target
     wished = sum(trial.problem.gains(target, target, [1.0] * len(members)))
     found, possible = [trial.nothing(least * wished)], trial.most(target) > least * wished
     for batch in wish.ways(trial.problem, target, trial.width) if possible else ():
         first = len(found)
         for wanted in batch:
-            found.append(trial.judged(trial.pose.faded(wanted), target, found))
+            found.append(trial.judged(trial.pose.faded(wanted) if wish.fades else wanted, target, found))
         if max(found, key=rank).least <= ENOUGH:
             for each in found[first:]:
                 found.append(trial.eased(each, target, found))

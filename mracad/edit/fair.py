@@ -64,6 +64,7 @@ class Filter(Wish):
     leads: Mapping[int, int] = field(default_factory=dict)
     limited: bool = False
     spread: ClassVar[float] = 1.0
+    fades: ClassVar[bool] = True
     fairs: ClassVar[bool] = True
     whole: ClassVar[bool] = False
     growth: ClassVar[Growth] = GROWTH

@@ -52,6 +52,7 @@ class Outward(Wish):
     distance: float
     refine: bool = True
     spread: ClassVar[float] = math.inf
+    fades: ClassVar[bool] = True
     fairs: ClassVar[bool] = False
     whole: ClassVar[bool] = True
     limited: ClassVar[bool] = False

@@ -38,6 +38,8 @@ class Wish(Protocol):
     ----------
     spread : float
         Number of wavelengths within which a change at a place spreads; infinite where spreading is no fault.
+    fades : bool
+        Whether it fades out towards regions in which nothing moves; otherwise its target takes them into account.
     fairs : bool
         Whether faces that do not get fairer stay as they are.
     whole : bool
@@ -50,6 +52,9 @@ class Wish(Protocol):
 
     @property
     def spread(self) -> float: ...
+
+    @property
+    def fades(self) -> bool: ...
 
     @property
     def fairs(self) -> bool: ...

@@ -59,7 +59,7 @@ def edited(
     allowed = tolerances(model, options)
     if restored:
         allowed = replace(allowed, gap=math.inf, least=math.inf, angle=math.inf, bend=math.inf)
-    wishes = wished(model, options, scope)
+    wishes = replace(wished(model, options, scope), jumps=math.isfinite(wish.growth.curvature))
     lost = {edge: cannot_slide(model, edge) for edge in scope.firm}
     for left in range(ROUNDS, -1, -1):
         result = faired(
@@ -105,12 +105,11 @@ def wished(model: Model, options: Fitting, scope: Scope) -> Wishes:
     held = every if options.edges == "frozen" else scope.edges
     able = every - held - scope.firm - _beside(model, scope) if options.edges == "slide" else frozenset[int]()
     fit = math.radians(options.fit_g1 or 0.0)
-    free = isinstance(options, Fairing) and options.free_edges == "smooth"
-    corners = isinstance(options, Fairing) and options.corners == "move"
+    carried = isinstance(options, Shaped)
+    free = carried or (isinstance(options, Fairing) and options.free_edges == "smooth")
+    corners = carried or (isinstance(options, Fairing) and options.corners == "move")
     wishes = Wishes(options.keep, fit, options.close_gaps, held, scope.zones, free=free, corners=corners)
-    if isinstance(options, Shaped):
-        return replace(wishes, free=True, corners=True, jumps=False)
-    return replace(wishes, slide=able, open=not isinstance(options, Fairing))
+    return replace(wishes, slide=able, open=not isinstance(options, Fairing | Shaped))
 
 
 def _outcome(face: Face, result: Result, movable: Collection[int], scope: Scope, options: Fitting) -> FaceOutcome:
@@ -152,7 +151,7 @@ def _left(moved: Moved, options: Fitting) -> tuple[Status, Reason, str]:
     """Status, reason and details of a face that has detail and stays."""
     if options.amount == 0:
         return "unchanged", Reason.AMOUNT, ""
-    if not moved.rough:
+    if not moved.rough or not moved.wanted:
         return "unchanged", Reason.FAIR, ""
     if not moved.free:
         return "left", Reason.NO_FREE, ""

@@ -61,7 +61,8 @@ def matched(nets: Mapping[int, Net], seams: Sequence[Seam]) -> dict[int, Net]:
         if not any(u or v for u, v in wanted.values()):
             break
         for i, new in wanted.items():
-            result[i] = result[i].refined(*(_most(each) for each in new))
+            both = zip(new, (result[i].u, result[i].v), strict=True)
+            result[i] = result[i].refined(*(_most(each, SAME * knots.period) for each, knots in both))
     return result
 
 
@@ -116,11 +117,11 @@ def _near(nets: Mapping[int, Net], border: Border, at: float) -> float:
     return nearest if abs(nearest - at) <= SAME * abs(border.stop - border.start) else at
 
 
-def _most(values: Iterable[float]) -> Array:
-    """Sorted knots needed by several seams, without duplicates up to rounding."""
+def _most(values: Iterable[float], apart: float) -> Array:
+    """Sorted knots needed by several seams, without duplicates up to a distance."""
     result: list[float] = []
     for value in sorted(values):
-        if not result or value - result[-1] > 1e-12 * max(1.0, abs(value)):
+        if not result or value - result[-1] > apart:
             result.append(value)
     return np.array(result)
 

@@ -179,7 +179,6 @@ def _opened(joined: Joints) -> Joints:
         exact=tuple(seam for seam in joined.exact if seam.edge not in sharp),
         loose=tuple(seam for seam in joined.loose if seam.edge not in sharp),
         frozen=frozen | dict.fromkeys(sharp, Cause(Still.SHARP)),
-        jumps=False,
         open=ends,
     )
 

@@ -228,6 +228,11 @@ class Problem:
             pull = pull + self.pull
         return np.asarray(kept + self._solver(stiffness, self.free)(pull, start=kept, goal=self.goal))
 
+    def response(self, rows: Any, stiffness: float) -> Array:
+        """P M P Φᵀ for rows Φ, ``(points, rows)``: P takes pulls to displacements, by the form M + ``stiffness`` K."""
+        solve = self._solver(stiffness, self.free)
+        return np.asarray(solve(self.mass @ solve(rows.T.toarray())))
+
     def settled(self, delta: Array, stiffness: float = 0.0, free: Array | None = None) -> Array:
         """A displacement ``(points, k)`` corrected as smoothly as possible to meet the conditions."""
         solver = self._solver(stiffness, self.free if free is None else free)

@@ -12,6 +12,7 @@ from mracad.spec.files import Naming
 from mracad.spec.quantity import NUMBER, length
 
 PLACE = "write a place as X,Y,Z in millimetres or #FACE@u,v"
+VECTOR = "write X,Y,Z in millimetres: 0,0,-2.5"
 FEATURE = "write a feature as near:X,Y,Z,radius:R (mm), #FACE@u0:u1,v0:v1 or the name of a .feature file"
 ZONE = "write a region as near:X,Y,Z,radius:R or box:X,Y,Z,X,Y,Z (mm), or radius<25mm"
 GRID = "write it as NxM,DX,DY: 4x3,25,25"
@@ -211,32 +212,56 @@ def table(path: str) -> list[tuple[str, tuple[float, ...]]]:
     FileError
         When it cannot be read, or for a bad line.
     """
+    hint = "write x,y,z or x,y,z,rotate,size,height, with numbers in millimetres and degrees"
+    found = _rows(path, (3, 4, 5, 6), "a place", "x,y,z", hint)
+    for where, row in found:
+        if any(factor <= 0 for factor in row[4:5]):
+            raise FileError(f"{where}: size {row[4]:g} is not greater than zero", "give a factor such as 1")
+        if any(factor == 0 for factor in row[5:6]):
+            raise FileError(f"{where}: a copy of height 0 is none", "leave the line out, or give a factor such as 1")
+    return found
+
+
+def moves(path: str) -> list[tuple[str, tuple[float, ...]]]:
+    """The rows of a CSV file of points and how far they move: x, y, z, dx, dy, dz (mm), with their names; lines and
+    errors as for :func:`table`."""
+    columns = "x,y,z,dx,dy,dz"
+    return _rows(path, (6,), "a point and its move", columns, f"write {columns}, with numbers in millimetres")
+
+
+def _rows(path: str, counts: Sequence[int], noun: str, columns: str, hint: str) -> list[tuple[str, tuple[float, ...]]]:
+    """The rows of a CSV file of places, with their names."""
     try:
         with open(path, encoding="utf-8") as file:
             lines = file.read().splitlines()
     except (OSError, UnicodeDecodeError) as error:
         why = error.strerror if isinstance(error, OSError) else "it is not UTF-8 text"
-        raise FileError(f"cannot read '{path}': {why}", "give the path of a CSV file with columns x,y,z") from error
+        raise FileError(
+            f"cannot read '{path}': {why}", f"give the path of a CSV file with columns {columns}"
+        ) from error
     name = path.replace("\\", "/").rpartition("/")[2]
     rows: list[tuple[str, tuple[float, ...]]] = []
     for number, line in enumerate(lines, 1):
         if not line.strip() or line.lstrip().startswith("#") or (not rows and re.match(r"\s*[\"A-Za-z]", line)):
             continue
         where = f"{name}:{number}"
-        row = numbers(line, (3, 4, 5, 6))
+        row = numbers(line, counts)
         if row is None:
-            hint = "write x,y,z or x,y,z,rotate,size,height, with numbers in millimetres and degrees"
-            raise FileError(f"{where}: {line.strip()!r} is not a place", hint)
-        if any(factor <= 0 for factor in row[4:5]):
-            raise FileError(f"{where}: size {row[4]:g} is not greater than zero", "give a factor such as 1")
-        if any(factor == 0 for factor in row[5:6]):
-            raise FileError(f"{where}: a copy of height 0 is none", "leave the line out, or give a factor such as 1")
+            raise FileError(f"{where}: {line.strip()!r} is not {noun}", hint)
         rows.append((where, row))
         if len(rows) > MOST_PLACES:
             raise FileError(f"'{path}' names more than {MOST_PLACES} places", "give several files, one edit each")
     if not rows:
-        raise FileError(f"'{path}' names no places", "write lines x,y,z")
+        raise FileError(f"'{path}' names no places", f"write lines {columns}")
     return rows
+
+
+def vector(text: str, name: str) -> tuple[float, ...]:
+    """Three coordinates of a point or a vector, mm, from ``X,Y,Z``; raises UsageError."""
+    found = numbers(text, (3,))
+    if found is None:
+        raise _wrong(name, text, "three numbers", VECTOR)
+    return found
 
 
 def grid(text: str, name: str) -> Grid:
@@ -297,6 +322,9 @@ def _wrong(name: str, text: str, noun: str, hint: str) -> UsageError:
 
 Place = Annotated[str, Naming(prefix="@"), place]
 """The type of a field that is a place, or names a file of places."""
+
+Vector = Annotated[str, vector]
+"""The type of a field of three coordinates."""
 
 Spot = Annotated[str, spot]
 """The type of a field that is a place."""

@@ -28,6 +28,7 @@ ELSEWHERE = {
 MEMORY = "robust/test_robust.py::test_limits_on_the_command_line"
 
 FEATURE = ("--feature", "near:5,5,0,radius:1.5")
+SWEPT = ("--at", "#1@0.5,0.5", "--by", "0,0,0.4")
 BASE = {
     "batch": ("batch", "recipe.toml", "sheet.step", "--folder", "out", "--json"),
     "check": ("check", "sheet.step", "--json"),
@@ -48,6 +49,7 @@ BASE = {
     "run": ("run", "recipe.toml", "sheet.step", "-o", "a.step", "--json"),
     "smooth": ("smooth", "sheet.step", "--scale", "4mm", "-o", "a.step", "--json"),
     "spectrum": ("spectrum", "sheet.step", "--json"),
+    "sweep": ("sweep", "sheet.step", *SWEPT, "--scale", "4mm", "-o", "a.step", "--json"),
     "transfer": (
         "transfer",
         "sheet.step",
@@ -171,6 +173,14 @@ OWN = {
     "level gap_tolerance": ("--gap-tolerance 1mm", "IN halves.step --scale 40mm"),
     "level keep": ("--keep g2", "IN tangent.step"),
     "level refine": ("--refine never", "IN strips.step --scale 8mm --faces #2"),
+    "sweep at": ("--at #1@0.6,0.4",),
+    "sweep by": ("--by 0,0,0.3",),
+    "sweep to": ("--to 5,5,0.7", "LESS --by --to 5,5,0.5"),
+    "sweep keep": ("--keep g2", "IN tangent.step --at #1@0.9,0.5"),
+    "sweep gap_tolerance": ("--gap-tolerance 1mm", "IN halves.step --scale 40mm --by 0,0,3"),
+    "sweep fit_g1": ("--fit-g1 20", "--at #1@0.9,0.5"),
+    "sweep max_deviation": ("--max-deviation 0.1mm",),
+    "sweep refine": ("--refine never", "--scale 2mm"),
     "offset gap_tolerance": ("--gap-tolerance 1mm", "IN halves.step --distance 2mm"),
     "offset refine": ("--refine never", "IN halves.step --distance 2mm"),
     "compare max_angle_growth": ("--max-angle-growth 0", "REF smooth.step IN sheet.step"),
@@ -293,7 +303,7 @@ def words(case):
         base.remove("--json")
         return base, [*base, "--json"], old
     changed, own = list(base), given.split()
-    if option in ("scale", "to", "from_", "feature", "folder", "output", "keep") and own[0] in changed:
+    if option in ("scale", "by", "to", "from_", "feature", "folder", "output", "keep") and own[0] in changed:
         _give(changed, own)
     else:
         changed += own

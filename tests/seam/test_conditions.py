@@ -286,6 +286,16 @@ def test_matched_nets_are_the_same_surfaces_with_the_same_knots_on_both_sides(pa
     assert inner[0] == inner[1] and len(inner[0]) > 2
 
 
+def test_knots_that_two_neighbours_have_all_but_alike_are_inserted_once():
+    """Spans of 7e-11 would bend like nothing else."""
+    middle = chart(lambda u, v: (u, v), spans=(2, 1))
+    left, right = (middle.refined((), [0.5 + off]) for off in (0.0, 7e-11))
+    ends = [(border(i, False), border(i + 1, True)) for i in (0, 1)]
+    seams = [joined(a, b, Joint(0, np.ones(1), NONE)) for a, b in ends]
+    nets = matched({0: left, 1: middle, 2: right}, seams)
+    assert nets[1].v.count == middle.v.count + 1
+
+
 def test_knots_are_handed_on_through_a_strip():
     nets = {i: chart(lambda u, v, i=i: (u + i, v), (3, 3 + i // 8), spans=(2, 3 + i)) for i in range(9)}
     seams = [joined(border(i, False), border(i + 1, True), Joint(0, np.ones(1), NONE)) for i in range(8)]

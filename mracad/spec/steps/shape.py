@@ -9,7 +9,9 @@ from typing import Annotated, ClassVar
 from msgspec import Meta
 
 from mracad.errors import UsageError
-from mracad.spec.quantity import gain_of
+from mracad.spec import places
+from mracad.spec.quantity import Length, gain_of
+from mracad.spec.steps.levels import Shaped
 from mracad.spec.steps.smooth import Fairing
 
 
@@ -72,3 +74,54 @@ def bands_apart(bands: Sequence[tuple[float, float, float]]) -> None:
         if low < high:
             message = f"band: one begins at {low:g}mm, before another ends at {high:g}mm"
             raise UsageError(message, "let each begin where another ends, or beyond", "band")
+
+
+class Sweep(Shaped, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Take points of NURBS faces elsewhere; the shape around them follows smoothly, and details ride on it."""
+
+    function: ClassVar[str] = "mracad.edit.sweep:sweep"
+
+    at: Annotated[
+        tuple[places.Place, ...],
+        Meta(
+            description="A point of the model: X,Y,Z (mm) on a selected face, #face@u,v, or @points.csv with lines "
+            "x,y,z,dx,dy,dz; repeatable."
+        ),
+    ] = ()
+    by: Annotated[
+        tuple[places.Vector, ...],
+        Meta(description="DX,DY,DZ (mm): how far the point moves; one for each --at in their order, or for all."),
+    ] = ()
+    to: Annotated[
+        tuple[places.Vector, ...],
+        Meta(description="X,Y,Z (mm): where the point goes, instead of --by; one for each --at in their order."),
+    ] = ()
+    scale: Annotated[
+        Length,
+        Meta(
+            description="Wavelength of the sweep (80mm, or 10% of the model's diagonal): a third of it away from a "
+            "point half of its move is left, and at two of it nothing. What is finer rides along as it is."
+        ),
+    ]
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        single = sum(not text.startswith("@") for text in self.at)
+        if not self.at:
+            raise UsageError("at: no point is given", "give --at X,Y,Z --by DX,DY,DZ", "at")
+        if self.by and self.to:
+            raise UsageError("by and to cannot be combined", "give one of them")
+        if single and not (self.by or self.to):
+            raise UsageError("by: the points have nowhere to go", "give --by DX,DY,DZ, or --to X,Y,Z", "by")
+        given, name = (self.by, "by") if self.by else (self.to, "to")
+        if len(given) != single and not (len(self.by) == 1 and single):
+            message = f"{name}: {len(given)} for {single} points"
+            raise UsageError(message, f"give --{name} for each --at that names no file", name)
+
+    @property
+    def done(self) -> str:
+        return f"swept at {self.scale}"
+
+    @property
+    def quiet(self) -> str:
+        return "out of reach" if self.amount else "left as they are: amount 0"

@@ -1,0 +1,87 @@
+"""Displacements that take points where they should go, changing as little as possible.
+
+Of all displacements that seams and rims allow, with δ(u_i, v_i) = d_i at some points, the one with the least
+
+    ‖(1 + ℓ⁴ M⁻¹ K) δ‖²_M = δᵀ B M⁻¹ B δ,      B = M + ℓ⁴ K,
+
+on the surface: |δ|² + 2 ℓ⁴ |∇²δ|² + ℓ⁸ |∇⁴δ|².  With Φ the rows of basis functions at the points and P = B⁻¹ on what
+may move, it is
+
+    δ = P M P Φᵀ μ,      (Φ P M P Φᵀ) μ = d,
+
+one column of the response P M P Φᵀ per point: on a plane the kernel with the spectrum 1 / (1 + (ℓ k)⁴)².  It is smooth
+at its point, where that of B alone has infinite curvature, and falls off like exp(−r / √2 ℓ).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from mracad.bspline.functions import functions
+from mracad.seam.solve import Problem
+
+Array = np.ndarray
+
+ALONE = 1 / 16
+"""The kernel at its point on a plane, times ℓ²."""
+
+PASSES = 3
+"""Times that what is lacking is made up for."""
+
+
+@dataclass(frozen=True, eq=False)
+class Anchors:
+    """Points by which a displacement is led.
+
+    Attributes
+    ----------
+    matrix : scipy.sparse.csr_array (anchors, points)
+        Φ.
+    response : ndarray (points, anchors)
+        P M P Φᵀ.
+    form : ndarray (anchors, anchors)
+        Φ P M P Φᵀ.
+    freedom : ndarray (anchors,)
+        Its diagonal, over that on a plane where nothing is held.
+    """
+
+    matrix: Any
+    response: Array
+    form: Array
+    freedom: Array
+
+    @classmethod
+    def of(cls, problem: Problem, places: dict[int, Array], stiffness: float) -> Anchors:
+        """Anchors at parameters ``(k, 2)`` by surface, in the order of the problem; ``stiffness`` is ℓ⁴, mm⁴."""
+        matrix = _rows(problem, places)
+        response = problem.response(matrix, stiffness)
+        form = np.asarray(matrix @ response)
+        form = (form + form.T) / 2
+        return cls(matrix, response, form, form.diagonal() * stiffness**0.5 / ALONE)
+
+    def led(self, delta: Array, goal: Array) -> Array:
+        """A displacement ``(points, 3)`` with the least that takes the anchors to their goals ``(anchors, 3)``, mm."""
+        scale = 1 / np.sqrt(self.form.diagonal())
+        inverse = np.linalg.pinv(self.form * scale * scale[:, None], rcond=1e-13, hermitian=True)
+        for _ in range(PASSES):
+            lacking = goal - self.matrix @ delta
+            delta = delta + self.response @ (scale[:, None] * (inverse @ (scale[:, None] * lacking)))
+        return np.asarray(delta)
+
+
+def _rows(problem: Problem, places: dict[int, Array]) -> Any:
+    """Φ, ``scipy.sparse.csr_array``."""
+    from scipy.sparse import csr_array
+
+    index, values, begin = [], [], 0
+    for i, space in problem.spaces.items():
+        if i in places:
+            found, table = functions(space.net, places[i], 0)
+            index += list(found + begin)
+            values += list(table[0])
+        begin += space.free.size
+    row = np.repeat(np.arange(len(index)), [len(each) for each in index])
+    return csr_array((np.concatenate(values), (row, np.concatenate(index))), shape=(len(index), begin))
