@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -153,10 +153,17 @@ def seams(model: Model, movable: Collection[int], wishes: Wishes) -> Seams:
         _sort(result, edge, _still(edge, wishes) or _seam(result, model, movable, wishes, (edge, edge), edge.sides))
     for edge, _, sides in unsewn:
         _unsewn(result, model, movable, wishes, edge, sides)
-    for index in touching(model) & result.frozen.keys():
-        if result.frozen[index].still is Still.FREE:
-            result.frozen[index] = Cause(Still.ELSEWHERE)
+    for edge, other, sides in unsewn:
+        _bound(result, (edge.index, other.index), _fixed(model, movable, sides) or Cause(Still.PART))
+    _bound(result, touching(model), Cause(Still.ELSEWHERE))
     return result
+
+
+def _bound(result: Seams, edges: Iterable[int], cause: Cause) -> None:
+    """Say why edges stay that are free in the topology, but not in space."""
+    for edge in edges:
+        if edge in result.frozen and result.frozen[edge].still is Still.FREE:
+            result.frozen[edge] = cause
 
 
 def _meetings(model: Model, wishes: Wishes, found: Sequence[tuple[Edge, Edge, Sequence[Side]]]) -> dict[int, Meeting]:

@@ -4,6 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeFace
+from OCP.gp import gp_Dir, gp_Pln, gp_Pnt
 
 from mracad.bspline.fit import interpolated
 from mracad.bspline.surface import Net
@@ -19,6 +21,7 @@ from mracad.wavelet.ladder import arc_lengths
 from tests.edit import panels
 from tests.edit.models import free_edge, sheet
 from tests.model.shapes import circle, cylinder, face, graph, plane, rectangle, segment
+from tests.occ import shapes
 
 
 def trimmed(net, curves):
@@ -270,3 +273,16 @@ def test_a_patch_of_few_rows_keeps_tangents():
         clean, _ = panels.whole(spans, 0.0, patches=(1, 2))
         model = view(panels.document(panels.cut(clean, (1, 2))))
         assert [seam.joint.order for seam in joints(model, {0, 1}, Wishes("as-is")).exact] == [order]
+
+
+@pytest.mark.parametrize(("longer", "why"), [(0.0, "plane neighbour"), (5.0, "coincides with part of another edge")])
+def test_an_edge_beside_an_unsewn_face_that_stays_is_not_free(longer, why):
+    """A patch beside a plane that was never sewn to it, whose edge may be longer; free edges move."""
+    x, y = np.meshgrid(np.linspace(0, 10, 8), np.linspace(0, 10, 8), indexing="ij")
+    patch = shapes.face_on(shapes.bspline(np.stack([x, y, 0.02 * x * (10 - x)], axis=-1)))
+    plane = BRepBuilderAPI_MakeFace(gp_Pln(gp_Pnt(10, 0, 0), gp_Dir(0, 0, 1)), 0.0, 10.0, -longer, 10.0).Face()
+    model = view(shapes.document(shapes.compound(patch, plane)))
+    joined = joints(model, {0}, Wishes(free=True))
+    assert len(joined.open) == 3
+    (cause,) = (joined.frozen[edge.index] for edge in model.edges if edge.index in joined.frozen)
+    assert str(cause) == why
