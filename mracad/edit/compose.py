@@ -70,9 +70,7 @@ class Detailed(Wish):
     laid: dict[tuple[int, KnotVector, KnotVector], Laid] = field(default_factory=dict)
     spread: ClassVar[float] = math.inf
     fairs: ClassVar[bool] = False
-    fades: ClassVar[bool] = True
     whole: ClassVar[bool] = True
-    limited: ClassVar[bool] = False
 
     @property
     def growth(self) -> Growth:

@@ -53,11 +53,7 @@ class Quiet(Wish):
 
     noise: Mapping[int, Noise]
     asked: Asked
-    spread: ClassVar[float] = 1.0
-    fades: ClassVar[bool] = True
     fairs: ClassVar[bool] = True
-    whole: ClassVar[bool] = False
-    limited: ClassVar[bool] = False
     growth: ClassVar[Growth] = NOISY
 
     def wavelength(self, net: Net, faces: Sequence[Face], creases: Creases) -> float:

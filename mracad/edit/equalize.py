@@ -48,11 +48,7 @@ class Gains(Wish):
     """
 
     bands: Sequence[tuple[float, float, float]]
-    spread: ClassVar[float] = 1.0
-    fades: ClassVar[bool] = True
     fairs: ClassVar[bool] = False
-    whole: ClassVar[bool] = False
-    limited: ClassVar[bool] = False
 
     @property
     def smooths(self) -> bool:

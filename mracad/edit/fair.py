@@ -63,10 +63,7 @@ class Filter(Wish):
     across: float | None = None
     leads: Mapping[int, int] = field(default_factory=dict)
     limited: bool = False
-    spread: ClassVar[float] = 1.0
-    fades: ClassVar[bool] = True
     fairs: ClassVar[bool] = True
-    whole: ClassVar[bool] = False
     growth: ClassVar[Growth] = GROWTH
 
     def wavelength(self, net: Net, faces: Sequence[Face], creases: Creases) -> float:

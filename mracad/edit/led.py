@@ -1,4 +1,4 @@
-"""Points that a sweep leads, from its options to parameters of surfaces."""
+"""The points that a sweep moves: from its options to parameters of surfaces."""
 
 from __future__ import annotations
 
@@ -18,26 +18,26 @@ from mracad.spec.steps.shape import Sweep
 Array = np.ndarray
 
 NEAR = 1e-3, 0.01
-"""How far off a surface a point may be: this share of the scale, and at least so many mm."""
+"""Largest distance of a point from a surface: a share of the scale, and at least a length (mm)."""
 
 NAMED = 5
-"""Most points that a message names."""
+"""Largest number of points that a message names."""
 
 
 @dataclass(frozen=True, eq=False)
 class Led:
-    """Points of surfaces that are led elsewhere.
+    """Points of surfaces, and how far they move.
 
     Attributes
     ----------
     places : mapping of int to ndarray (k, 2)
         Parameters by surface.
     moves : mapping of int to ndarray (k, 3)
-        How far they move in the frame of the surface, mm.
+        Displacements of the points in the frame of the surface, mm.
     labels : mapping of int to sequence of str
         Their names in messages.
     points : ndarray (m, 3)
-        All of them in the part's frame, mm.
+        All points in the part's frame, mm.
     """
 
     places: Mapping[int, Array]
@@ -51,7 +51,7 @@ class Led:
         return max(float(np.linalg.norm(each, axis=1).max()) for each in self.moves.values())
 
     def times(self, share: float) -> Led:
-        """The same points, led a share of the way."""
+        """The same points, moved a share of the way."""
         return replace(self, moves={i: share * each for i, each in self.moves.items()})
 
     def away(self, faces: Sequence[Face], points: Array) -> Array:
@@ -62,7 +62,7 @@ class Led:
         return np.asarray(np.min([tree.query(face.placed(points))[0] for face in faces], axis=0))
 
     def refuse(self, places: Mapping[int, Array], wrong: Array, why: str) -> None:
-        """Raise EditError for those points of some surfaces that are wrong."""
+        """Raise EditError for points in ``places`` for which ``wrong`` is true."""
         labels = [label for i in places for label in self.labels[i]]
         bad = [label for label, each in zip(labels, wrong, strict=True) if each]
         if bad:
@@ -109,7 +109,7 @@ def led(model: Model, options: Sweep, scope: Scope, scale: float) -> Led:
         For an invalid file of points.
     """
     given = _given(options)
-    movable = {i for i in scope.chosen if model.faces[i].surface is not None}
+    movable = scope.movable(model)
     ground = Ground.of(model, movable)
     every = [place(ground, each.where, each.label) for each in given]
     points = np.array([each.point for each in every])
@@ -136,7 +136,7 @@ def _goal(given: _Given, point: Array) -> Array:
 
 
 def _refuse_off(model: Model, scope: Scope, given: Sequence[_Given], points: Array, off: Array) -> None:
-    """Raise EditError for points off the faces to edit, with the faces on which they are or how far they are off."""
+    """Raise EditError for points that are not on the faces to edit, with the faces on which they are, or distances."""
     bad = np.flatnonzero(off)
     if not len(bad):
         return
@@ -151,9 +151,9 @@ def _refuse_off(model: Model, scope: Scope, given: Sequence[_Given], points: Arr
             why = "held" if face in scope.held else "not selected"
             words.append(f"{name} is on #{face + 1}, which is {why}")
         elif np.isfinite(feet.apart[k]):
-            words.append(f"{name} is {feet.apart[k]:.3g} mm off the model's NURBS faces")
+            words.append(f"{name} is {feet.apart[k]:.3g} mm away from the model's NURBS faces")
         else:
-            words.append(f"{name} is off the model's NURBS faces")
+            words.append(f"{name} is not on the model's NURBS faces")
     raise EditError(_listed(words), "give points on faces that may move")
 
 

@@ -71,8 +71,6 @@ class Coarser(Wish):
     level: float = 0.0
     scale: float | None = None
     fairs: bool = True
-    fades: ClassVar[bool] = True
-    limited: ClassVar[bool] = False
     spread: ClassVar[float] = math.inf  # waves beside what goes are part of a projection
 
     @property

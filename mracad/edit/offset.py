@@ -52,10 +52,8 @@ class Outward(Wish):
     distance: float
     refine: bool = True
     spread: ClassVar[float] = math.inf
-    fades: ClassVar[bool] = True
     fairs: ClassVar[bool] = False
     whole: ClassVar[bool] = True
-    limited: ClassVar[bool] = False
     growth: ClassVar[Growth] = RESHAPED
 
     def wavelength(self, net: Net, faces: Sequence[Face], creases: Creases) -> float:

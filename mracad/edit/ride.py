@@ -1,11 +1,11 @@
-"""Details that ride on a surface whose coarse shape c moves to c + δ: they turn with it.
+"""Details on a surface whose coarse shape c moves to c + δ: they turn with it.
 
     f ↦ c + δ + R (f − c) = f + δ + (R − 1)(f − c),      c = L f
 
 L is the low-pass of the solver, R the rotation from the tangent frame of c to that of c + δ
-(:func:`mracad.edit.carry.turns`).  A detail that stands on the surface keeps its height and its angle to it.  Where c
-shrinks (a tube thinner than the scale becomes a line), the whole tube is a detail and turns; its tangents are then seen
-at shorter wavelengths.
+(:func:`mracad.edit.carry.turns`).  A detail on the surface keeps its height and its angle to it.  Where c shrinks (a
+tube thinner than the scale becomes a line), the whole tube is a detail and turns; its tangents are then taken at
+shorter wavelengths.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ from mracad.seam.solve import Problem
 Array = np.ndarray
 
 HALVINGS = 4
-"""Most times that the wavelength is halved to see tangents."""
+"""How often the wavelength is halved at most to find tangents."""
 
 AREA = 0.9
-"""Least share of its area that a surface must keep for its tangents to be seen."""
+"""Share of its area that a surface must keep for its tangents to be used."""
 
 
 class Rider:
@@ -65,7 +65,7 @@ def _low(problem: Problem, wavelength: float) -> Array:
 
 
 def _shrunk(net: Net, coarse: Net, seen: Array) -> bool:
-    """Whether a coarse surface has clearly less area than the surface itself, where that is seen."""
+    """Whether a coarse surface has clearly less area than the surface itself, within its faces."""
     at = net.u.greville(), net.v.greville()
     areas = [
         np.linalg.norm(cross(each.tangents(*at, 0), each.tangents(*at, 1)), axis=-1)[seen].sum()

@@ -54,7 +54,7 @@ def smooth(
 def _within(model: Model, options: Smooth, scope: Scope, progress: Callable[[int, int], None] | None) -> Edit:
     """Smoothing at the largest scale that stays within the bound."""
     allowed, limited = tolerances(model, options), options.limit_by_curvature
-    movable = {i for i in scope.chosen if model.faces[i].surface is not None}
+    movable = scope.movable(model)
 
     def edit(scale: float) -> Edit:
         return edited(model, options, Filter(scale, limited=limited), scope, progress)

@@ -1,8 +1,8 @@
-"""Sweeps: points of a surface taken elsewhere, its coarse shape with them, and its details riding on that.
+"""Sweeps: points of a surface are moved; its coarse shape follows them, and its details turn with the coarse shape.
 
 The coarse shape moves by the least displacement that goes through the points (:mod:`mracad.seam.anchor`), with the ℓ of
-the scale; details turn with it (:mod:`mracad.edit.ride`).  As they move the points, too, the goals of the coarse shape
-are corrected by that, and the rest is met by the least displacement again: points go exactly where they should.
+the scale; details turn with it (:mod:`mracad.edit.ride`).  Because details also move the points, the goals of the
+coarse shape are corrected for that, and a last least displacement takes the points exactly to their goals.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from mracad.edit.bound import reached
 from mracad.edit.led import Led, led
 from mracad.edit.result import Edit
 from mracad.edit.ride import Rider
-from mracad.edit.target import Sheet, stiffness
+from mracad.edit.target import Sheet, Wish, stiffness
 from mracad.edit.tolerances import TURNED, tolerances
 from mracad.edit.whole import edited
 from mracad.errors import EditError
@@ -33,7 +33,6 @@ from mracad.seam.interface import Joints
 from mracad.seam.ladders import Creases
 from mracad.seam.solve import Problem, Soft
 from mracad.seam.space import MOST_POINTS
-from mracad.seam.stretch import EVEN, Stretch
 from mracad.spec.quantity import length
 from mracad.spec.select import Scope
 from mracad.spec.select import scope as scope_of
@@ -43,39 +42,39 @@ from mracad.wavelet.ladder import arc_lengths
 Array = np.ndarray
 
 REACH = 3.0
-"""Scales beyond which surfaces stay: what would be left of a move is 1e-5 of it."""
+"""Number of scales from the points beyond which surfaces stay: a move has faded to 1e-5 there."""
 
 SPANS = 8.0, 6.0, 4.0
-"""Parts of a scale into which spans in reach are divided: as many as the surface has room for."""
+"""Numbers of parts of a scale into which spans in reach are divided: as many as the surface has room for."""
 
 COARSE = 1.4
-"""Scales whose waves details ride on: a detail that the coarse shape shows would partly stay upright."""
+"""Wavelength of the coarse shape on which details turn, in scales: details within that shape would turn only partly."""
 
 ROUNDS = 8
-"""Most corrections of the goals of the coarse shape."""
+"""Largest number of corrections of the goals of the coarse shape."""
 
 MET = 1e-7
-"""How near to their goals points must come, mm."""
+"""Largest distance of points from their goals, mm."""
 
 FREE = 0.01
-"""Least freedom of a point, see :class:`mracad.seam.anchor.Anchors`: with less the surface beside it would move much
-farther than it."""
+"""Least freedom of a point, see :class:`mracad.seam.anchor.Anchors`: with less, the surface beside it would move much
+farther."""
 
 WITHIN = 0.999
-"""Share of a bound of the deviation that is aimed at."""
+"""Share of a limit of the deviation that is aimed at."""
 
 FARTHER = 3.0
-"""Most that anything may move, over the largest move asked for: points that contradict each other move others far."""
+"""Largest motion over the largest that was asked for: contradicting points move other places far."""
 
 
 @dataclass(frozen=True)
-class Through:
+class Through(Wish):
     """The wish of a sweep.
 
     Attributes
     ----------
     scale : float
-        mm.
+        Scale, mm.
     points : Led
         The points, and how far they move.
     refine : bool
@@ -96,12 +95,8 @@ class Through:
         """The scale."""
         return self.scale
 
-    def stretch(self, faces: Sequence[Face]) -> Stretch:
-        """The same in every direction."""
-        return EVEN
-
     def space(self, net: Net, faces: Sequence[Face]) -> Net:
-        """The surface with its spans in reach of a point divided until they can follow."""
+        """The surface, with spans in reach of a point divided so that they can follow."""
         if not self.refine:
             return net
         near = [self._near(net, faces, axis) for axis in (0, 1)]
@@ -116,7 +111,7 @@ class Through:
         return net
 
     def _near(self, net: Net, faces: Sequence[Face], axis: int) -> Array:
-        """Which spans along an axis come within the reach of a point, ``(spans,)``."""
+        """Mask of the spans along an axis that are within reach of a point, ``(spans,)``."""
         knots, other = (net.u, net.v)[:: 1 - 2 * axis]
         along = np.linspace(knots.breaks[:-1], knots.breaks[1:], 5, axis=1).ravel()
         across = np.linspace(*other.domain, 4 * other.spans + 1)
@@ -132,13 +127,13 @@ class Through:
         return self.points.largest if near or sheet.index in self.points.places else 0.0
 
     def target(self, problem: Problem, sheets: Mapping[int, Sheet], joined: Joints) -> Array:
-        """The displacement that takes the points of these surfaces to their goals, ``(points, 3)``."""
+        """The displacement that moves the points of these surfaces to their goals, ``(points, 3)``."""
         places = {i: self.points.places[i] for i in problem.spaces if i in self.points.places}
         if not places:
             return np.zeros_like(problem.f)
         plain = _plain(problem, sheets)
         anchors = Anchors.of(plain, places, stiffness(self.scale))
-        self.points.refuse(places, anchors.freedom < FREE, "is held, or too near to what is")
+        self.points.refuse(places, anchors.freedom < FREE, "is held, or too near to something held")
         goal = np.concatenate([self.points.moves[i] for i in places])
         still = np.zeros_like(problem.f)
         rider = Rider(plain, COARSE * self.scale)
@@ -167,7 +162,7 @@ class Through:
 
 
 def _plain(problem: Problem, sheets: Mapping[int, Sheet]) -> Problem:
-    """The same problem with the same length in every direction: rounds do not limit how far a sweep spreads."""
+    """The same problem with equal lengths in all directions: rounds do not limit how far a sweep spreads."""
     spaces = {}
     for i, space in problem.spaces.items():
         sheet = sheets[i]
@@ -184,12 +179,12 @@ def sweep(
     scope: Scope | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Edit:
-    """Take points of the NURBS faces of a model elsewhere; parameters as for :func:`mracad.edit.whole.edited`.
+    """Move points of the NURBS faces of a model; parameters as for :func:`mracad.edit.whole.edited`.
 
     Raises
     ------
     EditError
-        For points off the faces to edit or on what is held, and where the surface would fold.
+        For points that are held or not on the faces to edit, and if the surface would fold.
     """
     scope = scope or scope_of(model, options)
     scale, bound = length(options.scale, model.diagonal, "scale"), tolerances(model, options).deviation
@@ -213,7 +208,7 @@ def sweep(
 
 
 def _refuse_missed(model: Model, edit: Edit, points: Led) -> None:
-    """Raise EditError if points did not get where they should."""
+    """Raise EditError if points did not reach their goals."""
     for surface, places in points.places.items():
         net, moved = model.surfaces[surface].net, np.zeros((len(places), 3))
         if surface in edit.displacement.offsets:
@@ -221,7 +216,7 @@ def _refuse_missed(model: Model, edit: Edit, points: Led) -> None:
         missed = np.linalg.norm(moved - points.moves[surface], axis=1) > 10 * MET
         left = [outcome for outcome in edit.faces("left") if outcome.face in model.surfaces[surface].faces]
         if missed.any():
-            why = "it is joined to what must stay"
+            why = "it is joined to something that must stay"
             if left:
                 folds = left[0].said == Rougher.FOLD.value
                 why = f"#{left[0].face + 1} would fold" if folds else f"#{left[0].face + 1} {left[0].words}"

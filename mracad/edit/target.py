@@ -37,33 +37,37 @@ class Wish(Protocol):
     Attributes
     ----------
     spread : float
-        Number of wavelengths within which a change at a place spreads; infinite where spreading is no fault.
+        Number of wavelengths within which a change at a place spreads (default 1); infinite if spreading is no fault.
     fades : bool
-        Whether it fades out towards regions in which nothing moves; otherwise its target takes them into account.
+        Whether it fades out towards regions in which nothing may move (default); if not, its target respects them.
     fairs : bool
         Whether faces that do not get fairer stay as they are.
     whole : bool
-        Whether it is done in full or not at all, because part of it is not what was asked for.
+        Whether it is done in full or not at all, because part of it is not what was asked for (default: no).
     limited : bool
-        Whether wavelengths are reduced where radii of curvature are too small for them.
+        Whether wavelengths are reduced where radii of curvature are too small for them (default: no).
     growth : Growth
         How much rougher it may make a face.
     """
 
     @property
-    def spread(self) -> float: ...
+    def spread(self) -> float:
+        return 1.0
 
     @property
-    def fades(self) -> bool: ...
+    def fades(self) -> bool:
+        return True
 
     @property
     def fairs(self) -> bool: ...
 
     @property
-    def whole(self) -> bool: ...
+    def whole(self) -> bool:
+        return False
 
     @property
-    def limited(self) -> bool: ...
+    def limited(self) -> bool:
+        return False
 
     @property
     def growth(self) -> Growth: ...

@@ -55,7 +55,7 @@ def edited(
         For options that name parts this model does not have, or that need the document.
     """
     scope = scope or scope_of(model, options)
-    movable = {i for i in scope.chosen if model.faces[i].surface is not None}
+    movable = scope.movable(model)
     allowed = tolerances(model, options)
     if restored:
         allowed = replace(allowed, gap=math.inf, least=math.inf, angle=math.inf, bend=math.inf)

@@ -106,6 +106,10 @@ class Face:
         """1 where S_u × S_v points outward, otherwise -1."""
         return -1 if self.reversed else 1
 
+    def trim(self, edge: int) -> Trim:
+        """Its first use of an edge."""
+        return next(trim for trim in self.trims if trim.edge == edge)
+
     def turned(self, vectors: Array) -> Array:
         """Vectors ``(…, 3)`` of the surface's frame in the part's."""
         return np.asarray(vectors @ self.frame[:3, :3].T)

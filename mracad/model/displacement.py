@@ -114,7 +114,7 @@ def lifted(own: Net, fine: Net, offset: Array) -> Array:
 def _slid(model: Model, edge: Edge, face: Face) -> Edge:
     """An edge moved onto its face that moved, with the nearest points of its neighbour."""
     assert face.surface is not None
-    trim = next(trim for trim in face.trims if trim.edge == edge.index)
+    trim = face.trim(edge.index)
     first, last = trim.curve.knots.domain
     uv, way = trim.curve.evaluate(first + (last - first) * shares(len(edge.points)), 1)
     points, su, sv = model.surfaces[face.surface].net.evaluate(uv, 1)

@@ -1,11 +1,11 @@
-"""Displacements that take points where they should go, changing as little as possible.
+"""Displacements that move points to their goals and change as little as possible.
 
 Of all displacements that seams and rims allow, with δ(u_i, v_i) = d_i at some points, the one with the least
 
     ‖(1 + ℓ⁴ M⁻¹ K) δ‖²_M = δᵀ B M⁻¹ B δ,      B = M + ℓ⁴ K,
 
-on the surface: |δ|² + 2 ℓ⁴ |∇²δ|² + ℓ⁸ |∇⁴δ|².  With Φ the rows of basis functions at the points and P = B⁻¹ on what
-may move, it is
+on the surface: |δ|² + 2 ℓ⁴ |∇²δ|² + ℓ⁸ |∇⁴δ|².  With Φ the rows of basis functions at the points and P = B⁻¹ on the
+control points that may move, it is
 
     δ = P M P Φᵀ μ,      (Φ P M P Φᵀ) μ = d,
 
@@ -29,12 +29,12 @@ ALONE = 1 / 16
 """The kernel at its point on a plane, times ℓ²."""
 
 PASSES = 3
-"""Times that what is lacking is made up for."""
+"""How often the remaining error is corrected."""
 
 
 @dataclass(frozen=True, eq=False)
 class Anchors:
-    """Points by which a displacement is led.
+    """Points with goals for a displacement.
 
     Attributes
     ----------
@@ -63,7 +63,8 @@ class Anchors:
         return cls(matrix, response, form, form.diagonal() * stiffness**0.5 / ALONE)
 
     def led(self, delta: Array, goal: Array) -> Array:
-        """A displacement ``(points, 3)`` with the least that takes the anchors to their goals ``(anchors, 3)``, mm."""
+        """A displacement ``(points, 3)`` with the least correction that takes anchors to their goals ``(anchors, 3)``,
+        mm."""
         scale = 1 / np.sqrt(self.form.diagonal())
         inverse = np.linalg.pinv(self.form * scale * scale[:, None], rcond=1e-13, hermitian=True)
         for _ in range(PASSES):

@@ -69,13 +69,13 @@ def _roomy(model: Model, edge: Edge, side: Side, movable: Collection[int]) -> bo
     if face.surface is None:
         return False
     surface = model.surfaces[face.surface]
-    trim = next(trim for trim in face.trims if trim.edge == edge.index)
+    trim = face.trim(edge.index)
     return end(surface.net, trim) is None and not any(each in movable for each in surface.faces)
 
 
 def _slide(model: Model, edge: Edge, cause: Cause, sides: tuple[Side, Side], meets: _Meets) -> Slide:
     face, stays = (model.faces[side.face] for side in sides)
-    trim = next(trim for trim in face.trims if trim.edge == edge.index)
+    trim = face.trim(edge.index)
     assert face.surface is not None
     ground = model.rails.grounds.get(stays.index) or _sheet(model, stays, sides[1])
     border = end(model.surfaces[face.surface].net, trim)

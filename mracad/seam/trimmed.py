@@ -18,7 +18,7 @@ import numpy as np
 
 from mracad.bspline.surface import curvature
 from mracad.bspline.vectors import across, between
-from mracad.model.brep import Edge, Face, Model, Trim
+from mracad.model.brep import Edge, Model
 from mracad.seam.cause import Cause, Still
 from mracad.seam.natural import Seam, runs_back
 from mracad.seam.trace import EVENLY, LOOKS, Trace, along, pieces, trace_of
@@ -102,7 +102,7 @@ def trimmed(model: Model, edge: Edge, twin: Edge, wishes: Wishes) -> TrimmedSeam
         return Cause(Still.PLACED)
     if faces[0] is faces[1]:
         return Cause(Still.ITSELF)
-    a, b = (trace_of(model, face, _trim(face, each)) for face, each in zip(faces, (edge, twin), strict=True))
+    a, b = (trace_of(model, face, face.trim(each.index)) for face, each in zip(faces, (edge, twin), strict=True))
     if edge is not twin:
         fractions = _followed(model, a, b, runs_back(edge.points, twin.points))
         if (np.diff(fractions) * (fractions[-1] - fractions[0]) <= 0).any():
@@ -143,10 +143,6 @@ def _judged(model: Model, edge: int, twin: int, traces: tuple[Trace, Trace], wis
         return Cause(Still.FLAT)
     close, fit = wishes.close_gaps, order > 0 and bool(angle <= wishes.fit)
     return TrimmedSeam(edge, twin, *traces, order, opening, close, fit)
-
-
-def _trim(face: Face, edge: Edge) -> Trim:
-    return next(trim for trim in face.trims if trim.edge == edge.index)
 
 
 def judged(model: Model, traces: tuple[Trace, Trace]) -> Array:

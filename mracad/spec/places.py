@@ -218,13 +218,13 @@ def table(path: str) -> list[tuple[str, tuple[float, ...]]]:
         if any(factor <= 0 for factor in row[4:5]):
             raise FileError(f"{where}: size {row[4]:g} is not greater than zero", "give a factor such as 1")
         if any(factor == 0 for factor in row[5:6]):
-            raise FileError(f"{where}: a copy of height 0 is none", "leave the line out, or give a factor such as 1")
+            raise FileError(f"{where}: height 0 makes no copy", "leave the line out, or give a factor such as 1")
     return found
 
 
 def moves(path: str) -> list[tuple[str, tuple[float, ...]]]:
-    """The rows of a CSV file of points and how far they move: x, y, z, dx, dy, dz (mm), with their names; lines and
-    errors as for :func:`table`."""
+    """The rows of a CSV file of points and their moves: x, y, z, dx, dy, dz (mm), with their names; errors as for
+    :func:`table`."""
     columns = "x,y,z,dx,dy,dz"
     return _rows(path, (6,), "a point and its move", columns, f"write {columns}, with numbers in millimetres")
 

@@ -58,6 +58,10 @@ class Scope:
         """Faces that it may move."""
         return self.faces - self.held
 
+    def movable(self, model: Model) -> set[int]:
+        """Faces on NURBS surfaces that it may move."""
+        return {i for i in self.chosen if model.faces[i].surface is not None}
+
     def holding(self, faces: Iterable[int], firm: Iterable[int] = ()) -> Scope:
         """This scope with more faces held, and more edges that must not slide."""
         return replace(self, held=self.held | frozenset(faces), firm=self.firm | frozenset(firm))

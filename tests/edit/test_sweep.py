@@ -223,7 +223,7 @@ def test_less_of_it_is_a_shorter_way():
     ("options", "what"),
     [
         ({}, "no point"),
-        ({"at": ("1,2,3",)}, "nowhere to go"),
+        ({"at": ("1,2,3",)}, "no move is given"),
         ({"at": ("1,2,3",), "by": ("0,0,1",), "to": ("0,0,1",)}, "cannot be combined"),
         ({"at": ("1,2,3", "2,3,4"), "to": ("0,0,1",)}, "1 for 2 points"),
         ({"at": ("1,2,3",), "by": ("0,0",)}, "three numbers"),

@@ -54,7 +54,7 @@ def move(
         For a place or a window that is not on the faces, or a feature that does not fit its old or new place.
     """
     scope = scope or scope_of(model, options)
-    chosen = _movable(model, scope)
+    chosen = scope.movable(model)
     feature = feature_of(model, options, chosen, options.feature)
     assert feature.origin is not None
     _refuse_held(model, feature.origin.offsets, scope)
@@ -72,7 +72,7 @@ def repeat(
 ) -> Edit:
     """Copy a feature; parameters and errors as for :func:`move`."""
     scope = scope or scope_of(model, options)
-    chosen = _movable(model, scope)
+    chosen = scope.movable(model)
     feature = feature_of(model, options, chosen, options.feature)
     ground = Ground.of(model, chosen).without(feature.origin.offsets if feature.origin else {})
     return _edit(model, scope, _laid(ground, feature, places(ground, feature, options), options, scope, {}))
@@ -94,7 +94,7 @@ def transfer(
         The other model; other parameters and errors as for :func:`move`.
     """
     scope = scope or scope_of(model, options)
-    ground = Ground.of(model, _movable(model, scope))
+    ground = Ground.of(model, scope.movable(model))
     every = {f.index for f in source.faces if f.surface is not None}
     text = options.from_
     if is_feature(text):
@@ -114,10 +114,6 @@ def _refuse_held(model: Model, offsets: Mapping[int, Array], scope: Scope) -> No
         held = zoned(surface.net, [model.faces[face] for face in surface.faces], scope.zones)
         if np.any(offset[held]):
             raise EditError("feature: a region of --hold keeps part of it", "move another feature, or hold less")
-
-
-def _movable(model: Model, scope: Scope) -> set[int]:
-    return {i for i in scope.chosen if model.faces[i].surface is not None}
 
 
 def _target(ground: Ground, text: str, options: Copied) -> Place:
@@ -149,10 +145,8 @@ def _laid(
 
 def _edit(model: Model, scope: Scope, laid: Laid) -> Edit:
     """The edit with an outcome for every face and every edge of those under copies."""
-    touched = {f for copy in laid.copies for f in copy.faces}
-    outcomes = tuple(
-        untouched(face, scope, _movable(model, scope)) or _outcome(model, face, laid, touched) for face in model.faces
-    )
+    touched, movable = {f for copy in laid.copies for f in copy.faces}, scope.movable(model)
+    outcomes = tuple(untouched(face, scope, movable) or _outcome(model, face, laid, touched) for face in model.faces)
     ways = {
         **dict.fromkeys(laid.frozen, "frozen"),
         **dict.fromkeys(laid.loose, "to tolerance"),

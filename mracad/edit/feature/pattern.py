@@ -143,7 +143,7 @@ def along(ground: Ground, given: spec.Along) -> list[Place]:
         raise EditError(f"along: edge#{number} bounds no face to edit", "select one of its faces with --faces")
     face = model.faces[side.face]
     assert face.surface is not None
-    trace = trace_of(model, face, next(trim for trim in face.trims if trim.edge == edge.index))
+    trace = trace_of(model, face, face.trim(edge.index))
     points, tangents = _even(ground.patches[face.surface], trace, count)
     if offset:
         points = points + offset * _inward(ground, face, points, tangents)

@@ -77,7 +77,7 @@ def bands_apart(bands: Sequence[tuple[float, float, float]]) -> None:
 
 
 class Sweep(Shaped, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Take points of NURBS faces elsewhere; the shape around them follows smoothly, and details ride on it."""
+    """Move points of NURBS faces; the shape around them follows smoothly, and details turn with it."""
 
     function: ClassVar[str] = "mracad.edit.sweep:sweep"
 
@@ -99,8 +99,8 @@ class Sweep(Shaped, frozen=True, kw_only=True, forbid_unknown_fields=True):
     scale: Annotated[
         Length,
         Meta(
-            description="Wavelength of the sweep (80mm, or 10% of the model's diagonal): a third of it away from a "
-            "point half of its move is left, and at two of it nothing. What is finer rides along as it is."
+            description="Wavelength of the sweep (80mm, or 10% of the model's diagonal): half of a move is left at a "
+            "third of it from the point, and nothing at twice it. Finer detail moves along unchanged."
         ),
     ]
 
@@ -112,7 +112,7 @@ class Sweep(Shaped, frozen=True, kw_only=True, forbid_unknown_fields=True):
         if self.by and self.to:
             raise UsageError("by and to cannot be combined", "give one of them")
         if single and not (self.by or self.to):
-            raise UsageError("by: the points have nowhere to go", "give --by DX,DY,DZ, or --to X,Y,Z", "by")
+            raise UsageError("by: no move is given for the points", "give --by DX,DY,DZ, or --to X,Y,Z", "by")
         given, name = (self.by, "by") if self.by else (self.to, "to")
         if len(given) != single and not (len(self.by) == 1 and single):
             message = f"{name}: {len(given)} for {single} points"
@@ -124,4 +124,4 @@ class Sweep(Shaped, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
     @property
     def quiet(self) -> str:
-        return "out of reach" if self.amount else "left as they are: amount 0"
+        return "out of reach" if self.amount else "unchanged: amount 0"
