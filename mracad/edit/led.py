@@ -20,6 +20,9 @@ Array = np.ndarray
 NEAR = 1e-3, 0.01
 """Largest distance of a point from a surface: a share of the scale, and at least a length (mm)."""
 
+MOST = 500
+"""Most points of a sweep: each takes a solve of its own."""
+
 NAMED = 5
 """Largest number of points that a message names."""
 
@@ -78,7 +81,7 @@ class _Given:
 
 
 def _given(options: Sweep) -> list[_Given]:
-    """The points as given; raises FileError for an invalid file."""
+    """The points as given; raises FileError for an invalid file, and EditError for too many."""
     found: list[_Given] = []
     single = 0
     for text in options.at:
@@ -95,6 +98,8 @@ def _given(options: Sweep) -> list[_Given]:
         else:
             found.append(_Given(label, where, None, spec.vector(options.to[single], "to")))
         single += 1
+    if len(found) > MOST:
+        raise EditError(f"{len(found)} points are too many for a sweep", f"give {MOST} at most: others follow")
     return found
 
 

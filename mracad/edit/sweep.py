@@ -28,10 +28,10 @@ from mracad.inspect.roughness import Growth, Rougher
 from mracad.model.brep import Face, Model
 from mracad.model.cells import quadrature
 from mracad.seam.anchor import Anchors
-from mracad.seam.energy import forms
+from mracad.seam.energy import forms, slopes
 from mracad.seam.interface import Joints
 from mracad.seam.ladders import Creases
-from mracad.seam.solve import Problem, Soft
+from mracad.seam.solve import Problem, Soft, Space
 from mracad.seam.space import MOST_POINTS
 from mracad.spec.quantity import length
 from mracad.spec.select import Scope
@@ -131,8 +131,9 @@ class Through(Wish):
         places = {i: self.points.places[i] for i in problem.spaces if i in self.points.places}
         if not places:
             return np.zeros_like(problem.f)
+        stiff = stiffness(self.scale)
         plain = _plain(problem, sheets)
-        anchors = Anchors.of(plain, places, stiffness(self.scale))
+        anchors = Anchors.of(_tense(plain, sheets, stiff), places, stiff)
         self.points.refuse(places, anchors.freedom < FREE, "is held, or too near to something held")
         goal = np.concatenate([self.points.moves[i] for i in places])
         still = np.zeros_like(problem.f)
@@ -168,6 +169,21 @@ def _plain(problem: Problem, sheets: Mapping[int, Sheet]) -> Problem:
         sheet = sheets[i]
         form = forms(space.net, sheet.metric, quadrature(space.net, sheet.faces), sheet.creases)
         spaces[i] = replace(space, forms=form)
+    return _like(problem, spaces)
+
+
+def _tense(problem: Problem, sheets: Mapping[int, Sheet], stiff: float) -> Problem:
+    """The same problem with the form M + 2 ℓ² G + ℓ⁴ K, G of gradients, for the stiffness ℓ⁴."""
+    spaces = {}
+    for i, space in problem.spaces.items():
+        slope = slopes(space.net, sheets[i].metric, quadrature(space.net, sheets[i].faces))
+        form = replace(space.forms, bending=space.forms.bending + 2 / np.sqrt(stiff) * slope)
+        spaces[i] = replace(space, forms=form)
+    return _like(problem, spaces)
+
+
+def _like(problem: Problem, spaces: Mapping[int, Space]) -> Problem:
+    """A problem of other spaces that are joined and held alike, with nothing to mend."""
     soft = None if problem.soft is None else Soft(problem.soft, between=problem.between)
     return Problem(spaces, problem.rows, soft=soft, effort=problem.effort)
 
@@ -201,10 +217,13 @@ def sweep(
 
     share = options.amount or 1.0
     edit = swept(share)
-    while (far := reached(model, edit)) > bound:
+    for _ in range(ROUNDS):
+        far = reached(model, edit)
+        if far <= bound:
+            return edit
         share *= WITHIN * bound / far
         edit = swept(share)
-    return edit
+    raise EditError(f"{model.name}: no sweep stays within {options.max_deviation}", "allow more, or move points less")
 
 
 def _refuse_missed(model: Model, edit: Edit, points: Led) -> None:
@@ -214,11 +233,12 @@ def _refuse_missed(model: Model, edit: Edit, points: Led) -> None:
         if surface in edit.displacement.offsets:
             moved = edit.displacement.offsets[surface].motion(net).evaluate(places)
         missed = np.linalg.norm(moved - points.moves[surface], axis=1) > 10 * MET
-        left = [outcome for outcome in edit.faces("left") if outcome.face in model.surfaces[surface].faces]
         if missed.any():
-            why = "it is joined to something that must stay"
-            if left:
-                folds = left[0].said == Rougher.FOLD.value
-                why = f"#{left[0].face + 1} would fold" if folds else f"#{left[0].face + 1} {left[0].words}"
             name = points.labels[surface][int(np.flatnonzero(missed)[0])]
-            raise EditError(f"{name} cannot go there: {why}", "move it less far, or at a larger --scale")
+            own = [outcome for outcome in edit.outcomes if outcome.face in model.surfaces[surface].faces]
+            face = next((each for each in own if each.status in ("edited", "left")), own[0])
+            judged = face.status == "edited" or face.said == Rougher.FOLD.value  # less of it would not fold
+            why = "would fold" if judged else face.words
+            raise EditError(
+                f"{name} cannot go there: #{face.face + 1} {why}", "move it less far, or at a larger --scale"
+            )

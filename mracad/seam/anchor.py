@@ -2,15 +2,16 @@
 
 Of all displacements that seams and rims allow, with δ(u_i, v_i) = d_i at some points, the one with the least
 
-    ‖(1 + ℓ⁴ M⁻¹ K) δ‖²_M = δᵀ B M⁻¹ B δ,      B = M + ℓ⁴ K,
+    δᵀ B M⁻¹ B δ,      B = M + 2 ℓ² G + ℓ⁴ K,
 
-on the surface: |δ|² + 2 ℓ⁴ |∇²δ|² + ℓ⁸ |∇⁴δ|².  With Φ the rows of basis functions at the points and P = B⁻¹ on the
-control points that may move, it is
+M, G and K of the values, gradients and second derivatives of δ: ∫ |(1 − ℓ² ∇²)² δ|² on a plane.  With Φ the rows of
+basis functions at the points and P = B⁻¹ on the control points that may move, it is
 
     δ = P M P Φᵀ μ,      (Φ P M P Φᵀ) μ = d,
 
-one column of the response P M P Φᵀ per point: on a plane the kernel with the spectrum 1 / (1 + (ℓ k)⁴)².  It is smooth
-at its point, where that of B alone has infinite curvature, and falls off like exp(−r / √2 ℓ).
+one column of the response P M P Φᵀ per point: on a plane the kernel with the spectrum 1 / (1 + (ℓ k)²)⁴, which is
+(r/ℓ)³ K₃(r/ℓ) / 8, K₃ the modified Bessel function.  It is smooth at its point, where that of P alone has infinite
+curvature, never changes its sign, as it would without G, and falls off like exp(−r/ℓ).
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from mracad.seam.solve import Problem
 
 Array = np.ndarray
 
-ALONE = 1 / 16
+ALONE = 1 / (12 * np.pi)
 """The kernel at its point on a plane, times ℓ²."""
 
 PASSES = 3

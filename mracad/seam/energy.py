@@ -78,18 +78,40 @@ def forms(
     along = sites(net.u, quadrature.u, quadrature.wu), sites(net.v, quadrature.v, quadrature.wv)
     frame, area = _frames(metric, along, stretch)
     area = np.where(quadrature.mask, area, 0.0)
+    mass, bend = _squared(net, along, area, frame)
+    periodic, scale = (net.u.periodic, net.v.periodic), net.weights
+    smooth, sharp = _kinks(net, metric, quadrature, creases, stretch)
+    area = _sparse(integrals(along, {(ORDERS[0], ORDERS[0]): mass}), periodic, scale)
+    bending = _sparse(integrals(along, bend), periodic, scale)
+    return Forms(area, bending + smooth if smooth.nnz else _on_pattern(bending, area), sharp)
+
+
+def slopes(net: Net, metric: Net, quadrature: Quadrature) -> Any:
+    """∫ |∇δ|² dA of displacements, ``scipy.sparse.csr_array``; parameters as for :func:`forms`."""
+    along = sites(net.u, quadrature.u, quadrature.wu), sites(net.v, quadrature.v, quadrature.wv)
+    xu, xv = _jets(metric, along)[1:3]
+    e, f, g = _dot(xu, xu), _dot(xu, xv), _dot(xv, xv)
+    area = np.sqrt(np.maximum(e * g - f * f, 0.0)) * (along[0].weight.reshape(-1, 1) * along[1].weight.ravel())
+    e, f, g = _floored(e, f, g)
+    frame = np.zeros((5, 3, *e.shape))
+    frame[0, 0], frame[1, 1] = 1 / np.sqrt(e), np.sqrt(e / (e * g - f * f))
+    frame[0, 1] = -f / e * frame[1, 1]
+    _, slope = _squared(net, along, np.where(quadrature.mask, area, 0.0), frame)
+    return _sparse(integrals(along, slope), (net.u.periodic, net.v.periodic), net.weights)
+
+
+def _squared(
+    net: Net, along: tuple[Sites, Sites], area: Array, frame: Array
+) -> tuple[Array, dict[tuple[Order, Order], Array]]:
+    """Densities of the mass, and of the square of a form with coefficients ``(5, 3, qu, qv)`` of derivatives, by their
+    orders."""
     orders: tuple[Order, ...] = ORDERS[1:]
     mass = area
     if net.weights is not None:
         orders = ORDERS
         mass, frame = _over_weights(net, net.weights, along, area, frame)
     frame = frame * np.sqrt(area)
-    bend = {(a, b): _dot(frame[i], frame[j]) for i, a in enumerate(orders) for j, b in enumerate(orders[: i + 1])}
-    periodic, scale = (net.u.periodic, net.v.periodic), net.weights
-    smooth, sharp = _kinks(net, metric, quadrature, creases, stretch)
-    area = _sparse(integrals(along, {(ORDERS[0], ORDERS[0]): mass}), periodic, scale)
-    bending = _sparse(integrals(along, bend), periodic, scale)
-    return Forms(area, bending + smooth if smooth.nnz else _on_pattern(bending, area), sharp)
+    return mass, {(a, b): _dot(frame[i], frame[j]) for i, a in enumerate(orders) for j, b in enumerate(orders[: i + 1])}
 
 
 def _kinks(
@@ -177,10 +199,7 @@ def _frames(metric: Net, along: tuple[Sites, Sites], stretch: Stretch) -> tuple[
     xu, xv, xuu, xuv, xvv = _jets(metric, along)[1:]
     e, f, g = _dot(xu, xu), _dot(xu, xv), _dot(xv, xv)
     root = np.sqrt(np.maximum(e * g - f * f, 0.0))
-    # floors against division by zero where the metric degenerates
-    mean_u, mean_v = (np.sqrt(np.median(x)) for x in (e, g))
-    e, g = np.maximum(e, (FLATTEST**0.5 * mean_u) ** 2), np.maximum(g, (FLATTEST**0.5 * mean_v) ** 2)
-    f = np.clip(f, -0.999 * np.sqrt(e * g), 0.999 * np.sqrt(e * g))
+    e, f, g = _floored(e, f, g)
     det = e * g - f * f
     christoffel = []
     for second in (xuu, xuv, xvv):
@@ -200,6 +219,13 @@ def _frames(metric: Net, along: tuple[Sites, Sites], stretch: Stretch) -> tuple[
     if not stretch.plain:
         frame = stretched(frame, stretch.root(along[0].at, along[1].at, (e, f, g), (p, q, r)))
     return frame, root * (along[0].weight.reshape(-1, 1) * along[1].weight.ravel())
+
+
+def _floored(e: Array, f: Array, g: Array) -> tuple[Array, Array, Array]:
+    """A first fundamental form with floors where it degenerates, so that nothing is divided by zero there."""
+    mean_u, mean_v = (np.sqrt(np.median(x)) for x in (e, g))
+    e, g = np.maximum(e, (FLATTEST**0.5 * mean_u) ** 2), np.maximum(g, (FLATTEST**0.5 * mean_v) ** 2)
+    return e, np.clip(f, -0.999 * np.sqrt(e * g), 0.999 * np.sqrt(e * g)), g
 
 
 def _over_weights(

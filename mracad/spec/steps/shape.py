@@ -99,8 +99,8 @@ class Sweep(Shaped, frozen=True, kw_only=True, forbid_unknown_fields=True):
     scale: Annotated[
         Length,
         Meta(
-            description="Wavelength of the sweep (80mm, or 10% of the model's diagonal): half of a move is left at a "
-            "third of it from the point, and nothing at twice it. Finer detail moves along unchanged."
+            description="Wavelength of the sweep (80mm, or 10% of the model's diagonal): half of a move is left at 0.4 "
+            "of it from the point, a twentieth at one, and nothing at two. Finer detail moves along unchanged."
         ),
     ]
 
