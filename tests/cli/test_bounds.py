@@ -5,7 +5,7 @@ import pytest
 FEATURE = ("--feature", "near:5,5,0,radius:1.5")
 DETAIL = ("--from", "#1", "--to", "#1", "--band", "0mm:8mm")
 COPIES = [
-    (("--at", "@flat.csv"), 3, "flat.csv:1: a copy of height 0"),
+    (("--at", "@flat.csv"), 3, "flat.csv:1: height 0 makes no copy"),
     (("--at", "@far.csv"), 3, "far.csv:1"),
     (("--at", "@many.csv"), 3, "more than 10000 places"),
     (("--at", "5,7,0", "--size", "1e-9"), 4, "closer than"),

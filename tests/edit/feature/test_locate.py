@@ -46,7 +46,7 @@ def test_the_rectangle_of_a_window(ground):
 def test_places_off_the_face_are_told(ground):
     spot = place(ground, spec.spot("#1@0.25,0.5", "at"), "here")
     assert np.abs(spot.point - [50, 100, 0]).max() < 1e-9
-    with pytest.raises(EditError, match="off the face: u goes from 0 to 1"):
+    with pytest.raises(EditError, match="outside the face: u goes from 0 to 1"):
         place(ground, spec.spot("#1@1.5,0.5", "at"), "here")
     with pytest.raises(EditError, match="outside the face"):
         area(ground, "#1@0.5:1.5,0.4:0.5")
