@@ -21,7 +21,7 @@ NEAR = 1e-3, 0.01
 """Largest distance of a point from a surface: a share of the scale, and at least a length (mm)."""
 
 MOST = 500
-"""Most points of a sweep: each takes a solve of its own."""
+"""Largest number of points of a sweep, each of which takes a separate solve."""
 
 NAMED = 5
 """Largest number of points that a message names."""

@@ -183,7 +183,7 @@ def _tense(problem: Problem, sheets: Mapping[int, Sheet], stiff: float) -> Probl
 
 
 def _like(problem: Problem, spaces: Mapping[int, Space]) -> Problem:
-    """A problem of other spaces that are joined and held alike, with nothing to mend."""
+    """A problem with other spaces, joined and held in the same way, with nothing to mend."""
     soft = None if problem.soft is None else Soft(problem.soft, between=problem.between)
     return Problem(spaces, problem.rows, soft=soft, effort=problem.effort)
 
@@ -237,7 +237,7 @@ def _refuse_missed(model: Model, edit: Edit, points: Led) -> None:
             name = points.labels[surface][int(np.flatnonzero(missed)[0])]
             own = [outcome for outcome in edit.outcomes if outcome.face in model.surfaces[surface].faces]
             face = next((each for each in own if each.status in ("edited", "left")), own[0])
-            judged = face.status == "edited" or face.said == Rougher.FOLD.value  # less of it would not fold
+            judged = face.status == "edited" or face.said == Rougher.FOLD.value  # part of the sweep would not fold
             why = "would fold" if judged else face.words
             raise EditError(
                 f"{name} cannot go there: #{face.face + 1} {why}", "move it less far, or at a larger --scale"

@@ -222,7 +222,7 @@ def _frames(metric: Net, along: tuple[Sites, Sites], stretch: Stretch) -> tuple[
 
 
 def _floored(e: Array, f: Array, g: Array) -> tuple[Array, Array, Array]:
-    """A first fundamental form with floors where it degenerates, so that nothing is divided by zero there."""
+    """A first fundamental form, with floors against division by zero where it degenerates."""
     mean_u, mean_v = (np.sqrt(np.median(x)) for x in (e, g))
     e, g = np.maximum(e, (FLATTEST**0.5 * mean_u) ** 2), np.maximum(g, (FLATTEST**0.5 * mean_v) ** 2)
     return e, np.clip(f, -0.999 * np.sqrt(e * g), 0.999 * np.sqrt(e * g)), g
