@@ -71,6 +71,7 @@ class Detailed(Wish):
     spread: ClassVar[float] = math.inf
     fairs: ClassVar[bool] = False
     whole: ClassVar[bool] = True
+    lean: ClassVar[bool] = True
 
     @property
     def growth(self) -> Growth:

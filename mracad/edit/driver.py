@@ -146,7 +146,7 @@ def _together(
         joined = scene.joints.among(part)
         if len(part) < 2 or not rounds:
             continue
-        found = tried.get(tuple(part)) or _attempt(scene, wish, part, joined, _finer(scene, part, alone))
+        found = tried.get(tuple(part)) or _joined(scene, wish, part, joined, _finer(scene, part, alone))
         good = [i for i, moved in found.items() if moved.amount >= LEAST]
         if len(good) < len(part):
             waiting += [(each, rounds - 1) for each in groups(good, scene.joints.among(good))]
@@ -159,6 +159,15 @@ def _together(
             waiting += [(each, rounds - 1) for each in groups(good, scene.joints.among(good))]
             continue
         yield found, joined
+
+
+def _joined(scene: Scene, wish: Wish, part: Sequence[int], joined: Joints, finer: Collection[int]) -> dict[int, Moved]:
+    """The best result for joined surfaces; a lean wish gets more control points only where it needs them."""
+    if wish.lean and finer:
+        plain = _attempt(scene, wish, part, joined)
+        if _through(plain):
+            return plain
+    return _attempt(scene, wish, part, joined, finer)
 
 
 def _alike(found: Mapping[int, Moved], tolerances: Tolerances) -> dict[int, Moved]:

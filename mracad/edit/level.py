@@ -79,6 +79,11 @@ class Coarser(Wish):
         return not self.fairs
 
     @property
+    def lean(self) -> bool:
+        """A coarse shape needs few control points."""
+        return not self.fairs
+
+    @property
     def growth(self) -> Growth:
         """A coarse shape may be rougher anywhere, but must not fold."""
         return GROWTH if self.fairs else COARSE

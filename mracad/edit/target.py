@@ -46,6 +46,8 @@ class Wish(Protocol):
         Whether it is done in full or not at all, because part of it is not what was asked for (default: no).
     limited : bool
         Whether wavelengths are reduced where radii of curvature are too small for them (default: no).
+    lean : bool
+        Whether joined surfaces get more control points only if they cannot do without (default: no).
     growth : Growth
         How much rougher it may make a face.
     """
@@ -67,6 +69,10 @@ class Wish(Protocol):
 
     @property
     def limited(self) -> bool:
+        return False
+
+    @property
+    def lean(self) -> bool:
         return False
 
     @property

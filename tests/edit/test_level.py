@@ -3,9 +3,11 @@
 import numpy as np
 import pytest
 
+from mracad.bspline.fit import through
+from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
 from mracad.edit.fair import faired
-from mracad.edit.level import Coarser
+from mracad.edit.level import Coarser, level
 from mracad.edit.target import sheets
 from mracad.edit.tolerances import Tolerances
 from mracad.inspect.seams import seams
@@ -15,6 +17,7 @@ from mracad.seam.energy import forms
 from mracad.seam.interface import Joints
 from mracad.seam.solve import Problem, Space
 from mracad.seam.wishes import Wishes
+from mracad.spec.steps import Level
 from mracad.wavelet.ladder import arc_lengths, rungs_by_level
 from mracad.wavelet.project import projection
 from tests.edit import halves, panels
@@ -188,3 +191,34 @@ def test_halves_that_meet_along_a_trim_curve_come_closer_together_than_alone():
         assert len(result.joints.loose) == (not hold)
         errors.append(beside([surface.net for surface in after.surfaces], clean))
     assert errors[0] < 0.95 * errors[1]
+
+
+def test_a_coarse_shape_gets_no_control_points_that_it_does_not_need():
+    """Joined patches with a rim that is held: their own suffice."""
+    _, noisy = panels.whole(SPANS, NOISE, patches=(1, 2))
+    model = view(panels.document(panels.cut(noisy, (1, 2))))
+    edit = level(model, Level(level=1.0, hold=("edge#1",)))
+    assert len(edit.faces("edited")) == 2 and not any(each.inserted for each in edit.outcomes)
+
+
+def test_waves_of_patches_go_by_scale_whatever_their_knots():
+    """Ripples of half the scale and less go, those of three scales stay, across the seam between different knots."""
+    found = []
+    for length in (12.0, 90.0):
+        knots = [KnotVector.clamped(np.linspace(100.0 * k, 100.0 * (k + 1), n + 1), 3) for k, n in ((0, 50), (1, 64))]
+        across = KnotVector.clamped(np.linspace(0.0, 100.0, 13), 3)
+        patches = {}
+        for k, u in enumerate(knots):
+            x, y = np.meshgrid(u.greville(), across.greville(), indexing="ij")
+            net = Net(u, across, np.zeros((u.count, across.count, 3)))
+            wave = 0.1 * np.sin(2 * np.pi * x / length)
+            frame = (100.0 * k, 100.0 * (k + 1)), (0.0, 100.0)
+            patches[k, 0] = panels.Patch(net.with_poles(through(net, np.stack([x, y, wave], axis=-1))), "", frame)
+        model = view(panels.document(patches))
+        after = level(model, Level(scale="30mm")).displacement.applied(model)
+        at = np.linspace(0.2, 0.8, 80)
+        heights = [
+            s.net.grid(*(k.domain[0] + at * k.period for k in (s.net.u, s.net.v)))[..., 2] for s in after.surfaces
+        ]
+        found.append(np.sqrt(2 * np.mean(np.square(heights))) / 0.1)
+    assert found[0] <= 0.1 and 0.95 <= found[1] <= 1.05
