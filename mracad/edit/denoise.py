@@ -1,9 +1,10 @@
 """Denoising: remove noise at wavelengths that the noise itself determines.
 
-The noise of every surface is measured (:mod:`mracad.inspect.noise`) unless it is stated.  Of the estimates of the
-surface without it (:mod:`mracad.edit.estimate`) the one with the least risk is the target; where none is surely better
-than no change there is none.  The wavelengths of the spline, along u and v, are first searched in closed form, for each
-surface alone.
+The noise of every surface is measured unless it is stated: by what no smooth surface explains
+(:mod:`mracad.inspect.noise`), or, for few control points, by how much likelier they are with noise than without
+(:mod:`mracad.edit.evidence`).  Of the estimates of the surface without it (:mod:`mracad.edit.estimate`) the one with
+the least risk is the target; where none is surely better than no change there is none.  The wavelengths of the spline,
+along u and v, are first searched in closed form, for each surface alone.
 """
 
 from __future__ import annotations
@@ -15,19 +16,22 @@ from typing import ClassVar
 import numpy as np
 
 from mracad.bspline.surface import Net
-from mracad.edit.estimate import Asked, Noisy, best
+from mracad.edit.estimate import FEW, Asked, Noisy, best
+from mracad.edit.evidence import evidence, pooled
 from mracad.edit.result import Edit, FaceOutcome, Reason
 from mracad.edit.search import FIRST, alone
 from mracad.edit.target import Sheet, Wish, stiffness
 from mracad.edit.tolerances import NOISY
 from mracad.edit.whole import edited
-from mracad.inspect.noise import Noise, noise
+from mracad.inspect.noise import Noise, calm, noise
 from mracad.inspect.roughness import Growth
 from mracad.model.brep import Face, Model, Surface
 from mracad.seam.hold import separate
 from mracad.seam.interface import Joints
 from mracad.seam.ladders import Creases
+from mracad.seam.metric import creases
 from mracad.seam.solve import Problem
+from mracad.seam.white import ORDER
 from mracad.spec.quantity import length
 from mracad.spec.select import Scope
 from mracad.spec.select import scope as scope_of
@@ -58,16 +62,20 @@ class Quiet(Wish):
 
     def wavelength(self, net: Net, faces: Sequence[Face], creases: Creases) -> float:
         """The mean, along u and v, of the wavelengths of which the best spline of a surface alone keeps half, mm."""
-        found = []
+        noise = self.noise.get(_surface(faces))
+        order, found = noise.order if noise else ORDER, []
         for axis, stiff in enumerate(self._start(net, faces, creases)):
             step = float(arc_lengths(net, axis).sum()) / max(net.poles.shape[axis] - 1, 1)
-            found.append(step * max(2 * np.pi * stiff ** (1 / 6), 2.0))
+            found.append(step * max(2 * np.pi * stiff ** (0.5 / order), 2.0))
         return float(np.sqrt(found[0] * found[1]))
 
     def _start(self, net: Net, faces: Sequence[Face], creases: Creases) -> tuple[float, float]:
         noise = self.noise.get(_surface(faces))
         if noise is None:
             return FIRST, FIRST
+        if noise.precision is not None:
+            along, across = (noise.size**2 * each for each in noise.precision)
+            return along, across
         variance = noise.size**2
 
         def score(size: float, removed: float) -> float:
@@ -111,6 +119,8 @@ def denoise(
     stated = None if options.noise is None else length(options.noise, model.diagonal, "noise")
     chosen = scope or scope_of(model, options)
     found = {surface.index: _noise(model, surface, chosen, stated) for surface in model.surfaces}
+    if stated is None:
+        found |= pooled({i: each for i, each in found.items() if each is not None and each.precision})
     counted = {i: replace(each, size=options.strength * each.size) for i, each in found.items() if each}
     wish = Quiet(counted, Asked(options.method == "wiener", options.outliers / 100))
     edit = edited(model, options, wish, chosen, progress)
@@ -122,9 +132,20 @@ def _noise(model: Model, surface: Surface, chosen: Scope, stated: float | None) 
     faces = [model.faces[i] for i in surface.faces if i in chosen.chosen]
     if not faces:
         return None
-    net = surface.net
-    parts = separate(net, faces, [face.index for face in faces], "g0")
+    net, numbers = surface.net, [face.index for face in faces]
+    parts = separate(net, faces, numbers, "g0")
+    inner = separate(net, faces, numbers, "g1").free
+    if parts.free.any() and inner.sum() < FEW:
+        sharp = creases(net, np.ones(net.poles.shape[:2], bool))
+        told = evidence(net, (inner, parts.free, parts.visible), parts.visible, sharp, stated)
+        if told is not None or stated is None:
+            return told
     found = noise(net, parts.free, parts.visible)
+    if found:
+        still = next(
+            (each for each in (inner, parts.free) if calm(net, parts.visible & ~each, found.size)), found.where
+        )
+        found = replace(found, where=found.where & still)
     if stated is None:
         return found
     return Noise(stated, found.where if found else parts.visible, (net.u.greville(), net.v.greville()))
@@ -144,4 +165,6 @@ def _said(outcome: FaceOutcome, model: Model, noises: Mapping[int, Noise | None]
     noise, reason = noises[surface], outcome.reason
     if reason is Reason.FAIR:
         reason = Reason.UNSURE if noise else Reason.CLEAN
-    return replace(outcome, noise=noise.size if noise else 0.0, reason=reason)
+    before, after = (each.bending for each in outcome.roughness) if outcome.roughness else (0.0, 0.0)
+    taken = 1 - after / before if before else 0.0
+    return replace(outcome, noise=noise.size if noise else 0.0, taken=taken, reason=reason)

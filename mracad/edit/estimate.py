@@ -30,7 +30,7 @@ from mracad.edit.target import Sheet
 from mracad.inspect.noise import Noise
 from mracad.model.displacement import lifted
 from mracad.seam.solve import Problem
-from mracad.seam.white import Whitened, white
+from mracad.seam.white import ORDER, Whitened, white
 from mracad.wavelet.shrink import Spin, shrunk, spins, thresholded
 
 Array = np.ndarray
@@ -46,6 +46,9 @@ SMALL = 0.01
 
 SURE = 3.0
 """Standard deviations of its risk by which an estimate must be better than no change."""
+
+FEW = 60
+"""Control points below which what is known of the shape, rather than the risk, says how smooth it is."""
 
 LARGE = 30_000
 """Control points above which stiffnesses are not searched, and fewer probes of shrinkage are enough."""
@@ -102,6 +105,11 @@ class Risk:
         return bool(self.size[1] - 2 * self.removed[1] + SURE * self.spread < 0)
 
     @property
+    def likely(self) -> bool:
+        """Whether it is below 0, and along normals not above by more than chance."""
+        return self.total < 0 and bool(self.size[1] - 2 * self.removed[1] < self.spread)
+
+    @property
     def validated(self) -> float:
         """The score of generalised cross-validation."""
         return float(self.size.sum() / max(float(self.removed.sum()), 1e-100) ** 2)
@@ -130,7 +138,7 @@ class Noisy:
     def white(self) -> Whitened:
         """The problem in the metric of control points."""
         forms = {
-            i: white(space.net, self.sheets[i].origin, space.seen, self.sheets[i].creases)
+            i: white(space.net, self.sheets[i].origin, space.seen, self.sheets[i].creases, self._order(i))
             for i, space in self.problem.spaces.items()
         }
         most = self.most
@@ -139,7 +147,7 @@ class Noisy:
         if self.outliers is not None:
             precision = np.where(self.up(self.outliers[:, None] * 1.0) > 0.5, SPOILED * precision, precision)
         scale = {i: max(self._size(i) / most, QUIET) ** -2.0 for i in self.problem.spaces}
-        return Whitened(self.problem, forms, precision, scale)
+        return Whitened(self.problem, forms, precision, scale, self.up(self.own[:, None] * 1.0)[:, 0] > 0)
 
     @cached_property
     def own(self) -> Array:
@@ -158,6 +166,9 @@ class Noisy:
 
     def _size(self, i: int) -> float:
         return self.noise[i].size if i in self.noise else 0.0
+
+    def _order(self, i: int) -> int:
+        return self.noise[i].order if i in self.noise else ORDER
 
     def _where(self, i: int) -> Array:
         origin = self.sheets[i].origin
@@ -300,15 +311,17 @@ def best(noisy: Noisy, start: Stiffness, asked: Asked) -> Array:
         risk = noisy.linear(noisy.spline(at, True), y)
         return risk.total if asked.shrink else risk.validated
 
-    at = start if len(y) > LARGE else searched(start, score)
+    few = noisy.own.sum() < FEW
+    at = start if few or len(y) > LARGE else searched(start, score)
     tried = ((at, True), (start, False)) if noisy.problem.rimmed else ((at, True),)
     every = [(noisy.linear(noisy.spline(at, held), y), at, held) for at, held in tried]
     risk, at, held = min(every, key=lambda each: each[0].total)
     delta = noisy.spline(at, held)(y)
-    if asked.shrink:
+    if asked.shrink and not few:
         estimate = noisy.shrunk(at, held)
         other = estimate(y)
         now = noisy.nonlinear(estimate, y, other, risk.spread)
         if now.total < risk.total:
             risk, delta = now, other
-    return delta + wrong if risk.sure else np.zeros_like(delta)
+    better = risk.likely if few else risk.sure
+    return delta + wrong if better else np.zeros_like(delta)

@@ -69,6 +69,8 @@ class FaceOutcome:
         Roughness before and after, if the edit measures it.
     noise : float, optional
         Standard deviation of each coordinate of the control points, mm, if the edit measures it.
+    taken : float, optional
+        Share of the bending energy that went with it.
     """
 
     face: int
@@ -84,6 +86,7 @@ class FaceOutcome:
     creases: int = 0
     roughness: tuple[Roughness, Roughness] | None = None
     noise: float | None = None
+    taken: float | None = None
 
     @property
     def words(self) -> str:

@@ -9,7 +9,7 @@ import numpy as np
 
 from mracad.bspline.surface import Net
 from mracad.seam.ladders import Creases
-from mracad.seam.white import differences
+from mracad.seam.white import bends
 
 Array = np.ndarray
 Stiffness = Mapping[int, tuple[float, float]]
@@ -67,7 +67,7 @@ def alone(net: Net, where: Array, creases: Creases, score: Callable[[float, floa
     for axis, knots in enumerate((net.u, net.v)):
         inside = np.flatnonzero(where.any(axis=1 - axis))
         points = inside[max((len(inside) - MOST) // 2, 0) :][:MOST]
-        whole = differences(knots, knots.greville(), creases[axis])
+        whole = bends(knots, knots, creases[axis])
         inner = whole[:, points][np.abs(np.delete(whole, points, axis=1)).sum(axis=1) == 0]
         values, modes = np.linalg.eigh(inner.T @ inner)
         squares.append(np.maximum(values, 0.0))

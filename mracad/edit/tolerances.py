@@ -16,8 +16,9 @@ GROWTH = Growth(0.005, 0.005, 0.005, 0.02, 30.0, 0.25)
 """Growth that the judge allows by default: a quarter of the 2 % that count as worse in comparisons, and waves at a
 place an eighth larger than those around it."""
 
-NOISY = replace(GROWTH, singular=0.25, each=False)
-"""Growth that the judge allows if noise is removed: kinks and singular points that noise makes are random."""
+NOISY = replace(GROWTH, singular=0.25, each=False, spread=np.inf)
+"""Growth that the judge allows if noise is removed: kinks and singular points that noise makes are random, and so is
+where it makes places smoother; that noise goes rather than shape, its risk tells."""
 
 RESHAPED = Growth(np.inf, np.inf, np.inf, np.inf, 30.0, np.inf)
 """Growth that the judge allows if an edit changes the shape of faces: they must not fold."""

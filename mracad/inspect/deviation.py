@@ -11,10 +11,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from mracad.bspline.surface import pairs
+from mracad.bspline.vectors import cross
 from mracad.model.brep import Model
 from mracad.model.cells import inside_grid
 from mracad.model.displacement import Displacement
 from mracad.model.region import face_region, supported
+
+Array = np.ndarray
 
 RIM = 33
 """Number of points along each edge."""
@@ -32,6 +35,8 @@ class Deviation:
         Largest and mean length over the sample of the face.
     bound : float
         Certified bound: the longest offset of a control point.
+    normal : float
+        Largest component along the normal of the surface.
     where : tuple of float
         Point of the largest displacement, before the edit, in the part's frame, mm.
     """
@@ -40,6 +45,7 @@ class Deviation:
     largest: float
     mean: float
     bound: float
+    normal: float
     where: tuple[float, float, float]
 
 
@@ -50,17 +56,32 @@ def deviations(model: Model, displacement: Displacement) -> list[Deviation]:
         surface = model.surfaces[index]
         net, motion = offset.over(surface.net), offset.motion(surface.net)
         us, vs = net.u.greville(), net.v.greville()
-        sizes = np.linalg.norm(motion.grid(us, vs), axis=-1)
+        moved = np.asarray(motion.grid(us, vs))
+        sizes, heights = (
+            np.linalg.norm(moved, axis=-1),
+            _along(moved, cross(*(net.tangents(us, vs, k) for k in (0, 1)))),
+        )
         for number in surface.faces:
             face = model.faces[number]
             reach = supported(net, face_region(net, face).inside)
             inner = inside_grid(face, net, us, vs)
             rim = [trim.curve.evaluate(np.linspace(*trim.curve.knots.domain, RIM))[0] for trim in face.trims]
             uv = np.concatenate([pairs(us, vs)[inner.ravel()], *rim])
-            size = np.concatenate([sizes[inner], np.linalg.norm(motion.evaluate(uv[inner.sum() :]), axis=1)])
+            edge = uv[inner.sum() :]
+            beside = motion.evaluate(edge)
+            size = np.concatenate([sizes[inner], np.linalg.norm(beside, axis=1)])
+            height = float(np.concatenate([heights[inner], _along(beside, net.normals(edge))]).max())
             largest = int(size.argmax())
             where = face.placed(net.evaluate(uv[largest : largest + 1])[0])
             bound = float(np.linalg.norm(offset.poles, axis=-1)[reach].max(initial=0.0))
             mean = float(sizes[inner].mean()) if inner.any() else float(size.mean())
-            found.append(Deviation(number, float(size[largest]), mean, bound, tuple(float(x) for x in where)))  # type: ignore[arg-type]
+            at = float(where[0]), float(where[1]), float(where[2])
+            found.append(Deviation(number, float(size[largest]), mean, bound, height, at))
     return sorted(found, key=lambda d: d.face)
+
+
+def _along(moved: Array, normals: Array) -> Array:
+    """Lengths of displacements along normals of any length; 0 where there is none."""
+    length = np.linalg.norm(normals, axis=-1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(np.nan_to_num(np.abs((moved * normals).sum(axis=-1)) / length))

@@ -63,11 +63,17 @@ class Noise:
         Control points that have it.
     at : (ndarray, ndarray)
         Their Greville points along u and v.
+    order : int
+        Of the differences that show how smooth the shape is.
+    precision : (float, float), optional
+        Their inverse variance along u and v, 1/mm², where it is known.
     """
 
     size: float
     where: Array
     at: tuple[Array, Array]
+    order: int = 3
+    precision: tuple[float, float] | None = None
 
     def over(self, net: Net) -> Array:
         """Control points that have it, of the same surface over more knots."""
@@ -94,6 +100,17 @@ def noise(net: Net, points: Array, seen: Array) -> Noise | None:
     size = _size(net, where & points, seen, where, _along_normals)
     at = net.u.greville(), net.v.greville()
     return Noise(size, where, at) if size > ROUNDING * float(np.abs(net.poles).max()) else None
+
+
+def calm(net: Net, points: Array, size: float) -> bool:
+    """Whether some control points, ``(nu, nv)``, have no noise, where noise has a size (mm): the differences among them
+    tell."""
+    told = []
+    for orders in ((4, 0), (0, 4)):
+        found, _, within = _differences(net, orders, points, points, points)
+        told.append(np.linalg.norm(found[within], axis=1))
+    lengths = np.concatenate(told)
+    return len(lengths) >= BESIDE and float(np.median(lengths)) <= CALM * size * MEDIAN
 
 
 def _size(net: Net, points: Array, seen: Array, noisy: Array, deviation: Deviation) -> float:

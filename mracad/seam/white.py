@@ -2,9 +2,10 @@
 
     x = argmin Σ w |x − f|² + Σ λ_u |D_u x|² + λ_v |D_v x|²
 
-D are third divided differences of control points along u and v on their Greville points, scaled so that on even knots
-they are plain differences of neighbours: a wave of Λ control points keeps 1 / (1 + λ (2 sin π/Λ)⁶).  On knots inserted
-into a surface everything counts as if they were not there: w and the differences go by the spacing of its own points.
+D are third derivatives along u and v as differences of control points (:mod:`mracad.bspline.differences`), scaled so
+that on even knots they are plain differences of neighbours: a wave of Λ control points keeps
+1 / (1 + λ (2 sin π/Λ)⁶).  On knots inserted into a surface everything counts as if they were not there: w and the
+differences go by the spacing of its own points.
 """
 
 from __future__ import annotations
@@ -15,8 +16,8 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 
+from mracad.bspline.differences import differences, divided
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
 from mracad.seam.energy import Forms
@@ -45,7 +46,7 @@ class White:
     along: tuple[Any, Any]
 
 
-def white(net: Net, origin: Net, points: Array, creases: Creases) -> White:
+def white(net: Net, origin: Net, points: Array, creases: Creases, order: int = ORDER) -> White:
     """The forms of a surface.
 
     Parameters
@@ -56,41 +57,49 @@ def white(net: Net, origin: Net, points: Array, creases: Creases) -> White:
         Control points of ``net`` that count.
     creases : pair of frozenset of float
         Lines in u and v that differences do not cross.
+    order : int
+        Of the differences.
     """
-    both = [(knots, own.greville()) for knots, own in ((net.u, origin.u), (net.v, origin.v))]
-    mass = np.multiply.outer(*(_spacing(knots.greville(), own) for knots, own in both)) * points
-    along = [_energy(differences(knots, own, creases[axis]), points, axis) for axis, (knots, own) in enumerate(both)]
+    both = (net.u, origin.u), (net.v, origin.v)
+    mass = np.multiply.outer(*(_spacing(knots.greville(), own.greville()) for knots, own in both)) * points
+    along = [_energy(bends(*each, creases[axis], order), points, axis) for axis, each in enumerate(both)]
     return White(mass.ravel(), (along[0], along[1]))
 
 
-def differences(knots: KnotVector, own: Array, creases: frozenset[float] = frozenset()) -> Array:
+def bends(knots: KnotVector, own: KnotVector, creases: frozenset[float] = frozenset(), order: int = ORDER) -> Array:
     """The differences along one direction, ``(rows, n)``: see the module.
 
     Parameters
     ----------
-    knots : KnotVector
-    own : ndarray
-        Greville points before knots were inserted.
+    knots, own : KnotVector
+        With inserted knots, and without.
     creases : frozenset of float
+    order : int
     """
-    g, n = knots.greville(), knots.count
-    index = np.arange(n)
-    if knots.periodic:
-        g = np.unwrap(g, period=knots.period)
-        g, index = np.concatenate([g, g[:ORDER] + knots.period]), np.concatenate([index, index[:ORDER]])
-    if len(g) <= ORDER:
-        return np.zeros((0, n))
-    at, columns = (sliding_window_view(each, ORDER + 1) for each in (g, index))
-    apart = at[:, :, None] - at[:, None, :] + np.eye(ORDER + 1)
+    weights, columns = (divided if knots.degree > own.degree else differences)(knots, order)
+    matrix = np.zeros((len(weights), knots.count))
+    if not len(weights):
+        return matrix
+    at = knots.greville()[columns]
+    at = np.unwrap(at, period=knots.period, axis=1) if knots.periodic else at
     middle, step = at.mean(axis=1), np.diff(at, axis=1).mean(axis=1)
-    spacing = np.interp(middle, own, np.gradient(own)) if len(own) > 1 else step
+    spacing = _local(own, middle) if own.count > 1 else step
     with np.errstate(divide="ignore", invalid="ignore"):
-        weights = 6.0 * (spacing**ORDER * np.sqrt(step / spacing))[:, None] / apart.prod(axis=2)
+        weights = weights * ((spacing / step) ** (order - 0.5))[:, None]
     crossed = np.any([(at[:, 0] < c) & (c < at[:, -1]) for c in creases] or [np.zeros(len(at), bool)], axis=0)
     rows = np.flatnonzero(np.isfinite(weights).all(axis=1) & ~crossed)
-    matrix = np.zeros((len(rows), n))
     np.add.at(matrix, (np.arange(len(rows))[:, None], columns[rows]), weights[rows])
-    return matrix
+    return matrix[: len(rows)]
+
+
+def _local(knots: KnotVector, at: Array) -> Array:
+    """Spacing of the Greville points of a knot vector about places."""
+    g = knots.greville()
+    if not knots.periodic:
+        return np.asarray(np.interp(at, g, np.gradient(g)))
+    g = np.sort(g)
+    around = np.concatenate([g[-1:] - knots.period, g, g[:1] + knots.period])
+    return np.asarray(np.interp(at, g, (around[2:] - around[:-2]) / 2, period=knots.period))
 
 
 def _spacing(g: Array, own: Array) -> Array:
@@ -126,12 +135,15 @@ class Whitened:
         Factors on w: control points with less noise count more.
     scale : mapping of int to float
         Factors on λ: those of the noisy control points of each surface.
+    noisy : ndarray of bool (points,)
+        Control points with noise: the others stay.
     """
 
     problem: Problem
     forms: Mapping[int, White]
     precision: Array
     scale: Mapping[int, float]
+    noisy: Array
 
     @cached_property
     def weights(self) -> Array:
@@ -141,21 +153,20 @@ class Whitened:
     @cached_property
     def seen(self) -> Array:
         """Control points that count, ``(points,)``."""
-        return np.asarray(self.weights[:, 0] > 0)
+        return np.asarray((self.weights[:, 0] > 0) & self.noisy)
 
     def at(self, stiffness: Mapping[int, tuple[float, float]]) -> Problem:
         """The problem with λ along u and v for each surface; joints stay as they are."""
         from scipy.sparse import csr_array, diags_array
 
         spaces: dict[int, Space] = {}
-        for (i, space), precision in zip(
-            self.problem.spaces.items(), self.problem.split(self.precision).values(), strict=True
-        ):
+        parts = (self.problem.split(each).values() for each in (self.precision, self.seen[:, None]))
+        for (i, space), precision, seen in zip(self.problem.spaces.items(), *parts, strict=True):
             form, (lu, lv) = self.forms[i], stiffness[i]
             mass = diags_array(precision.ravel() * form.mass).tocsr()
             bending = self.scale[i] * (lu * form.along[0] + lv * form.along[1])
-            points = (form.mass > 0).reshape(space.seen.shape)
             forms = Forms(mass, bending.tocsr(), csr_array(mass.shape))
+            points = seen[..., 0]
             spaces[i] = replace(space, forms=forms, free=space.free & points, seen=points, trend=None)
         old = self.problem
         area = float(old.mass.diagonal().sum() / max(self.seen.sum(), 1))

@@ -14,6 +14,8 @@ from mracad.seam.ladders import Creases
 from mracad.spec.steps.smooth import Denoise
 from tests.edit import panels
 from tests.edit.models import rotation, sheet
+from tests.edit.test_evidence import NOISE as SIZE
+from tests.edit.test_evidence import inner, shape, spoiled
 
 NOISE = 0.3
 NONE: Creases = (frozenset(), frozenset())
@@ -77,9 +79,32 @@ def test_a_clean_face_stays_as_it_is():
         assert (outcome.status, outcome.reason) == ("unchanged", Reason.CLEAN)
 
 
-def test_few_control_points_tell_nothing():
+def test_few_control_points_full_of_noise_tell_nothing():
     (outcome,) = denoise(sheet(panels.whole(2, NOISE)[1]), Denoise()).outcomes
-    assert (outcome.status, outcome.reason) == ("unchanged", Reason.UNSURE)
+    assert (outcome.status, outcome.noise) == ("unchanged", 0.0)
+
+
+def test_few_noisy_control_points_among_clean_ones_tell_enough():
+    """Rims are held with their tangents' rows clean: what is inside is compared with how smooth these are."""
+    clean = shape()
+    noisy = spoiled(clean, inner(clean, 2))
+    edit = denoise(sheet(noisy), Denoise())
+    after = edit.displacement.applied(sheet(noisy)).surfaces[0].net
+    before, now = (np.sqrt(((net.poles - clean.poles) ** 2).mean()) for net in (noisy, after))
+    (outcome,) = edit.outcomes
+    print(f"{now / before:.3f} of the noise is left, {outcome.noise / SIZE:.2f} of it found")
+    assert now < 0.5 * before and outcome.noise == pytest.approx(SIZE, rel=0.3)
+    assert outcome.taken == pytest.approx(1 - outcome.roughness[1].bending / outcome.roughness[0].bending)
+    assert not (after.poles - clean.poles)[~inner(clean, 2)].any()
+
+
+def test_outer_points_without_noise_stay():
+    """Rows without noise all around, told by the differences among them, are not in the noise that is found."""
+    clean, noisy = panels.whole(16, NOISE)
+    inside = np.pad(np.ones(np.subtract(noisy.poles.shape[:2], 4), bool), 2)[..., None]
+    mixed = noisy.with_poles(np.where(inside, noisy.poles, clean.poles))
+    moved = denoise(sheet(mixed), Denoise()).displacement.offsets[0].poles
+    assert not moved[~inside[..., 0]].any() and moved[inside[..., 0]].any()
 
 
 def test_more_is_taken_where_the_noise_is_said_to_be_more():

@@ -18,6 +18,7 @@ def test_a_translation_is_the_same_everywhere():
     model, net = sheet()
     (found,) = deviations(model, Displacement({0: Offset(np.full(net.poles.shape, [1.0, 2.0, 2.0]))}))
     assert (found.largest, found.mean, found.bound) == pytest.approx((3.0, 3.0, 3.0))
+    assert found.normal == pytest.approx(2.0)
 
 
 def test_only_what_the_face_has_counts():

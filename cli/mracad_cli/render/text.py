@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from mracad.job.words import notes, numbers, placed
-from mracad.spec.steps import Selection
+from mracad.spec.steps import Fitting, Selection
 
 if TYPE_CHECKING:
     from mracad.edit.result import FaceOutcome
@@ -101,15 +101,8 @@ def edit_lines(report: Report, options: Selection, end: str, found: Found | None
     if not edit.faces("edited"):
         lines[0] += "; nothing changed"
     lines += [f"note: {note}" for note in notes(report)]
-    if report.deviations:
-        worst = max(report.deviations, key=lambda d: d.largest)
-        mean = sum(d.mean for d in report.deviations) / len(report.deviations)
-        lines.append(f"deviation: max {mm(worst.largest)} on #{worst.face + 1}, mean {mm(mean)}")
-        lines[-1] += roughness_words(edit.faces("edited"))
-        before, after = report.control_points
-        lines[-1] += f"; control points: {after} (were {before})" if after != before and not edit.copies else ""
-    else:
-        lines.append("deviation: none")
+    lines += noise_lines(edit.outcomes)
+    lines.append(deviation_line(report, options))
     if edit.copies:
         lines.append(copies_line(report))
     smooth = report.smooth_seams()
@@ -125,6 +118,37 @@ def edit_lines(report: Report, options: Selection, end: str, found: Found | None
     now = found or Found(report.valid_after.valid, "in memory")
     lines.append(f"valid: {now.words} (was {verdict(report.valid_before.valid)}); {end}")
     return lines
+
+
+def deviation_line(report: Report, options: Selection) -> str:
+    """How far an edit moved faces, and how rough they were and are."""
+    if not report.deviations:
+        return "deviation: none"
+    worst = max(report.deviations, key=lambda d: d.largest)
+    mean = sum(d.mean for d in report.deviations) / len(report.deviations)
+    line = f"deviation: max {mm(worst.largest)} on #{worst.face + 1}, mean {mm(mean)}"
+    if isinstance(options, Fitting) and options.max_deviation is not None:
+        line += f", along the normal {mm(max(d.normal for d in report.deviations))}"
+    line += roughness_words(report.edit.faces("edited"))
+    before, after = report.control_points
+    return line + (f"; control points: {after} (were {before})" if after != before and not report.edit.copies else "")
+
+
+def noise_lines(outcomes: Sequence[FaceOutcome]) -> list[str]:
+    """How much noise an edit found that looks for it, and how much of the faces' energy it took."""
+    known = [each for each in outcomes if each.noise is not None]
+    noisy = sorted((each for each in known if each.noise), key=lambda each: each.noise or 0.0)
+    if not noisy:
+        return ["noise: none"] if known else []
+    least, middle, most = (noisy[k] for k in (0, len(noisy) // 2, -1))
+    text = f"noise: {mm(middle.noise or 0.0)} on {plural(len(noisy), 'face')}"
+    if mm(least.noise or 0.0) != mm(most.noise or 0.0):
+        text += f" ({mm(least.noise or 0.0)} on #{least.face + 1} to {mm(most.noise or 0.0)} on #{most.face + 1})"
+    clean = len(known) - len(noisy)
+    text += f", none on {clean}" if clean else ""
+    both = [each.roughness for each in noisy if each.roughness]
+    before, after = (sum(pair[k].bending for pair in both) for k in (0, 1))
+    return [f"{text}; {100 * (1 - after / before):.2g} % of their bending energy taken" if before else text]
 
 
 def left_words(left: Sequence[FaceOutcome]) -> list[str]:
