@@ -1,8 +1,8 @@
 """Derivatives of splines as differences of their control points.
 
-The control points of the derivative of a spline are differences of its own over differences of Greville abscissae, of
-one degree less each time.  They vanish for polynomials on any knots, clamped ends and multiple knots included, where
-divided differences on the Greville abscissae of the spline itself do not.
+The control points of the derivative of a spline are differences of its own, divided by differences of Greville
+abscissae, with a degree less each time.  They vanish for polynomials on any knots, also at clamped ends and multiple
+knots, where divided differences on the Greville abscissae of the spline itself do not.
 """
 
 from __future__ import annotations
@@ -23,19 +23,19 @@ SAME = 1e-12
 
 @kept(1024)
 def differences(knots: KnotVector, order: int) -> tuple[Array, Array]:
-    """Weights of the control points of a derivative, and the control points that they are for.
+    """Weights of control points in a derivative, and the indices of these control points.
 
     Parameters
     ----------
     knots : KnotVector
     order : int
-        Of the derivative; beyond the degree, of the differences between its values.
+        Order of the derivative; beyond the degree, order of the differences between its values.
 
     Returns
     -------
     weights : ndarray (rows, order + 1)
-        Those of plain differences of neighbours on even knots; never larger, as a whole.  Not finite where the
-        derivative does not exist.
+        On even knots, those of plain differences of neighbours; never larger in all.  Not finite where the derivative
+        does not exist.
     index : ndarray of int (rows, order + 1)
         A periodic direction has a row for each control point, others ``order`` fewer.
     """
@@ -74,8 +74,8 @@ def _means(flat: Array, first: int, degree: int, count: int) -> Array:
 
 
 def divided(knots: KnotVector, order: int) -> tuple[Array, Array]:
-    """The same on the Greville abscissae of the spline itself: for knots repeated by a raised degree, between which
-    derivatives say nothing."""
+    """Divided differences on the Greville abscissae of the spline itself: for knots repeated by a raised degree,
+    between which there are no derivatives."""
     x, n = knots.greville(), knots.count
     index = np.arange(n)
     if knots.periodic:

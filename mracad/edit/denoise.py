@@ -1,10 +1,10 @@
 """Denoising: remove noise at wavelengths that the noise itself determines.
 
-The noise of every surface is measured unless it is stated: by what no smooth surface explains
-(:mod:`mracad.inspect.noise`), or, for few control points, by how much likelier they are with noise than without
-(:mod:`mracad.edit.evidence`).  Of the estimates of the surface without it (:mod:`mracad.edit.estimate`) the one with
-the least risk is the target; where none is surely better than no change there is none.  The wavelengths of the spline,
-along u and v, are first searched in closed form, for each surface alone.
+The noise of every surface is measured unless it is stated: as the part that no smooth surface explains
+(:mod:`mracad.inspect.noise`), or, for few control points, by likelihood (:mod:`mracad.edit.evidence`).  Of the
+estimates of the surface without noise (:mod:`mracad.edit.estimate`), the one with the least risk is the target, if it
+is surely better than no change.  The wavelengths of the spline, along u and v, are first searched in closed form, for
+each surface alone.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ from mracad.wavelet.ladder import arc_lengths
 Array = np.ndarray
 
 RARE = 3.0
-"""Standard deviations that noise hardly exceeds."""
+"""Number of standard deviations that noise hardly exceeds."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class Quiet(Wish):
     Attributes
     ----------
     noise : mapping of int to Noise
-        That the control points of each surface count to have; those without any are not named.
+        Noise of the control points by surface; surfaces without noise are left out.
     asked : Asked
     """
 
@@ -61,7 +61,7 @@ class Quiet(Wish):
     growth: ClassVar[Growth] = NOISY
 
     def wavelength(self, net: Net, faces: Sequence[Face], creases: Creases) -> float:
-        """The mean, along u and v, of the wavelengths of which the best spline of a surface alone keeps half, mm."""
+        """The mean, along u and v, of the wavelengths that the best spline of a surface alone halves, mm."""
         noise = self.noise.get(_surface(faces))
         order, found = noise.order if noise else ORDER, []
         for axis, stiff in enumerate(self._start(net, faces, creases)):
@@ -84,7 +84,7 @@ class Quiet(Wish):
         return alone(net, noise.over(net), creases, score)
 
     def detail(self, alone: Problem, sheet: Sheet) -> float:
-        """What noise moves few control points by."""
+        """A distance by which noise moves only few control points, mm."""
         noise = self.noise.get(sheet.index)
         return RARE * noise.size if noise else 0.0
 
@@ -97,7 +97,7 @@ class Quiet(Wish):
         return best(Noisy(problem, sheets, noise), start, self.asked)
 
     def ways(self, problem: Problem, target: Array, width: float) -> Iterable[Iterable[Array]]:
-        """Meet the target next to what is held, ever more smoothly, or fade out; none if there is nothing to do."""
+        """Meet the target next to what is held, more and more smoothly, or fade out; none without a target."""
         if not target.any():
             return
         if not problem.rimmed:

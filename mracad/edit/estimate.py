@@ -1,8 +1,8 @@
 """Estimates of surfaces without the noise of their control points, and their risk.
 
     spline    the smoothing spline of :mod:`mracad.seam.white` over all surfaces that seams join
-    shrunk    their details in wavelet space in the share that a pilot has of them: the mean of the spline and of
-              what thresholds leave (:mod:`mracad.wavelet.shrink`); then the nearest that seams and rims allow
+    shrunk    their details in wavelet space, multiplied by gains from a pilot: the mean of the spline and of the
+              thresholded details (:mod:`mracad.wavelet.shrink`); then the nearest that seams and rims allow
 
 For an estimate δ(y) of noisy control points y (standard deviation σ), the expected squared distance to the truth along
 the normals n is, up to a constant,
@@ -35,34 +35,35 @@ from mracad.wavelet.shrink import Spin, shrunk, spins, thresholded
 
 Array = np.ndarray
 Estimator = Callable[[Array], Array]
-"""From control points to their change, ``(points, k)`` both."""
+"""Maps control points to their change, both ``(points, k)``."""
 
 PROBES, EXACT = 12, 100
-"""Random probes of the divergence; with at most so many control points it is exact."""
+"""Number of random probes of the divergence; with no more control points than that it is exact."""
 
 WIENER = 4
-"""Random probes of the divergence of shrinkage, and their size over σ."""
+"""Number of random probes of the divergence of shrinkage, and their size over σ."""
 SMALL = 0.01
 
 SURE = 3.0
-"""Standard deviations of its risk by which an estimate must be better than no change."""
+"""Number of standard deviations of its risk by which an estimate must be better than no change."""
 
 FEW = 60
-"""Control points below which what is known of the shape, rather than the risk, says how smooth it is."""
+"""Number of control points below which the likelihood, not the risk, determines how smooth the shape is."""
 
 LARGE = 30_000
-"""Control points above which stiffnesses are not searched, and fewer probes of shrinkage are enough."""
+"""Number of control points above which stiffnesses are not searched, and fewer probes of shrinkage are enough."""
 
 SPOILED, ODD, ROUNDS = 1e-6, 5.0, 4
-"""Weight of an outlier, the deviations of noise that make one, and the most times that they are looked for."""
+"""Weight of an outlier, the number of deviations of noise that make one, and how often they are searched for at
+most."""
 
 QUIET = 0.03
-"""Control points without noise count as if they had this share of the largest."""
+"""Control points without noise count as if they had this share of the largest noise."""
 
 
 @dataclass(frozen=True)
 class Asked:
-    """What is asked of an estimate.
+    """Options of an estimate.
 
     Attributes
     ----------
@@ -85,7 +86,7 @@ class Risk:
     size : ndarray (2,)
         ∫ |δ|² dA and ∫ (δ·n)² dA, mm⁴.
     removed : ndarray (2,)
-        −σ² div of them, mm⁴.
+        −σ² times their divergences, mm⁴.
     spread : float
         Standard deviation of the second part, mm⁴.
     """
@@ -96,12 +97,12 @@ class Risk:
 
     @property
     def total(self) -> float:
-        """Its value, mm⁴: the distance along normals counts twice."""
+        """The value of the risk, mm⁴; the distance along normals counts twice."""
         return float((self.size - 2 * self.removed).sum())
 
     @property
     def sure(self) -> bool:
-        """Whether it is below 0 along normals, whatever the noise happens to be."""
+        """Whether it is below 0 along normals for any likely noise."""
         return bool(self.size[1] - 2 * self.removed[1] + SURE * self.spread < 0)
 
     @property
@@ -124,9 +125,9 @@ class Noisy:
     problem : Problem
     sheets : mapping of int to Sheet
     noise : mapping of int to Noise
-        That of their own control points; those without any are not named.
+        Noise of their own control points; surfaces without noise are left out.
     outliers : ndarray of bool (own points,), optional
-        Those that are wrong; none by default.
+        Control points that are wrong; none by default.
     """
 
     problem: Problem
@@ -179,7 +180,7 @@ class Noisy:
         return origin.u.count * origin.v.count
 
     def up(self, values: Array) -> Array:
-        """Values of own control points as those of the problem's."""
+        """Values of own control points, transferred to the control points of the problem."""
         parts, at = [], 0
         for i, space in self.problem.spaces.items():
             origin = self.sheets[i].origin
@@ -189,7 +190,7 @@ class Noisy:
         return np.concatenate(parts)
 
     def down(self, values: Array) -> Array:
-        """The reverse, by interpolation."""
+        """The reverse of :meth:`up`, by interpolation."""
         parts, at = [], 0
         for i, space in self.problem.spaces.items():
             origin, n = self.sheets[i].origin, space.free.size
@@ -202,15 +203,15 @@ class Noisy:
         return np.concatenate(parts)
 
     def spline(self, stiffness: Stiffness, held: bool) -> Estimator:
-        """The smoothing spline, with rims held; or the nearest to that without which they allow."""
+        """The smoothing spline with rims held; or the spline without, and the nearest to it that rims allow."""
         problem = self.white.at(stiffness)
         if held:
             return lambda y: problem.faired(1.0, None, y)
         return lambda y: problem.nearest(problem.faired(1.0, problem.seen, y))
 
     def shrunk(self, stiffness: Stiffness, held: bool) -> Estimator:
-        """Empirical Wiener shrinkage about the spline, and the nearest to that which seams and rims allow; if they are
-        ``held``, by as smooth a correction as that of the spline."""
+        """Empirical Wiener shrinkage about the spline, and the nearest to it that seams and rims allow; if rims are
+        ``held``, with a correction as smooth as that of the spline."""
         problem, spline = self.white.at(stiffness), self.spline(stiffness, held)
         every = {i: spins(self.sheets[i].origin, self.sheets[i].creases) for i in self.noise}
 
@@ -234,7 +235,8 @@ class Noisy:
 
     @cached_property
     def probes(self) -> Array:
-        """Noise that seams allow, of the problem's control points, mm, ``(points, probes)``: its mean square is σ²."""
+        """Random noise on the problem's control points that seams allow, with mean square σ², mm, ``(points,
+        probes)``."""
         own = np.flatnonzero(self.own)
         few = len(own) <= EXACT
         probes = np.zeros((len(self.own), len(own) if few else PROBES))
@@ -270,7 +272,7 @@ class Noisy:
         return Risk(self._products(delta, delta), removed * np.array([3.0, 1.0]), spread)
 
     def nonlinear(self, estimate: Estimator, y: Array, delta: Array, spread: float) -> Risk:
-        """The risk of another estimate, which is δ at control points, if its deviation is known."""
+        """The risk of another estimate, whose change of the control points is ``delta``."""
         removed, count = np.zeros(2), int(np.clip(LARGE // len(delta), 1, WIENER))
         for probe in range(count):
             z = np.take(self.probes, np.arange(3 * probe, 3 * probe + 3), axis=1, mode="wrap")
@@ -278,8 +280,8 @@ class Noisy:
         return Risk(self._products(delta, delta), removed / count, spread)
 
     def mended(self, stiffness: Stiffness, share: float) -> tuple[Noisy, Array]:
-        """The same with up to a share of the control points known as wrong, and their change to where the spline of
-        the others puts them, ``(points, 3)``."""
+        """The same surfaces with up to a share of the control points marked as wrong, and the change of these to the
+        spline through the others, ``(points, 3)``."""
         y, most = self.down(self.problem.f), int(share * self.own.sum())
         found, now = np.zeros(len(y), bool), self
         delta = np.zeros_like(y)

@@ -1,4 +1,4 @@
-"""The noise of few control points: how much likelier they are with it than without.
+"""The noise of few control points, by the likelihoods with noise and without.
 
 Differences of order m of the shape (:mod:`mracad.seam.white`) count as independent, with variances τ_u² and τ_v², and
 some control points W as noisy, with variance σ².  With Q = τ_u⁻² D_uᵀD_u + τ_v⁻² D_vᵀD_v of rank r, b = (Q y)_W and the
@@ -34,28 +34,28 @@ NOISES = 10.0 ** np.arange(-6.0, 8.1, 0.25)
 """σ² over τ_u τ_v."""
 
 FINER = 10.0 ** np.linspace(-0.25, 0.25, 21)
-"""Factors on it that are tried about the best."""
+"""Factors on the best value that are tried."""
 
 LIKELIER, EACH = 40.0, 1.0
-"""Least 2 log of the ratio of likelihoods where there is noise, over all and for each noisy control point."""
+"""Least 2 log of the likelihood ratio that shows noise: in all, and for each noisy control point."""
 
 LEFT = 0.2
 """Largest share of the variance of noise that smoothing may be expected to leave: beyond it the shape is too rough."""
 
 AGREE = 2.5
-"""Most by which the noise by neighbouring orders differs, as a factor."""
+"""Largest factor between the noise by neighbouring orders."""
 
 LARGE = 2.0
-"""Noise over the distance of neighbours beyond which it is none."""
+"""Largest noise over the distance of neighbours."""
 
 MOST = 640
-"""Most control points that are looked at."""
+"""Largest number of control points that are used."""
 
 UNLIKELY = 4.0
-"""Standard deviations by which sizes must differ for not being the same."""
+"""Number of standard deviations by which sizes must differ to count as different."""
 
 POSITIVE = 1e-12
-"""Share of the largest eigenvalue below which one is zero."""
+"""Share of the largest eigenvalue below which others count as zero."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,18 +73,18 @@ class _Fit:
 def evidence(
     net: Net, roles: Sequence[Array], seen: Array, creases: Creases, stated: float | None = None
 ) -> Noise | None:
-    """The noise of a net of few control points; None where there is none that can be told.
+    """The noise of a net of few control points; None if none is found.
 
     Parameters
     ----------
     net : Net
     roles : sequence of ndarray of bool (nu, nv)
-        Control points that may be those with noise: one of these sets is.  The others make it seem less.
+        Candidate sets of noisy control points, one of which is chosen: points without noise would reduce its size.
     seen : ndarray of bool (nu, nv)
-        Those that follow the surface at all.
+        Control points on which the faces depend.
     creases : pair of frozenset of float
     stated : float, optional
-        Its standard deviation, mm, where that is known.
+        Standard deviation of the noise, mm, if known.
     """
     if seen.sum() > MOST or not any(where.any() for where in roles):
         return None
@@ -102,7 +102,7 @@ def evidence(
 
 
 def _telling(fits: Sequence[_Fit], most: float) -> list[_Fit]:
-    """Those that tell noise, and that neighbouring orders confirm."""
+    """The fits that show noise, and that neighbouring orders confirm."""
     found = [f for f in fits if f.gain > max(LIKELIER, EACH * f.where.sum()) and f.size < most]
     found = [f for f in found if any(abs(f.order - g.order) == 1 and _agree(f.size, g.size) for g in found)]
     return [f for f in found if f.left < LEFT * f.size**2 * f.where.sum()]
@@ -124,7 +124,7 @@ def _spacing(net: Net, seen: Array) -> float:
 def _fits(
     net: Net, roles: Sequence[Array], seen: Array, creases: Creases, order: int, stated: float | None
 ) -> Iterable[_Fit]:
-    """The likeliest for an order of differences and each role, if the net has any."""
+    """The likeliest fits for an order of differences and each role, if the net has such differences."""
     points = np.flatnonzero(seen.ravel())
     along = [each[points][:, points].toarray() for each in white(net, net, seen, creases, order).along]
     ratios = RATIOS if all(each.any() for each in along) else RATIOS[RATIOS == 1.0]
@@ -161,7 +161,7 @@ def _fits(
 def _likeliest(
     part: Array, bent: Array, energy: float, rank: int, stated: float | None
 ) -> tuple[float, float, float, float]:
-    """−2 log of the largest likelihood, σ, τ_u τ_v, and the variance of what smoothing leaves."""
+    """−2 log of the largest likelihood, σ, τ_u τ_v, and the variance of the smoothed result."""
     stiff, modes = np.linalg.eigh(part)
     stiff = np.maximum(stiff, 0.0)
     power = ((modes.T @ bent) ** 2).sum(axis=1)
@@ -180,9 +180,9 @@ def _likeliest(
 
 
 def pooled(noises: dict[int, Noise]) -> dict[int, Noise]:
-    """Noises with one size for all if they may well have the same (M. S. Bartlett, Proc. R. Soc. A 160, 1937).
+    """Noises with one common size, if that is plausible (M. S. Bartlett, Proc. R. Soc. A 160, 1937).
 
-    What made a file noisy is mostly one thing, and few control points tell its size only roughly.
+    A file usually has noise from one source, and few control points show its size only roughly.
     """
     if len(noises) < 2:
         return noises

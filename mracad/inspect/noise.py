@@ -3,8 +3,8 @@
 Divided differences with weights of unit norm keep the standard deviation of white noise on control points, whatever
 their order; those of a smooth surface are small, and change with the order.  The noise is the least of the estimates
 by differences of order 3 along both axes and of order 4 along each, or the mean of those that agree with it, if those
-of neighbouring orders do.  Only noise along the normal shows, and scanners make little other: an estimate is that of
-the differences along normals, if it differs from that of all three coordinates by more than chance.
+of neighbouring orders do.  Only noise along the normal shows, and scanners make little other: the differences along
+normals are used if their estimate differs from that of all three coordinates by more than chance.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ from mracad.bspline.surface import Net, pairs
 Array = np.ndarray
 Orders = tuple[int, int]
 Deviation = Callable[[Net, Orders, Array, Array], float]
-"""Of some differences of a net of given orders."""
+"""The standard deviation of some differences of given orders of a net."""
 
 KINDS: tuple[tuple[Orders, ...], ...] = ((3, 3), (2, 2)), ((4, 0), (3, 0), (5, 0)), ((0, 4), (0, 3), (0, 5))
-"""Orders of differences along u and v: of each kind the one that counts, and its neighbours."""
+"""Orders of differences along u and v: for each kind the one that counts, and its neighbours."""
 
 MEDIAN = 1.5381723
 """Median length of a vector of three standard normal numbers: of χ with three degrees of freedom."""
@@ -32,23 +32,24 @@ NORMAL = 0.6744898
 """Median of the absolute value of a standard normal number."""
 
 CHANCE = 3.0
-"""Times 1 / √n: most by which estimates along normals and in all coordinates differ where noise has no direction."""
+"""Factor on 1 / √n: largest difference of estimates along normals and in all coordinates for noise without
+direction."""
 
 AGREE = 1.15
-"""An estimate above this times the least contains shape."""
+"""An estimate above the least by this factor contains shape."""
 
 LEVEL = 1.6
-"""Most by which estimates of neighbouring orders differ, as a factor, where there is noise."""
+"""Largest factor between estimates of neighbouring orders if there is noise."""
 
 FEWEST, BESIDE = 16, 8
-"""Fewest differences that tell noise, and of neighbouring orders."""
+"""Least number of differences that show noise, and of neighbouring orders."""
 
 ROUNDING = 1e-12
 """Share of the coordinates below which differences are rounding."""
 
 LOCAL, CALM, RUN = 7, 0.3, 5
-"""Differences in a row that are looked at together, the share of the noise below which there is none, and the fewest
-control points in a row without."""
+"""Number of differences in a row that are used together, the share of the noise below which there is none, and the
+least number of control points in a row without noise."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,13 +61,13 @@ class Noise:
     size : float
         Standard deviation of each coordinate of control points, mm.
     where : ndarray of bool (nu, nv)
-        Control points that have it.
+        Control points that have noise.
     at : (ndarray, ndarray)
         Their Greville points along u and v.
     order : int
-        Of the differences that show how smooth the shape is.
+        Order of the differences that show how smooth the shape is.
     precision : (float, float), optional
-        Their inverse variance along u and v, 1/mm², where it is known.
+        Inverse variance of these differences along u and v, 1/mm², if known.
     """
 
     size: float
@@ -76,22 +77,22 @@ class Noise:
     precision: tuple[float, float] | None = None
 
     def over(self, net: Net) -> Array:
-        """Control points that have it, of the same surface over more knots."""
+        """Control points that have noise, for the same surface over more knots."""
         own = (net.u.greville(), net.v.greville())
         near = [np.abs(there[:, None] - here).argmin(axis=1) for there, here in zip(own, self.at, strict=True)]
         return np.asarray(self.where[np.ix_(*near)])
 
 
 def noise(net: Net, points: Array, seen: Array) -> Noise | None:
-    """The noise of a net; None where there is none that can be told.
+    """The noise of a net; None if none is found.
 
     Parameters
     ----------
     net : Net
     points : ndarray of bool (nu, nv)
-        Control points that tell it.
+        Control points from which it is estimated.
     seen : ndarray of bool (nu, nv)
-        Those that follow the surface at all.
+        Control points on which the faces depend.
     """
     mean = _size(net, points, seen, seen, _mean)
     if not mean:
@@ -103,8 +104,7 @@ def noise(net: Net, points: Array, seen: Array) -> Noise | None:
 
 
 def calm(net: Net, points: Array, size: float) -> bool:
-    """Whether some control points, ``(nu, nv)``, have no noise, where noise has a size (mm): the differences among them
-    tell."""
+    """Whether control points of a mask ``(nu, nv)`` have no noise of a size (mm), by the differences among them."""
     told = []
     for orders in ((4, 0), (0, 4)):
         found, _, within = _differences(net, orders, points, points, points)
@@ -139,7 +139,7 @@ def _mean(net: Net, orders: Orders, found: Array, use: Array) -> float:
 
 
 def _along_normals(net: Net, orders: Orders, found: Array, use: Array) -> float:
-    """That along normals, where it differs from the mean by more than chance."""
+    """The deviation along normals if it differs from the mean by more than chance, else the mean."""
     us, vs = (kv.greville()[k // 2 :][:n] for kv, k, n in zip((net.u, net.v), orders, use.shape, strict=True))
     normals = net.normals(pairs(us, vs)).reshape(found.shape)
     heights = np.abs((found * normals).sum(axis=2)[use])
@@ -167,15 +167,15 @@ def _around(net: Net, seen: Array) -> Array:
 
 
 def _runs(points: Array) -> Array:
-    """Those of some points that have enough neighbours in a row among them along an axis."""
+    """The points of a mask that have enough neighbours in a row in it, along an axis."""
     from scipy.ndimage import binary_opening
 
     return np.asarray(binary_opening(points, np.ones((RUN, 1))) | binary_opening(points, np.ones((1, RUN))))
 
 
 def _differences(net: Net, orders: Orders, points: Array, seen: Array, noisy: Array) -> tuple[Array, Array, Array]:
-    """Differences ``(…, 3)``, the share of each that noise on ``noisy`` control points has, and whether it is about
-    some of ``points`` alone and follows the surface."""
+    """Differences ``(…, 3)``, the share of each that is due to ``noisy`` control points, and whether it is centred on
+    ``points`` and follows the surface."""
     window = orders[0] + 1, orders[1] + 1
     if any(count < size for count, size in zip(points.shape, window, strict=True)):
         return np.zeros((0, 0, 3)), np.zeros((0, 0)), np.zeros((0, 0), bool)
@@ -206,7 +206,7 @@ def _weights(x: Array, order: int) -> Array:
 
 
 def _applied(weights: Array, values: Array, axis: int) -> Array:
-    """Sums of neighbours along an axis with weights."""
+    """Weighted sums of neighbours along an axis."""
     windows = sliding_window_view(np.moveaxis(values, axis, 0), weights.shape[1], axis=0)
     with np.errstate(invalid="ignore"):
         return np.moveaxis(np.einsum("nk,n...k->n...", weights, windows), 0, axis)

@@ -1,11 +1,11 @@
-"""The metric in which noise on control points is white: their own, in which each counts alike.
+"""The metric of control points, in which each has the same weight, and noise on them is white.
 
     x = argmin Σ w |x − f|² + Σ λ_u |D_u x|² + λ_v |D_v x|²
 
 D are third derivatives along u and v as differences of control points (:mod:`mracad.bspline.differences`), scaled so
 that on even knots they are plain differences of neighbours: a wave of Λ control points keeps
-1 / (1 + λ (2 sin π/Λ)⁶).  On knots inserted into a surface everything counts as if they were not there: w and the
-differences go by the spacing of its own points.
+1 / (1 + λ (2 sin π/Λ)⁶).  Knots inserted into a surface have no effect: w and the differences depend on the spacing of
+its own points.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ class White:
     Attributes
     ----------
     mass : ndarray (points,)
-        w; 0 for control points that its faces do not depend on.
+        w; 0 for control points on which its faces do not depend.
     along : pair of csr_array (points, points)
         DᵀD in u and v.
     """
@@ -52,13 +52,13 @@ def white(net: Net, origin: Net, points: Array, creases: Creases, order: int = O
     Parameters
     ----------
     net, origin : Net
-        The surface over the knots that it is solved on, and over its own.
+        The surface over the knots on which it is solved, and over its own.
     points : ndarray of bool (nu, nv)
         Control points of ``net`` that count.
     creases : pair of frozenset of float
         Lines in u and v that differences do not cross.
     order : int
-        Of the differences.
+        Order of the differences.
     """
     both = (net.u, origin.u), (net.v, origin.v)
     mass = np.multiply.outer(*(_spacing(knots.greville(), own.greville()) for knots, own in both)) * points
@@ -72,7 +72,7 @@ def bends(knots: KnotVector, own: KnotVector, creases: frozenset[float] = frozen
     Parameters
     ----------
     knots, own : KnotVector
-        With inserted knots, and without.
+        Knots with inserted ones, and without.
     creases : frozenset of float
     order : int
     """
@@ -103,7 +103,7 @@ def _local(knots: KnotVector, at: Array) -> Array:
 
 
 def _spacing(g: Array, own: Array) -> Array:
-    """Spacing of Greville points over that of others about them."""
+    """Spacing of Greville points over that of others near them."""
     if len(g) < 2 or len(own) < 2:
         return np.ones(len(g))
     return np.asarray(np.gradient(g) / np.maximum(np.interp(g, own, np.gradient(own)), 1e-300))
@@ -129,14 +129,14 @@ class Whitened:
     Attributes
     ----------
     problem : Problem
-        The same in that of the surfaces.
+        The problem in the metric of the surfaces.
     forms : mapping of int to White
     precision : ndarray (points, 1)
-        Factors on w: control points with less noise count more.
+        Factors on w: control points with less noise have more weight.
     scale : mapping of int to float
         Factors on λ: those of the noisy control points of each surface.
     noisy : ndarray of bool (points,)
-        Control points with noise: the others stay.
+        Control points with noise; all others stay.
     """
 
     problem: Problem

@@ -121,7 +121,7 @@ def edit_lines(report: Report, options: Selection, end: str, found: Found | None
 
 
 def deviation_line(report: Report, options: Selection) -> str:
-    """How far an edit moved faces, and how rough they were and are."""
+    """How far an edit moved faces, and their roughness before and after."""
     if not report.deviations:
         return "deviation: none"
     worst = max(report.deviations, key=lambda d: d.largest)
@@ -135,7 +135,8 @@ def deviation_line(report: Report, options: Selection) -> str:
 
 
 def noise_lines(outcomes: Sequence[FaceOutcome]) -> list[str]:
-    """How much noise an edit found that looks for it, and how much of the faces' energy it took."""
+    """The noise that an edit found, and the share of the faces' bending energy that it removed, if it looks for
+    noise."""
     known = [each for each in outcomes if each.noise is not None]
     noisy = sorted((each for each in known if each.noise), key=lambda each: each.noise or 0.0)
     if not noisy:
@@ -148,7 +149,7 @@ def noise_lines(outcomes: Sequence[FaceOutcome]) -> list[str]:
     text += f", none on {clean}" if clean else ""
     both = [each.roughness for each in noisy if each.roughness]
     before, after = (sum(pair[k].bending for pair in both) for k in (0, 1))
-    return [f"{text}; {100 * (1 - after / before):.2g} % of their bending energy taken" if before else text]
+    return [f"{text}; {100 * (1 - after / before):.2g} % of their bending energy removed" if before else text]
 
 
 def left_words(left: Sequence[FaceOutcome]) -> list[str]:
