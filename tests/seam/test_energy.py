@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from mracad.bspline.crease import crease_lines
-from mracad.bspline.fit import interpolated
+from mracad.bspline.fit import interpolated, through
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
 from mracad.model.cells import quadrature
-from mracad.seam.energy import KINK_WEIGHT, forms
+from mracad.seam.energy import KINK_WEIGHT, forms, slopes
 from tests.edit.models import rotation
 from tests.model.shapes import circle, cylinder, face, graph, plane, rectangle, sphere, torus
 
@@ -29,6 +29,20 @@ def sped(degree=6, spans=5):
     u, v = np.meshgrid(net.u.greville(), net.v.greville(), indexing="ij")
     points = np.stack([0.6 * u + 0.4 * u**2, v * (1 + u / 4), 0 * u], axis=-1)
     return Net(net.u, net.v, interpolated(net.u, net.v, points))
+
+
+def weighted(net):
+    """The same plane under weights that vary along u."""
+    u, _ = np.meshgrid(net.u.greville(), net.v.greville(), indexing="ij")
+    values = np.asarray(net.grid(net.u.greville(), net.v.greville()))
+    bare = Net(net.u, net.v, net.poles, 1.0 + 0.2 * u)
+    return bare.with_poles(through(bare, values))
+
+
+def fitted_over(net, function):
+    """The same with the weights of the net."""
+    points = np.asarray(net.grid(net.u.greville(), net.v.greville()))
+    return through(net, function(points[..., 0], points[..., 1])[..., None]).ravel()
 
 
 @pytest.mark.parametrize(
@@ -66,6 +80,24 @@ CURVED = (
 def test_bending_is_that_of_the_plane_whatever_the_parameters(net, function, density):
     found, c = of(net), fitted(net, function)
     assert c @ found.bending @ c == pytest.approx(density * found.mass.sum(), rel=1e-9, abs=1e-9)
+
+
+SLOPED = (
+    (lambda x, y: 1 + 2 * x - 3 * y, lambda x, y: 13.0 + 0 * x),
+    (lambda x, y: x * y, lambda x, y: x**2 + y**2),
+)
+
+
+@pytest.mark.parametrize(("function", "density"), SLOPED)
+@pytest.mark.parametrize("net", [plane(4), sped(), weighted(plane(6))], ids=["even", "uneven", "rational"])
+def test_slopes_are_those_of_the_plane_whatever_the_parameters_and_weights(net, function, density):
+    rule = quadrature(net, [face(())])
+    found, c = slopes(net, net, rule), fitted_over(net, function)
+    x, y, _ = np.moveaxis(np.asarray(net.grid(rule.u.ravel(), rule.v.ravel())), 2, 0)
+    su, sv = (net.tangents(rule.u.ravel(), rule.v.ravel(), axis) for axis in (0, 1))
+    area = np.abs(su[..., 0] * sv[..., 1] - su[..., 1] * sv[..., 0])
+    wanted = (density(x, y) * area * rule.weights).sum()
+    assert c @ found @ c == pytest.approx(wanted, rel=1e-6)
 
 
 def test_bending_does_not_change_with_rotation_and_scales_with_the_square_of_length():
