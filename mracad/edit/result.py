@@ -23,7 +23,7 @@ class Reason(Enum):
     """Why a face did not change."""
 
     FAIR = "already fair"
-    CLEAN = "no noise"
+    CLEAN = "no noise found"
     UNSURE = "noise that cannot be told from shape"
     AMOUNT = "amount 0"
     NO_COPY = "no copy on it"

@@ -140,7 +140,7 @@ def noise_lines(outcomes: Sequence[FaceOutcome]) -> list[str]:
     known = [each for each in outcomes if each.noise is not None]
     noisy = sorted((each for each in known if each.noise), key=lambda each: each.noise or 0.0)
     if not noisy:
-        return ["noise: none"] if known else []
+        return ["noise: none found"] if known else []
     least, middle, most = (noisy[k] for k in (0, len(noisy) // 2, -1))
     text = f"noise: {mm(middle.noise or 0.0)} on {plural(len(noisy), 'face')}"
     if mm(least.noise or 0.0) != mm(most.noise or 0.0):
