@@ -189,7 +189,12 @@ def matched(model: Model, details: Details) -> dict[int, Piece]:
     own, there = _places([each.net for each in surfaces]), _places([each.net for each in every])
     apart = ((own[:, None] - there[None]) ** 2).mean(axis=2)
     size = max(float(np.ptp(each.net.poles, axis=(0, 1)).max()) for each in every)
-    found = {i: int(k) for i, k in enumerate(apart.argmin(axis=1)) if apart[i, k] <= (SAME * size) ** 2}
+    found: dict[int, int] = {}
+    for i, near in enumerate(apart <= (SAME * size) ** 2):
+        here = np.flatnonzero(near).tolist()  # copies of a part are in one place
+        if here:
+            taken = set(found.values())
+            found[i] = min(here, key=lambda k: (every[k].faces != surfaces[i].faces, k in taken))
     rest = [i for i in range(len(surfaces)) if i not in found]
     others = [k for k in range(len(every)) if k not in found.values()]
     found |= _assigned(surfaces, every, rest, others, apart)

@@ -18,12 +18,14 @@ from mracad.edit.mra import load, save
 from mracad.errors import EditError, UsageError
 from mracad.inspect.seams import seams
 from mracad.job.document import run
+from mracad.occ.geometry import spline
 from mracad.occ.view import view
 from mracad.spec.steps import Compose, Level
 from tests.edit import panels
 from tests.edit.models import sheet
 from tests.edit.test_fair import rough
 from tests.edit.test_level import nets
+from tests.occ import shapes
 
 
 def points(net, count=40):
@@ -202,6 +204,17 @@ def test_faces_that_were_numbered_anew_are_found(tmp_path):
     back = put(there, path)
     for one, two in zip(model.surfaces, back.surfaces, strict=True):
         np.testing.assert_allclose(points(two.net), points(one.net) + shift, atol=1e-9)
+
+
+def test_copies_of_a_part_in_one_place_get_the_details_once_each_and_others_none(tmp_path):
+    plain = flat()
+    nets = ripple(plain), ripple(plain), plain.with_poles(plain.poles + [0.0, 200.0, 0.0])
+    model = view(shapes.document(*(shapes.face_on(spline(net)) for net in nets)))
+    found = coarse(model, tmp_path / "a.mra").surfaces
+    shape = model.with_surfaces([replace(s, net=s.net.with_poles(np.round(s.net.poles, 13))) for s in found])
+    edit = compose(shape, Compose(details=str(tmp_path / "a.mra")))
+    assert off(model, edit.displacement.applied(shape)) < 1e-12
+    assert edit.notes == ("details of 2 surfaces: 2 added as they were",)
 
 
 def test_what_is_held_gets_no_details(tmp_path):
