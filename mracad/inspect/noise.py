@@ -31,7 +31,7 @@ MEDIAN = 1.5381723
 NORMAL = 0.6744898
 """Median of the absolute value of a standard normal number."""
 
-CHANCE = 3.0
+CHANCE = 8.0
 """Factor on 1 / √n: largest difference of estimates along normals and in all coordinates for noise without
 direction."""
 
