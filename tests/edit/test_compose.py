@@ -208,7 +208,7 @@ def test_faces_that_were_numbered_anew_are_found(tmp_path):
 
 def test_copies_of_a_part_in_one_place_get_the_details_once_each_and_others_none(tmp_path):
     plain = flat()
-    nets = ripple(plain), ripple(plain), plain.with_poles(plain.poles + [0.0, 200.0, 0.0])
+    nets = ripple(plain), ripple(plain), plain.with_poles(plain.poles + np.array([0.0, 200.0, 0.0]))
     model = view(shapes.document(*(shapes.face_on(spline(net)) for net in nets)))
     found = coarse(model, tmp_path / "a.mra").surfaces
     shape = model.with_surfaces([replace(s, net=s.net.with_poles(np.round(s.net.poles, 13))) for s in found])
