@@ -36,7 +36,7 @@ def patches():
 @pytest.mark.parametrize("way", [{}, {"free_edges": "smooth"}])
 def test_the_largest_scale_reaches_the_bound(patches, most, way, monkeypatch):
     solved = []
-    monkeypatch.setattr(bound_module, "_deviation", _counted(bound_module._deviation, solved))
+    monkeypatch.setattr(bound_module, "sheets", _counted(bound_module.sheets, solved))
     edit = smooth(patches, Smooth(max_deviation=f"{most}mm", **way))
     reached = deviation(patches, edit)
     print(f"{most} mm: {edit.scale:.3g} mm, {reached / most:.3f} of the bound, {len(solved)} problems solved unjudged")
