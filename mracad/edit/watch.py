@@ -19,7 +19,7 @@ Array = np.ndarray
 BISECTIONS = 3, 5
 """Bisections by which an amount is found: few among several displacements of one surface, otherwise more."""
 
-SINGULAR = 1e3
+SINGULAR = 1e5
 """Curvature over the wavelength above which a face is singular."""
 
 

@@ -175,9 +175,9 @@ def _unsettled(survey: Survey, form: Forms) -> Array:
     found, those = np.zeros(len(survey.sharp)), survey.sharp > 0
     if those.any():
         before, after = survey.sharp[those], form.largest[those]
+        change = np.where(after > before.min(), np.abs(after / before - 1), 0.0)
         turned = np.linalg.norm(form.normal[:, those].astype(np.float32) - survey.normals[:, those], axis=0)
-        change = np.maximum(np.abs(after / before - 1), STEADY * turned)
-        found[those] = np.where(after > before.min(), change, 0.0)
+        found[those] = np.maximum(change, STEADY * turned)
     return found
 
 
