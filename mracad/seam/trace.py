@@ -130,7 +130,7 @@ def crossings(trace: Trace, spaces: tuple[KnotVector, KnotVector]) -> Array:
         if knots.periodic:
             lines = np.unique(lines[None] + knots.period * np.arange(-2, 3)[:, None])
         low, high = np.minimum(x[:-1], x[1:]), np.maximum(x[:-1], x[1:])
-        first, last = np.searchsorted(lines, low, "right"), np.searchsorted(lines, high, "left")
+        first, last = np.searchsorted(lines, low), np.searchsorted(lines, high)
         step = np.repeat(np.arange(len(low)), np.maximum(last - first, 0))
         line = lines[first[step] + np.arange(len(step)) - np.searchsorted(step, step)]
         inside = (line - x[step]) / (x[step + 1] - x[step])
