@@ -70,6 +70,7 @@ def extract(reading: Reading, chosen: Extract, output: str, overwrite: bool, as_
         "radius": found.radius,
         "reach": found.reach,
         "height": found.height,
+        "base": found.base,
         "written": path.name,
     }
     said = f"{model.name}: {mm(found.height)} high, {mm(2 * found.radius)} across; wrote {path.name}"

@@ -186,6 +186,9 @@ def copies_line(report: Report) -> str:
     lost = max(copies, key=lambda c: c.lost)
     if lost.lost > 1e-9:
         text += f"; lost to constraints ≤ {mm(lost.lost)} ({lost.place})"
+    base = max(c.base for c in copies)
+    if base > worst.deviation:
+        text += f"; the surface under the feature is known to {mm(base)}"
     return f"{text}; control points: {after}" + (f" (were {before})" if after != before else "")
 
 

@@ -60,6 +60,8 @@ class Feature:
     name : str
     origin : Origin or None
         None for a feature from a file.
+    base : float
+        Error of the surface that it was separated from, root mean square, mm; 0 if not known.
     """
 
     radius: float
@@ -68,6 +70,7 @@ class Feature:
     table: Array
     name: str = ""
     origin: Origin | None = field(default=None)
+    base: float = 0.0
 
     @cached_property
     def height(self) -> float:
@@ -103,12 +106,14 @@ class _File(msgspec.Struct, forbid_unknown_fields=True):
     along_y: list[float]
     along_normal: list[float]
     window: list[float]
+    base: float = 0.0
 
 
 def save(feature: Feature) -> bytes:
     """A feature as the bytes of a file (JSON, ``docs/features.md``)."""
-    columns = np.round(feature.table.reshape(-1, 4).T, 9).tolist()
-    content = _File(FORMAT, feature.name, feature.radius, feature.reach, feature.spacing, len(feature.table), *columns)
+    x, y, normal, window = np.round(feature.table.reshape(-1, 4).T, 9).tolist()
+    numbers = feature.radius, feature.reach, feature.spacing, len(feature.table)
+    content = _File(FORMAT, feature.name, *numbers, x, y, normal, window, feature.base)
     return msgspec.json.encode(content) + b"\n"
 
 
@@ -130,7 +135,7 @@ def load(path: str | os.PathLike[str]) -> Feature:
     if not (0 < content.radius <= content.reach < np.inf and 0 < content.spacing < np.inf):
         raise FileError(f"'{file.name}' is damaged: its radius is {content.radius} mm", hint)
     table = np.array(columns).T.reshape(content.size, content.size, 4)
-    return Feature(content.radius, content.reach, content.spacing, table, content.name)
+    return Feature(content.radius, content.reach, content.spacing, table, content.name, base=content.base)
 
 
 def taper(share: Array) -> Array:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from mracad.bspline.fit import through
 from mracad.bspline.surface import Net, pairs
-from mracad.edit.feature.base import plate
+from mracad.edit.feature.base import under
 from mracad.edit.feature.chart import Charts
 from mracad.edit.feature.detail import LOST, Feature, Origin, load, taper
 from mracad.edit.feature.ground import STEEP, Ground
@@ -72,7 +72,7 @@ def feature_of(model: Model, options: Featured, faces: Collection[int], text: st
 
 
 def above_surroundings(ground: Ground, area: Window, keep: str) -> Feature:
-    """The feature under a window, above a thin plate through its surroundings.
+    """The feature under a window, above the surface that its surroundings determine.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ def above_surroundings(ground: Ground, area: Window, keep: str) -> Feature:
     keep : {"as-is", "g0", "g1", "g2"}
         Continuity of edges that do not move.
     """
-    base, reach = plate(ground, area), area.reach
+    base, reach = under(ground, area), area.reach
     (origin,), (frame,), cuts = base.chart.origin, base.chart.axes, {}
     for index, patch in ground.patches.items():
         points, normals = _lattice(patch)
@@ -97,7 +97,8 @@ def above_surroundings(ground: Ground, area: Window, keep: str) -> Feature:
             if weight.any():
                 offset = through(patch.net, np.where((shares < 1)[..., None], values, 0.0))
                 cuts[index] = Cut(offset * weight[..., None], weight)
-    return _made(ground.without({i: cut.offset for i, cut in cuts.items()}), base.chart, area, cuts, keep)
+    made = _made(ground.without({i: cut.offset for i, cut in cuts.items()}), base.chart, area, cuts, keep)
+    return replace(made, base=base.error)
 
 
 def between_levels(ground: Ground, bands: Mapping[int, Array], area: Window, keep: str) -> Feature:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -39,6 +39,8 @@ class Copy:
         Largest part of it that the control points there cannot hold, mm.
     exact : bool
         Whether it is an exact shift of control points.
+    base : float
+        Error of the surface that the feature was separated from, root mean square, in the copy, mm.
     """
 
     place: str
@@ -49,6 +51,7 @@ class Copy:
     lost: float
     short: float
     exact: bool
+    base: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +85,10 @@ def compared(copies: Copies, wanted: Mapping[int, Wanted], done: Mapping[int, Ar
             for k, figures in _figures(copies, copies.ground.patches[i], each, left):
                 found[k].append(figures)
     points = copies.feet.points
-    return [copied(place.label, points[k], found[k], bool(exact[k])) for k, place in enumerate(copies.places)]
+    return [
+        replace(copied(each.label, points[k], found[k], bool(exact[k])), base=copies.feature.base * abs(each.height))
+        for k, each in enumerate(copies.places)
+    ]
 
 
 def copied(place: str, at: Array, found: Sequence[Figures], exact: bool = False) -> Copy:

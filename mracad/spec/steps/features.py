@@ -35,7 +35,7 @@ class Featured(Selection, frozen=True, kw_only=True, forbid_unknown_fields=True)
     base: Annotated[
         Literal["surroundings", "level"],
         Meta(
-            description="What the feature is measured from: surroundings is a thin plate fitted around the window; "
+            description="What the feature is measured from: surroundings is a smooth surface fitted around it; "
             "level is the face without its --band."
         ),
     ] = "surroundings"

@@ -122,6 +122,52 @@ def rhombi(side=60.0, spans=30, bend=0.0, degree=3, turns=("", "", "")):
     return documents.single(topology.shell(faces), "rhombi")
 
 
+def _cylinder(a, b, h, radius):
+    return (radius + h) * np.sin(a / radius), b, (radius + h) * np.cos(a / radius)
+
+
+def _sphere(a, b, h, radius):
+    s, t, r = a / radius, b / radius, radius + h
+    return r * np.sin(s) * np.cos(t), r * np.sin(t), r * np.cos(s) * np.cos(t)
+
+
+def _torus(a, b, h, radius, tube):
+    s, t = a / tube, b / (radius + tube)
+    away = radius + (tube + h) * np.cos(s)
+    return (tube + h) * np.sin(s), away * np.sin(t), away * np.cos(t)
+
+
+def _cone(a, b, h, radius, slope):
+    cos, sin = 1 / np.hypot(1, slope), slope / np.hypot(1, slope)
+    away = radius + slope * cos * a + h * cos
+    return a * cos - h * sin, away * np.sin(b / radius), away * np.cos(b / radius)
+
+
+def _waves(a, b, h, height, length):
+    s, t = a / length + 0.3, 0.8 * b / length + 0.2
+    slopes = height / length * np.cos(s) * np.cos(t), -0.8 * height / length * np.sin(s) * np.sin(t)
+    size = np.sqrt(1 + slopes[0] ** 2 + slopes[1] ** 2)
+    return a - h * slopes[0] / size, b - h * slopes[1] / size, height * np.sin(s) * np.cos(t) + h / size
+
+
+GROUNDS = {
+    "plane": lambda a, b, h: (a, b, 0 * a + h),
+    "cylinder 30": lambda a, b, h: _cylinder(a, b, h, 30.0),
+    "cone 40": lambda a, b, h: _cone(a, b, h, 40.0, 0.3),
+    "sphere 60": lambda a, b, h: _sphere(a, b, h, 60.0),
+    "torus 60/25": lambda a, b, h: _torus(a, b, h, 60.0, 25.0),
+    "waves 8/30": lambda a, b, h: _waves(a, b, h, 8.0, 30.0),
+}
+"""Grounds as functions to x, y and z of a, b and the height above, mm; at a = b = 0 they are 1 mm to the mm."""
+
+
+def above(name, height, half=40.0, spans=160):
+    """A bicubic net on a ground, with a height function of a and b, for both up to ``half`` mm."""
+    k = KnotVector.clamped(np.linspace(-half, half, spans + 1), 3)
+    a, b = np.meshgrid(k.greville(), k.greville(), indexing="ij")
+    return Net(k, k, at_greville(k, k, np.stack(GROUNDS[name](a, b, height(a, b)), axis=-1)))
+
+
 def _interpolated(k, function):
     """Poles of the spline over k × k that takes the values of a function at the Greville points."""
     at = k.greville()

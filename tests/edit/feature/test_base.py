@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mracad.bspline.knots import KnotVector
-from mracad.edit.feature.base import plate
+from mracad.edit.feature.base import under
 from mracad.edit.feature.ground import Ground
 from mracad.edit.feature.locate import window
 from mracad.errors import EditError
@@ -15,7 +15,7 @@ from tests.edit.models import fitted, sheet
 
 def base(net, text):
     ground = Ground.of(sheet(net), {0})
-    return plate(ground, window(ground, spec.feature(text, "feature"), text, None))
+    return under(ground, window(ground, spec.feature(text, "feature"), text, None))
 
 
 def test_a_plane_is_found_below_a_bump():
@@ -23,6 +23,37 @@ def test_a_plane_is_found_below_a_bump():
     local = np.random.default_rng(0).uniform(-15, 15, (200, 3))
     assert np.abs(found.feet(local)[:, 2]).max() < 1e-3
     assert np.abs(found.chart.origin[0] - [50, 50, 0]).max() < 1e-3
+
+
+FORM = {"plane": "plane", "cylinder 30": "quadric", "cone 40": "quadric", "torus 60/25": "cyclide"}
+
+
+@pytest.mark.parametrize("name", grounds.GROUNDS)
+def test_curved_ground_is_found_below_a_bump(name):
+    """Exactly where it is of a canonical kind; elsewhere the stated error tells how well."""
+    ground = grounds.GROUNDS[name]
+    x, y, z = ground(np.zeros(1), np.zeros(1), np.full(1, grounds.HEIGHT))
+    found = base(grounds.above(name, lambda a, b: grounds.bump(np.hypot(a, b))), f"near:{x[0]},{y[0]},{z[0]},radius:20")
+    a, b = np.random.default_rng(0).uniform(-14, 14, (2, 400))
+    true = np.stack(ground(a, b, 0 * a), axis=1)
+    local = (true - found.chart.origin[0]) @ found.chart.axes[0].T
+    off = np.linalg.norm(found.feet(local) - local, axis=1).max()
+    print(f"{name}: {found.name}, off by {off:.1e} mm, stated {found.error:.1e} mm")
+    assert off <= (1e-3 if name.startswith("waves") else 2e-5) * grounds.HEIGHT
+    assert off <= max(10 * found.error, 2e-5)
+    assert found.name == FORM.get(name, found.name)
+
+
+def test_noise_does_not_call_for_a_form_that_swings():
+    """On a noisy plane, algebraic forms could be anything within the ring."""
+    rng = np.random.default_rng(1)
+    noisy = lambda a, b: grounds.bump(np.hypot(a, b)) + 0.02 * rng.standard_normal(a.shape)  # noqa: E731
+    found = base(grounds.above("plane", noisy), "near:0,0,2,radius:20")
+    a, b = np.random.default_rng(0).uniform(-14, 14, (2, 400))
+    local = np.stack([a, b, 0 * a], axis=1) - found.chart.origin[0]
+    local = local @ found.chart.axes[0].T
+    assert np.linalg.norm(found.feet(local) - local, axis=1).max() <= 0.08
+    assert 0.01 <= found.error <= 0.04
 
 
 def test_a_cubic_ground_is_found_whatever_stands_on_it():

@@ -10,6 +10,7 @@ from OCP.BRepAlgoAPI import BRepAlgoAPI_Cut
 from OCP.BRepPrimAPI import BRepPrimAPI_MakeCylinder
 from OCP.gp import gp_Ax2, gp_Dir, gp_Pnt
 
+from mracad.bspline.closest import feet
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
 from mracad.edit.feature.edits import repeat
@@ -21,6 +22,8 @@ from mracad.occ.step import read_step, write_step
 from mracad.occ.view import view
 from mracad.spec.steps import Repeat, Single
 from samples.models import geometry
+from samples.models.panel import panel_shell
+from samples.models.splines import split
 from tests.conftest import CORPUS
 from tests.edit import panels
 from tests.edit.feature import grounds
@@ -155,6 +158,39 @@ def check_curved(name, delta, normal, far):
     top = along.max() / bump(far[along.argmax()])
     print(f"{name}: off by {off:.1e} of the height, height {top:.4f}, size {sigma / SIGMA:.4f}")
     assert off <= 1e-2 and abs(top - 1) <= 1e-2 and abs(sigma / SIGMA - 1) <= 1e-2
+
+
+@pytest.mark.parametrize(("source", "target"), [("cylinder 30", "cone 40"), ("sphere 60", "cylinder 30")])
+def test_a_feature_of_curved_ground_is_the_same_elsewhere(source, target, tmp_path):
+    """From four sewn patches with a corner under the feature, on ground whose sag exceeds it."""
+    whole = grounds.above(source, lambda a, b: bump(np.hypot(a, b), sigma=3.0), half=30.0, spans=120)
+    strips = split(whole.u.knots, whole.poles, 3, [1.0])
+    rows = [[(u, v, n.swapaxes(0, 1)) for v, n in split(whole.v.knots, s.swapaxes(0, 1), 3, [-2.0])] for u, s in strips]
+    bare = grounds.above(target, lambda a, b: 0 * a, half=30.0, spans=40)
+    far = np.array([0.0, 300.0, 0.0])
+    other = shapes.face_on(geometry.surface(bare.poles + far, bare.u.knots, bare.v.knots, (3, 3)))
+    path = shapes.save(shapes.compound(panel_shell(rows), other), tmp_path / "in.step")
+    zero = np.zeros(1)
+    top = [np.stack(grounds.GROUNDS[name](zero, zero, zero), axis=1)[0] for name in (source, target)]
+    _, after, report = repeated(
+        path, tmp_path / "out.step", "--at", word(top[1] + far), feature=f"near:{word(top[0])},radius:15"
+    )
+    a, b = np.random.default_rng(0).uniform(-10, 10, (2, 500))
+    wanted = np.stack(grounds.GROUNDS[target](a, b, bump(_geodesic(target, a, b), sigma=3.0)), axis=1) + far
+    _, apart = feet(after.surfaces[4].net, wanted, np.stack([a, b], axis=1))
+    (copy,) = report["copies"]
+    print(f"{source} to {target}: off by {apart.max() / HEIGHT:.1e} of the height, base {copy['base']:.1e} mm")
+    assert apart.max() <= 1e-3 * HEIGHT
+    assert 0 < copy["base"] <= 1e-3 * HEIGHT
+
+
+def _geodesic(name, a, b):
+    """Distance on a ground from where a = b = 0; cylinders and cones unroll."""
+    if not name.startswith("cone"):
+        return np.hypot(a, b)
+    slant = 40.0 * np.hypot(1, 0.3) / 0.3
+    angle = b / 40.0 * 0.3 / np.hypot(1, 0.3)
+    return np.sqrt((slant + a) ** 2 + slant**2 - 2 * slant * (slant + a) * np.cos(angle))
 
 
 def test_motion_leaves_a_clean_surface(plane, tmp_path):
