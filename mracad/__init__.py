@@ -30,12 +30,12 @@ if TYPE_CHECKING:
     from mracad.inspect.seams import seams
     from mracad.inspect.spectrum import spectra
     from mracad.job.document import run
+    from mracad.job.look import snapshot
     from mracad.model.brep import Model
     from mracad.model.displacement import Displacement
     from mracad.occ.apply import apply
     from mracad.occ.check import check
     from mracad.occ.files import read, write
-    from mracad.occ.view import view as snapshot
     from mracad.spec.steps import Compose, Level, Move, Repeat, Smooth, Transfer
 
 _HOMES = {
@@ -52,7 +52,7 @@ _HOMES = {
     "run": "job.document",
     "save_details": "edit.mra:save",
     "seams": "inspect.seams",
-    "snapshot": "occ.view:view",
+    "snapshot": "job.look",
     "spectra": "inspect.spectrum",
     "write": "occ.files",
 }

@@ -16,6 +16,11 @@ from mracad.spec.select import scope as select_scope
 from mracad.spec.steps import Selection
 
 
+def snapshot(document: Document) -> Model:
+    """The geometry of a document as plain arrays (mm), with what edges can slide along; errors as for ``view``."""
+    return railed(document, view(document))
+
+
 def looked_at(document: Document, options: Selection) -> tuple[Model, Scope]:
     """The view of a document for an edit, and what the edit may move.
 

@@ -203,7 +203,7 @@ OWN = {
 
 VALUES = {
     "smooth edges=slide": ("--edges slide", "IN block.step --scale 30mm"),
-    "denoise edges=slide": ("--edges slide", "IN block.step --noise 0.05mm"),
+    "denoise edges=coupled": ("--edges coupled", "IN block.step --noise 0.05mm"),
     "smooth keep=g0": ("--keep g0", "IN tangent.step"),
     "smooth keep=g1": ("--keep g1", "IN tangent.step --keep g0"),
     "repeat overlap=replace": ("--overlap replace", "--grid 2x1,0.8,0.8"),

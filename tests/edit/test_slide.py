@@ -12,6 +12,7 @@ from OCP.BRepGProp import BRepGProp
 from OCP.GProp import GProp_GProps
 from scipy.spatial import KDTree
 
+import mracad as library
 from mracad.bspline.closest import distances
 from mracad.edit import driver
 from mracad.edit.denoise import denoise
@@ -149,12 +150,30 @@ def test_rims_get_as_smooth_as_the_inside(made, name):
     assert rim <= 1.3 * inside and rim < 0.93 * held
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_solids_stay_valid_as_read_back(made, tmp_path, mracad, name):
+def test_denoised_rims_get_as_smooth_as_the_inside():
+    """What is left of noise is noise: single rims are 1.1 to 1.5 times as far off as the inside."""
+    found = []
+    for name in ("block", "boss", "cone"):
+        for seed in range(1, 4):
+            model = looked(blocks.document(name, blocks.nets(seed=seed)[1]), Denoise())
+            edit = denoise(model, Denoise())
+            assert {each.how for each in edit.edges} == {"slid"}
+            found.append(errors(edit.displacement.applied(model)))
+            print(f"{name}, seed {seed}: rim {found[-1][0]:.4f}, inside {found[-1][1]:.4f}")
+    rim, inside = np.sqrt(np.mean(np.square(found), axis=0))
+    assert rim <= 1.3 * inside
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [(name, ("smooth", "--scale", blocks.SCALE, "--edges", "slide")) for name in NAMES]
+    + [(name, ("denoise",)) for name in ("block", "boss", "cone")],
+)
+def test_solids_stay_valid_as_read_back(made, tmp_path, mracad, name, words):
     document = made(name)
     source, target = tmp_path / "in.step", tmp_path / "out.step"
     documents.write(document, source)
-    found = mracad("smooth", source, "-o", target, "--scale", blocks.SCALE, "--edges", "slide", "--json")
+    found = mracad(words[0], source, "-o", target, *words[1:], "--json")
     assert found.code == 0, found.err
     report = json.loads(found.out)
     assert {each["how"] for each in report["edges"]} == {"slid"}
@@ -235,10 +254,21 @@ def test_an_edge_stays_where_that_does_more(made, monkeypatch):
 
 
 def test_denoising_slides_as_if_the_rim_were_free(made):
-    model = looked(made("block"), Denoise(edges="slide"))
-    rim, _ = errors(denoise(model, Denoise(edges="slide")).displacement.applied(model))
+    model = looked(made("block"), Denoise())
+    rim, _ = errors(denoise(model, Denoise()).displacement.applied(model))
     free, _ = errors(denoise(sheet(NOISY), Denoise(free_edges="smooth")).displacement.applied(sheet(NOISY)))
     assert rim <= 1.05 * free
+
+
+def test_the_library_slides_like_the_command(tmp_path, mracad):
+    source, target = tmp_path / "in.step", tmp_path / "out.step"
+    documents.write(blocks.document("cone", blocks.nets(16)[1]), source)
+    assert mracad("denoise", source, "--noise", "0.05mm", "-o", target).code == 0
+    model = library.snapshot(library.read(source))
+    edit = library.denoise(model, library.Denoise(noise="0.05mm"))
+    assert {each.how for each in edit.edges} == {"slid"}
+    poles = [sculpted(each)[1].poles for each in (edit.displacement.applied(model), view(read(target)))]
+    assert np.array_equal(*poles)
 
 
 def test_edges_and_faces_that_are_held_do_not_slide(made):

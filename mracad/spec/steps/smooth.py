@@ -11,6 +11,16 @@ from mracad.spec import places
 from mracad.spec.quantity import Angle, Length, Share
 from mracad.spec.steps.base import Edges, Selection
 
+Sliding = Annotated[
+    Literal["coupled", "slide", "frozen"],
+    Meta(
+        description="Edges between two edited faces: coupled lets them move, as smooth as before where possible; "
+        "frozen keeps them in place; slide also lets sharp edges move along a plane, cylinder, cone, sphere, torus "
+        "or NURBS face that stays."
+    ),
+]
+"""The type of ``edges`` for edits whose edges may slide."""
+
 
 class Fitting(Selection, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Options of edits that change whole faces."""
@@ -50,15 +60,7 @@ class Fitting(Selection, frozen=True, kw_only=True, forbid_unknown_fields=True):
 class Fairing(Fitting, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Options of edits that make faces fairer."""
 
-    edges: Annotated[
-        Literal["coupled", "slide", "frozen"],
-        Meta(
-            description="Edges between two edited faces: coupled lets them move, as smooth as before where possible; "
-            "frozen keeps them in place; slide also lets sharp edges move along a plane, cylinder, cone, sphere, torus "
-            "or NURBS face that stays."
-        ),
-    ] = "coupled"
-
+    edges: Sliding = "coupled"
     free_edges: Annotated[
         Literal["hold", "smooth"],
         Meta(
@@ -159,6 +161,7 @@ class Denoise(Fairing, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
     function: ClassVar[str] = "mracad.edit.denoise:denoise"
 
+    edges: Sliding = "slide"
     noise: Annotated[
         Length | None,
         Meta(
