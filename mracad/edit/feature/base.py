@@ -32,7 +32,7 @@ Array = np.ndarray
 RING = 1.5
 """Outer radius, over that of the feature, of the ring that determines the surface under it."""
 
-BETTER = 1.5
+BETTER = 1.25
 """How many times nearer to the ring than the simpler ones a form must come."""
 
 SECTORS = 16
