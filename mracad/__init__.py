@@ -20,11 +20,12 @@ from mracad.version import __version__
 if TYPE_CHECKING:
     from mracad.edit.compose import compose
     from mracad.edit.details import Details
-    from mracad.edit.feature.edits import move, repeat, transfer
+    from mracad.edit.feature.edits import move, repeat
     from mracad.edit.level import level
     from mracad.edit.mra import load as load_details
     from mracad.edit.mra import save as save_details
     from mracad.edit.smooth import smooth
+    from mracad.edit.transfer import transfer
     from mracad.errors import MracadError
     from mracad.inspect.deviation import deviations
     from mracad.inspect.seams import seams

@@ -7,31 +7,21 @@ displacement, because frames on the two sides of a seam differ a little.
 
 from __future__ import annotations
 
-import math
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from typing import ClassVar
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from msgspec import structs
 
-from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
-from mracad.edit.carry import SAME, Laid, Piece, Way
+from mracad.edit.carry import SAME, Piece, Way
+from mracad.edit.detailed import Detailed, detailed
 from mracad.edit.details import Detail, Details
-from mracad.edit.fair import DETAIL
 from mracad.edit.mra import load
-from mracad.edit.result import Edit, Reason
-from mracad.edit.target import Sheet, Wish, largest, stiffness
-from mracad.edit.tolerances import COARSE, RESTORED
-from mracad.edit.whole import edited
+from mracad.edit.result import Edit
 from mracad.errors import EditError
-from mracad.inspect.roughness import Growth
-from mracad.model.brep import Face, Model, Surface
-from mracad.seam.interface import Joints
-from mracad.seam.ladders import Creases
-from mracad.seam.solve import Problem
+from mracad.model.brep import Model, Surface
 from mracad.spec.select import Scope
 from mracad.spec.select import scope as scope_of
 from mracad.spec.steps import Compose
@@ -46,79 +36,6 @@ PLACES = 3
 
 ELSEWHERE = 100.0
 """Surfaces count as renumbered if others fit better by this factor, in squared distances."""
-
-
-@dataclass(frozen=True, eq=False)
-class Detailed(Wish):
-    """The wish of composing.
-
-    Attributes
-    ----------
-    pieces : mapping of int to Piece
-        Details by surface.
-    refine : bool
-        Whether knots of the details are inserted where a surface lacks them.
-    restores : bool
-        Whether all details are put back where they were.
-    laid : dict
-        Results so far, by surface and knots.
-    """
-
-    pieces: Mapping[int, Piece]
-    refine: bool = True
-    restores: bool = False
-    laid: dict[tuple[int, KnotVector, KnotVector], Laid] = field(default_factory=dict)
-    spread: ClassVar[float] = math.inf
-    fairs: ClassVar[bool] = False
-    whole: ClassVar[bool] = True
-    lean: ClassVar[bool] = True
-
-    @property
-    def growth(self) -> Growth:
-        """Details must not fold a face, unless it was folded before."""
-        return RESTORED if self.restores else COARSE
-
-    def wavelength(self, net: Net, faces: Sequence[Face], creases: Creases) -> float:
-        """The wavelength of the details, mm."""
-        return self._piece(faces).wavelength
-
-    def space(self, net: Net, faces: Sequence[Face]) -> Net:
-        """The surface over its knots and those of the details."""
-        return self._piece(faces).over(net) if self.refine else net
-
-    def detail(self, alone: Problem, sheet: Sheet) -> float:
-        """The largest change in the target; even the smallest details count."""
-        found = largest(self, alone, sheet)
-        return max(found, 2 * DETAIL[0], 2 * DETAIL[1] * sheet.wavelength) if found else 0.0
-
-    def target(self, problem: Problem, sheets: Mapping[int, Sheet], joined: Joints) -> Array:
-        """The details as carried by the surfaces, ``(points, 3)``."""
-        return np.concatenate([self._on(i, space.net).offset.reshape(-1, 3) for i, space in problem.spaces.items()])
-
-    def ways(self, problem: Problem, target: Array, width: float) -> Iterable[Iterable[Array]]:
-        """The details as they are, if they are put back; else the nearest displacement that seams allow, and smoother
-        transitions to what is held."""
-        if self.restores:
-            yield [target]
-            return
-        yield [problem.nearest(target, stiff) for stiff in ((0.0, stiffness(width / 4)) if problem.rimmed else (0.0,))]
-        if problem.rimmed:
-            yield problem.nearest(target, stiffness(width / 2)), problem.nearest(problem.fading(width) * target)
-
-    def way(self, surface: int) -> Way | None:
-        """How the details were placed on a surface in the end."""
-        return next((each.way for (i, *_), each in reversed(self.laid.items()) if i == surface), None)
-
-    def _piece(self, faces: Sequence[Face]) -> Piece:
-        surface = faces[0].surface
-        assert surface is not None
-        return self.pieces[surface]
-
-    def _on(self, surface: int, net: Net) -> Laid:
-        key = surface, net.u, net.v
-        if key not in self.laid:
-            self.laid[key] = self.pieces[surface].laid(net)
-        return self.laid[key]
 
 
 def compose(
@@ -150,13 +67,8 @@ def compose(
         options = structs.replace(options, refine="never")  # nothing needs more knots
     restored = same and _whole(model, options, scope, pieces)
     wish = Detailed(pieces, refine, restored)
-    edit = edited(model, options, wish, replace(scope, faces=scope.faces - bare), progress, restored=restored)
-    left = bare & scope.chosen
-    outcomes = tuple(
-        replace(each, status="unchanged", reason=Reason.NO_DETAIL) if each.face in left else each
-        for each in edit.outcomes
-    )
-    return replace(edit, outcomes=outcomes, notes=_notes(edit, wish, len(details.surfaces)))
+    edit = detailed(model, options, wish, scope, progress, bare)
+    return replace(edit, notes=_notes(edit, wish, len(details.surfaces)))
 
 
 def _whole(model: Model, options: Compose, scope: Scope, pieces: Mapping[int, Piece]) -> bool:

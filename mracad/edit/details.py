@@ -20,7 +20,7 @@ from itertools import zip_longest
 import numpy as np
 
 from mracad.bspline.surface import Net
-from mracad.model.brep import Model
+from mracad.model.brep import Face, Model, Surface
 from mracad.model.displacement import Displacement, Offset
 from mracad.wavelet.ladder import arc_lengths, rungs_by_level
 from mracad.wavelet.project import projection
@@ -123,6 +123,22 @@ class Details:
             taken = _taken(surface.net, offset)
             found.append(replace(taken, faces=surface.faces, product=faces[0].product, names=names))
         return cls(model.name, model.diagonal, made, tuple(found))
+
+    def as_model(self) -> Model:
+        """The model with its details, as far as they tell: faces without boundaries, whose normals are S_u × S_v."""
+        surfaces = [
+            Surface(i, each.net.with_poles(each.net.poles + each.offset), each.faces)
+            for i, each in enumerate(self.surfaces)
+        ]
+        names = [("", "")] * (1 + max((face for each in self.surfaces for face in each.faces), default=-1))
+        on: list[int | None] = [None] * len(names)
+        for i, each in enumerate(self.surfaces):
+            for face, name in zip(each.faces, each.names, strict=False):
+                on[face], names[face] = i, (name, each.product)
+        faces = tuple(
+            Face(i, "bspline", on[i], (), False, np.eye(4), np.zeros((2, 3)), *names[i]) for i in range(len(names))
+        )
+        return Model(self.model, tuple(surfaces), faces, (), self.diagonal)
 
 
 def summed(levels: Sequence[Net]) -> Array:

@@ -33,6 +33,9 @@ MOST = 1 << 30
 MOST_HEADER, MOST_KNOTS = 1 << 25, 1 << 20
 """Largest number of bytes of a header, and of knots of a knot vector."""
 
+MOST_FACES = 1_000_000
+"""Largest number of a face."""
+
 SPARE = 4096
 """Largest number of bytes of an array besides its numbers."""
 
@@ -49,7 +52,7 @@ _Degree = Annotated[int, Meta(ge=1, le=25)]
 class _Surface(msgspec.Struct, forbid_unknown_fields=True):
     """The details of one surface."""
 
-    faces: list[Annotated[int, Meta(ge=1)]]
+    faces: list[Annotated[int, Meta(ge=1, le=MOST_FACES)]]
     product: str
     names: list[str]
     degrees: tuple[_Degree, _Degree]

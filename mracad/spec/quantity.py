@@ -151,3 +151,13 @@ def gain_of(text: str, diagonal: float | None) -> tuple[float, float, float]:
     if not 0.0 <= float(gain) <= MOST_GAIN:
         raise UsageError(f"band: a gain of {gain.strip()} is not between 0 and {MOST_GAIN:g}", hint)
     return (*band_of(band, diagonal), float(gain))
+
+
+def blend_of(text: str, diagonal: float | None) -> tuple[tuple[float, float] | None, float]:
+    """A band, if there is one, and the share of the other detail there, from ``"0.3"`` or ``"2mm:10mm=0.3"``; raises
+    UsageError."""
+    band, equals, share = text.rpartition("=")
+    hint = "write a share as 0.3, or with a band as 2mm:10mm=0.3"
+    if not re.fullmatch(rf"\s*{NUMBER}\s*", share) or not 0.0 <= float(share) <= 1.0:
+        raise UsageError(f"blend: {share.strip() or text!r} is not a share between 0 and 1", hint)
+    return band_of(band, diagonal) if equals else None, float(share)

@@ -28,6 +28,8 @@ ELSEWHERE = {
 MEMORY = "robust/test_robust.py::test_limits_on_the_command_line"
 
 FEATURE = ("--feature", "near:5,5,0,radius:1.5")
+TEXTURE = "--from #1 --to #1 --band 0mm:8mm"
+TEXTURES = "LESS --from LESS --to --map #1=#1,#1=#2 --band 0mm:8mm"
 SWEPT = ("--at", "#1@0.5,0.5", "--by", "0,0,0.4")
 BASE = {
     "batch": ("batch", "recipe.toml", "sheet.step", "--folder", "out", "--json"),
@@ -119,7 +121,7 @@ WAYS = {
     "min_wall": ("--min-wall 9mm", "IN slab.step"),
     "method": ("--method spline",),
     "mirror": ("--mirror", "--rotate 20"),
-    "mode": ("--mode replace", "--from #1 --to #1 --band 0mm:8mm"),
+    "mode": ("--mode replace", f"IN sheet.step {TEXTURE} --rotate 20"),
     "outliers": ("--outliers 2%", "IN spiky.step"),
     "output": ("-o b.feature",),
     "noise": ("--noise 0.2mm",),
@@ -187,7 +189,18 @@ OWN = {
     "info keep": ("--keep g2",),
     "feature extract keep": ("--keep g2",),
     "feature extract faces": ("--faces #2",),
+    "transfer amount": ("--amount 0.5", TEXTURE),
+    "transfer band": ("--band 0mm:3mm", "LESS --from LESS --to --map #1=#1 --mode replace --band 0mm:8mm"),
+    "transfer blend": ("--blend 0.3", TEXTURE),
+    "transfer close_gaps": ("--close-gaps", f"IN gaping.step {TEXTURE}"),
+    "transfer corners": ("--corners move", f"--free-edges smooth {TEXTURE}"),
     "transfer faces": ("--faces #2",),
+    "transfer fit_g1": ("--fit-g1 20", f"IN sheet.step {TEXTURES}"),
+    "transfer free_edges": ("--free-edges smooth", TEXTURE),
+    "transfer gap_tolerance": ("--gap-tolerance 1mm", f"IN halves.step {TEXTURES}"),
+    "transfer map": ("--map #1=#2", "LESS --from LESS --to --map #1=#1 --band 0mm:8mm"),
+    "transfer max_deviation": ("--max-deviation 0.01mm", TEXTURE),
+    "transfer refine": ("--refine never", f"IN strips.step {TEXTURE}"),
     "transfer edges": ("--edges frozen", "--to 10,5,0 --clip"),
     "transfer hold": ("--hold #1",),
     "repeat edges": ("--edges frozen", "--at 10,5,0 --clip"),
@@ -303,7 +316,7 @@ def words(case):
         base.remove("--json")
         return base, [*base, "--json"], old
     changed, own = list(base), given.split()
-    if option in ("scale", "by", "to", "from_", "feature", "folder", "output", "keep") and own[0] in changed:
+    if option in ("scale", "by", "to", "from_", "feature", "folder", "output", "keep", "map") and own[0] in changed:
         _give(changed, own)
     else:
         changed += own

@@ -5,9 +5,10 @@ import pytest
 from msgspec import structs
 
 from mracad.edit.denoise import denoise
-from mracad.edit.feature.edits import move, repeat, transfer
+from mracad.edit.feature.edits import move, repeat
 from mracad.edit.offset import offset
 from mracad.edit.smooth import smooth
+from mracad.edit.transfer import transfer
 from mracad.errors import EditError, UsageError
 from mracad.spec.steps import Move, Repeat, Smooth, Transfer
 from mracad.spec.steps.smooth import Denoise, OffsetFaces
@@ -117,7 +118,7 @@ def test_features_leave_regions_alone():
     with pytest.raises(EditError, match="feature: a region of --hold keeps part of it"):
         move(model, Move(**near, to="120,50,0", hold=("near:50,50,0,radius:5",)))
     options = Transfer(
-        from_="#1", to="#1", band="0mm:30mm", mode="blend=0.5", source="a.step", hold=("near:50,50,0,radius:5",)
+        from_="#1", to="#1", band="0mm:30mm", blend=("0.5",), source="a.step", hold=("near:50,50,0,radius:5",)
     )
     before = model.surfaces[0].net
     after = transfer(model, options, model).displacement.applied(model).surfaces[0].net

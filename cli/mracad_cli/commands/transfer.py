@@ -1,4 +1,4 @@
-"""Copy the detail of a face, or a feature, from one file to another; units may differ."""
+"""Copy the detail of faces, or a feature, from one file to another; units may differ."""
 
 from __future__ import annotations
 

@@ -18,9 +18,8 @@ from mracad.edit.feature.fit import NARROWEST
 from mracad.edit.feature.ground import Ground
 from mracad.edit.feature.ideal import copies
 from mracad.edit.feature.lay import Laid, laid
-from mracad.edit.feature.locate import Place, face_number, patch_of, place, standing
+from mracad.edit.feature.locate import Place, place, standing
 from mracad.edit.feature.pattern import places
-from mracad.edit.feature.transfer import laid_on
 from mracad.edit.result import Edit, FaceOutcome, Reason, untouched
 from mracad.errors import EditError
 from mracad.model.brep import Face, Model
@@ -28,8 +27,7 @@ from mracad.model.displacement import Displacement
 from mracad.seam.natural import Treatment
 from mracad.seam.wishes import Wishes
 from mracad.seam.zones import zoned
-from mracad.spec.places import is_feature, spot
-from mracad.spec.quantity import band_of, length
+from mracad.spec.places import spot
 from mracad.spec.select import Scope
 from mracad.spec.select import scope as scope_of
 from mracad.spec.steps import Copied, Move, Repeat, Transfer
@@ -78,33 +76,14 @@ def repeat(
     return _edit(model, scope, _laid(ground, feature, places(ground, feature, options), options, scope, {}))
 
 
-def transfer(
-    model: Model,
-    options: Transfer,
-    source: Model,
-    *,
-    scope: Scope | None = None,
-    progress: Callable[[int, int], None] | None = None,
-) -> Edit:
-    """Transfer the detail of a face, or a feature, of another model to this one.
-
-    Parameters
-    ----------
-    source : Model
-        The other model; other parameters and errors as for :func:`move`.
-    """
-    scope = scope or scope_of(model, options)
-    ground = Ground.of(model, scope.movable(model))
+def transferred(model: Model, options: Transfer, source: Model, scope: Scope) -> Edit:
+    """Copy a feature of another model (``source``) to this one; errors as for :func:`move`."""
+    assert options.from_ is not None
+    assert options.to is not None
     every = {f.index for f in source.faces if f.surface is not None}
-    text = options.from_
-    if is_feature(text):
-        feature = replace(feature_of(source, options, every, text), origin=None)
-        return _edit(model, scope, _laid(ground, feature, [_target(ground, options.to, options)], options, scope, {}))
-    one = patch_of(Ground.of(source, every), face_number(source, text, "from", FACE), "from")
-    two = patch_of(ground, face_number(model, options.to, "to", FACE), "to")
-    width = None if options.taper is None else length(options.taper, model.diagonal, "taper")
-    band = band_of(options.band or "", source.diagonal)
-    return _edit(model, scope, laid_on(model, two, one, band, options, width, scope.zones))
+    feature = replace(feature_of(source, options, every, options.from_), origin=None)
+    ground = Ground.of(model, scope.movable(model))
+    return _edit(model, scope, _laid(ground, feature, [_target(ground, options.to, options)], options, scope, {}))
 
 
 def _refuse_held(model: Model, offsets: Mapping[int, Array], scope: Scope) -> None:
@@ -116,7 +95,7 @@ def _refuse_held(model: Model, offsets: Mapping[int, Array], scope: Scope) -> No
             raise EditError("feature: a region of --hold keeps part of it", "move another feature, or hold less")
 
 
-def _target(ground: Ground, text: str, options: Copied) -> Place:
+def _target(ground: Ground, text: str, options: Copied | Transfer) -> Place:
     found = place(ground, spot(text, "to"), f"place ({text})")
     return replace(found, rotate=math.radians(options.rotate), size=options.size, height=options.height)
 
@@ -125,7 +104,7 @@ def _laid(
     ground: Ground,
     feature: Feature,
     found: Sequence[Place],
-    options: Copied,
+    options: Copied | Transfer,
     scope: Scope,
     removed: Mapping[int, Array],
 ) -> Laid:

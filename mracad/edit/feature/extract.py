@@ -22,7 +22,7 @@ from mracad.seam.natural import seams
 from mracad.seam.wishes import Wishes
 from mracad.spec.places import Stored, feature
 from mracad.spec.quantity import band_of, length
-from mracad.spec.steps import Featured
+from mracad.spec.steps import Featured, Transfer
 from mracad.wavelet.project import band
 
 Array = np.ndarray
@@ -43,7 +43,7 @@ class Cut:
     window: Array
 
 
-def feature_of(model: Model, options: Featured, faces: Collection[int], text: str) -> Feature:
+def feature_of(model: Model, options: Featured | Transfer, faces: Collection[int], text: str) -> Feature:
     """The feature that a text names: from a file, or from a window on faces of a model.
 
     Raises

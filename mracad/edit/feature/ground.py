@@ -116,15 +116,19 @@ class Ground:
 
         best = np.full(len(points), np.inf)
         surface, uv = np.zeros(len(points), int), np.zeros((len(points), 2))
-        for index, patch in self.patches.items():
-            seeds, spots = patch.seeds
-            if not len(seeds):
-                continue
-            which = cKDTree(spots).query(points, k=min(3, len(seeds)))[1].reshape(len(points), -1)
-            for k in range(which.shape[1]):
-                at, apart = closest(patch.net, points, seeds[which[:, k]])
-                better = (apart < best - 1e-12) & patch.covers(at)
-                best[better], surface[better], uv[better] = apart[better], index, at[better]
+        trees = {i: cKDTree(patch.seeds[1]) for i, patch in self.patches.items() if len(patch.seeds[0])}
+        far = {i: tree.query(points)[0] for i, tree in trees.items()}
+        most = np.min(list(far.values()), axis=0) if far else best
+        for index, tree in trees.items():
+            patch = self.patches[index]
+            near = np.flatnonzero(far[index] - patch.apart <= most)
+            count = min(3, tree.n)
+            which = tree.query(points[near], k=count)[1].reshape(len(near), count)
+            for k in range(count if len(near) else 0):
+                at, apart = closest(patch.net, points[near], patch.seeds[0][which[:, k]])
+                better = (apart < best[near] - 1e-12) & patch.covers(at)
+                here = near[better]
+                best[here], surface[here], uv[here] = apart[better], index, at[better]
         return self.standing(surface, uv, best)
 
     def standing(self, surface: Array, uv: Array, apart: Array) -> Feet:

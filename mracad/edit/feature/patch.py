@@ -103,13 +103,25 @@ class Patch:
         return points, unit(self.signs(pairs(us, vs)).reshape(*points.shape[:2], 1) * np.cross(su, sv))
 
     @cached_property
+    def _lines(self) -> tuple[Array, Array]:
+        """Parameters of the seeds in u and v."""
+        counts = (int(np.clip(3 * k.spans, 16, SEEDS)) for k in self.knots)
+        u, v = (
+            np.interp(np.linspace(0, k.spans, count), np.arange(k.spans + 1), k.breaks)
+            for k, count in zip(self.knots, counts, strict=True)
+        )
+        return u, v
+
+    @cached_property
+    def apart(self) -> float:
+        """Largest distance of a point of the faces from the nearest seed, mm, estimated from above."""
+        points = np.asarray(self.net.grid(*self._lines))
+        return 2.0 * sum(float(np.linalg.norm(np.diff(points, axis=k), axis=2).max()) for k in (0, 1))
+
+    @cached_property
     def seeds(self) -> tuple[Array, Array]:
         """Parameters distributed over the faces, and their points."""
-        lists = []
-        for k in self.knots:
-            count = int(np.clip(3 * k.spans, 16, SEEDS))
-            lists.append(np.interp(np.linspace(0, k.spans, count), np.arange(k.spans + 1), k.breaks))
-        uv = pairs(*lists)
+        uv = pairs(*self._lines)
         uv = uv[self.covers(uv)]
         return uv, np.asarray(self.net.evaluate(uv))
 

@@ -6,12 +6,13 @@ field holds its help.  This package imports no numerical library, so that the co
 
 from __future__ import annotations
 
-from mracad.spec.steps import checks, features, levels, shape, smooth
+from mracad.spec.steps import checks, features, levels, shape, smooth, transfer
 from mracad.spec.steps.base import Options, Selection
 from mracad.spec.steps.checks import Check, Compare
-from mracad.spec.steps.features import Copied, Extract, Featured, Move, Repeat, Single, Transfer
+from mracad.spec.steps.features import Copied, Extract, Featured, Move, Repeat, Single
 from mracad.spec.steps.levels import Compose, Level, Shaped
 from mracad.spec.steps.smooth import Fairing, Fitting, Smooth
+from mracad.spec.steps.transfer import Transfer
 
 __all__ = [
     "STEPS", "Check", "Compare", "Compose", "Copied", "Extract", "Fairing", "Featured", "Fitting", "Level", "Move",
@@ -20,7 +21,7 @@ __all__ = [
 
 STEPS: dict[str, type[Options]] = {
     struct.function.partition(":")[2]: struct
-    for module in (smooth, shape, levels, features, checks)
+    for module in (smooth, shape, levels, features, transfer, checks)
     for struct in vars(module).values()
     if isinstance(struct, type) and issubclass(struct, Options) and "function" in vars(struct)
 }

@@ -1,15 +1,13 @@
-"""Options of edits that copy a feature or the detail of a face."""
+"""Options of edits that copy a feature."""
 
 from __future__ import annotations
 
-import re
 from typing import Annotated, ClassVar, Literal
 
 from msgspec import Meta
 
 from mracad.errors import UsageError
 from mracad.spec import places
-from mracad.spec.files import File, Naming
 from mracad.spec.quantity import Angle, Length, band_of
 from mracad.spec.steps.base import Selection
 
@@ -20,31 +18,57 @@ _Feature = Annotated[
         "a file made by mracad feature extract."
     ),
 ]
+Taper = Annotated[
+    Length | None,
+    Meta(
+        description="Width over which the feature fades out beyond its window. Default: a quarter of the window's "
+        "radius, or of the shorter side of a rectangle."
+    ),
+]
+Base = Annotated[
+    Literal["surroundings", "level"],
+    Meta(
+        description="What the feature is measured from: surroundings is a smooth surface fitted around it; "
+        "level is the face without its --band."
+    ),
+]
+Band = Annotated[
+    str | None,
+    Meta(description="Wavelengths of the detail to take, such as 0.5mm:20mm; 0mm:20mm takes everything up to 20 mm."),
+]
+Rotate = Annotated[Angle, Meta(description="Rotation of each copy about the outward normal (degrees).")]
+Size = Annotated[
+    float, Meta(description="Scale factor of each copy along the face; its height does not change.", gt=0.0)
+]
+Height = Annotated[
+    float, Meta(description="Scale factor of the height of each copy; a negative one turns a bump into a dent.")
+]
+Mirror = Annotated[bool, Meta(description="Mirror each copy.")]
+Clip = Annotated[
+    bool, Meta(description="Let fixed edges and holes cut off parts of copies, instead of refusing such copies.")
+]
+
+
+def separable(base: str, band: str | None) -> None:
+    """Raise UsageError for a band that is malformed, or missing where the base is a level."""
+    if band is not None:
+        band_of(band, None)
+    if base == "level" and band is None:
+        raise UsageError("base: a level needs a band", "give --band 0.5mm:20mm", "base")
+
+
+def not_flat(height: float) -> None:
+    """Raise UsageError for a height of zero."""
+    if height == 0:
+        raise UsageError("height: it must not be zero", "give --height 0.5, or a negative one for a dent", "height")
 
 
 class Featured(Selection, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Options that separate a feature from its surroundings."""
 
-    taper: Annotated[
-        Length | None,
-        Meta(
-            description="Width over which the feature fades out beyond its window. Default: a quarter of the window's "
-            "radius, or of the shorter side of a rectangle."
-        ),
-    ] = None
-    base: Annotated[
-        Literal["surroundings", "level"],
-        Meta(
-            description="What the feature is measured from: surroundings is a smooth surface fitted around it; "
-            "level is the face without its --band."
-        ),
-    ] = "surroundings"
-    band: Annotated[
-        str | None,
-        Meta(
-            description="Wavelengths of the detail to take, such as 0.5mm:20mm; 0mm:20mm takes everything up to 20 mm."
-        ),
-    ] = None
+    taper: Taper = None
+    base: Base = "surroundings"
+    band: Band = None
 
     @property
     def quiet(self) -> str:
@@ -52,10 +76,7 @@ class Featured(Selection, frozen=True, kw_only=True, forbid_unknown_fields=True)
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.band is not None:
-            band_of(self.band, None)
-        if self.base == "level" and self.band is None:
-            raise UsageError("base: a level needs a band", "give --band 0.5mm:20mm", "base")
+        separable(self.base, self.band)
 
 
 class Extract(Featured, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -76,22 +97,15 @@ class Copied(Featured, frozen=True, kw_only=True, forbid_unknown_fields=True):
             "smooth as before where possible; frozen keeps them in place."
         ),
     ] = "coupled"
-    rotate: Annotated[Angle, Meta(description="Rotation of each copy about the outward normal (degrees).")] = 0.0
-    size: Annotated[
-        float, Meta(description="Scale factor of each copy along the face; its height does not change.", gt=0.0)
-    ] = 1.0
-    height: Annotated[
-        float, Meta(description="Scale factor of the height of each copy; a negative one turns a bump into a dent.")
-    ] = 1.0
-    mirror: Annotated[bool, Meta(description="Mirror each copy.")] = False
-    clip: Annotated[
-        bool, Meta(description="Let fixed edges and holes cut off parts of copies, instead of refusing such copies.")
-    ] = False
+    rotate: Rotate = 0.0
+    size: Size = 1.0
+    height: Height = 1.0
+    mirror: Mirror = False
+    clip: Clip = False
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.height == 0:
-            raise UsageError("height: it must not be zero", "give --height 0.5, or a negative one for a dent", "height")
+        not_flat(self.height)
 
 
 class Single(Copied, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -172,56 +186,3 @@ class Repeat(Single, frozen=True, kw_only=True, forbid_unknown_fields=True):
     @property
     def done(self) -> str:
         return "edited with copies"
-
-
-class Transfer(Copied, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Copy the detail of a face, or a feature, from another file to this one; units may differ."""
-
-    function: ClassVar[str] = "mracad.edit.feature.edits:transfer"
-
-    source: Annotated[File, Meta(description="The file that the detail is taken from.")]
-    from_: Annotated[
-        Annotated[str, Naming(ending=".feature")],
-        Meta(
-            description="What to take: a face (#3 or its name) with all its detail in --band, or a feature as for "
-            "mracad repeat."
-        ),
-    ]
-    to: Annotated[str, Meta(description="Where to: a face for the detail of a face; a place for a feature.")]
-    mode: Annotated[
-        str,
-        Meta(
-            description="How the detail of a face is applied: add it; replace the face's own detail in the band; or "
-            "blend=0.3 for a mix with 30% of it."
-        ),
-    ] = "add"
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if places.is_feature(self.from_):
-            places.feature(self.from_, "from")
-            places.spot(self.to, "to")
-        elif self.band is None:
-            message = "band: the detail of a face cannot be transferred without one"
-            raise UsageError(message, "give --band 0mm:20mm", "band")
-        self.share()
-
-    def share(self) -> tuple[float, float]:
-        """Shares of the face's own detail that is kept, and of the other face's detail that is added."""
-        if self.mode in ("add", "replace"):
-            return (1.0, 1.0) if self.mode == "add" else (0.0, 1.0)
-        match = re.fullmatch(r"blend=(\d+\.?\d*|\.\d+)", self.mode)
-        if not match or not 0 <= float(match[1]) <= 1:
-            raise UsageError(f"mode: {self.mode!r} is not known", "use add, replace or blend=0.3", "mode")
-        return 1.0 - float(match[1]), float(match[1])
-
-    def models(self) -> tuple[str, ...]:
-        return (self.source,)
-
-    @property
-    def done(self) -> str:
-        return "edited with transferred detail"
-
-    @property
-    def quiet(self) -> str:
-        return "unchanged"

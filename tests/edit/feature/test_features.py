@@ -460,7 +460,7 @@ def test_transfer_of_the_character_of_a_face(tmp_path):
     print(f"texture on a cylinder: off by {off:.1e} of its height")
     assert off <= 2e-2
     same = tmp_path / "same.step"
-    run("transfer", texture, texture, "-o", same, "--from", "#1", "--to", "#1", *band, "--mode", "blend=0.4")
+    run("transfer", texture, texture, "-o", same, "--from", "#1", "--to", "#1", *band, "--blend", "0.4")
     one, two = model(texture).surfaces[0].net, model(same).surfaces[0].net
     assert np.abs(one.poles - two.poles).max() <= 1e-12
 

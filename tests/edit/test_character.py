@@ -2,14 +2,14 @@
 
 import numpy as np
 
+from mracad.edit.character import Character
 from mracad.edit.feature.patch import Patch
-from mracad.edit.feature.transfer import Character
 from tests.edit.feature import grounds
 from tests.edit.models import sheet
 
 
 def test_places_correspond_by_arc_length_and_are_mirrored_beyond_the_face():
-    own = Character.of(Patch.of(sheet(grounds.uneven()), 0, {0}), (0.0, 1.0))
+    own = Character.of(Patch.of(sheet(grounds.uneven()), 0, {0}), [(0.0, 1.0, 1.0)])
     uv = np.random.default_rng(0).uniform(0, 1, (100, 2))
     lengths = own.lengths(uv)
     assert np.abs(lengths - 200.0 * uv).max() < 0.05  # x = 200 u on the plane
@@ -21,7 +21,7 @@ def test_places_correspond_by_arc_length_and_are_mirrored_beyond_the_face():
 def test_detail_in_frames_of_the_coarse_surface():
     """A band between two scales: what the coarse surface and the detail sum up to; along the normal of a plane."""
     flat = Patch.of(sheet(grounds.plane(60.0, (30.0, 30.0))), 0, {0})
-    own = Character.of(flat, (0.0, 200.0))
+    own = Character.of(flat, [(0.0, 200.0, 1.0)])
     assert np.abs(own.coarse.net.poles + own.detail.poles - flat.net.poles).max() < 1e-12
     uv = np.random.default_rng(0).uniform(10, 50, (100, 2))
     frames = own.frames(uv)
