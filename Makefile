@@ -1,7 +1,7 @@
 # mracad: multiresolution editing for CAD models.
 #
 #   make demo    set everything up and smooth a sample
-#   make example fair a panel of six patches and put details on it: moved, repeated over seams, carried from a file
+#   make example smooth, sweep, emboss and knurl a shell of a dozen patches, step by step (docs/example.md)
 #   make test    set everything up and run the tests
 #   make test-long  at more scales, with the largest real models everywhere
 #   make regress compare every sample with the reference figures in samples/figures.json
@@ -30,8 +30,8 @@ demo: $(VENV)/ready
 
 example: $(VENV)/ready
 	@mkdir -p build
-	$(BIN)/mracad run samples/example/recipe.toml samples/panel.step --overwrite -o build/example.step -o build/example.stl
-	@echo 'The result lies in build/example.step (and .stl); samples/example/recipe.toml says how it was made.'
+	$(BIN)/mracad run samples/example/recipe.toml samples/shell.step --overwrite -o build/example.step -o build/example.stl
+	@echo 'The result lies in build/example.step (and .stl); docs/example.md shows each step.'
 
 test: $(VENV)/dev
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n 2
@@ -62,13 +62,15 @@ bench: $(VENV)/dev
 bench-batch: $(VENV)/dev
 	$(BIN)/python benchmarks/batch.py
 
-# The page of steps, from their declaration, and the picture of the rooms, from the imports
+# The page of steps, from their declaration, the picture of the rooms, from the imports, and those of the samples
 docs: $(VENV)/ready
+	$(BIN)/python docs/picture.py
 	$(BIN)/python -c 'from mracad.spec.schema import page; print(page(), end="")' > docs/steps.md
 	$(BIN)/python docs/house.py > docs/house.svg
 
 samples: $(VENV)/ready
 	$(BIN)/python samples/make.py samples
+	$(BIN)/python samples/example/make.py
 
 # All samples smoothed: make smooth SCALE=2% -j2
 smooth: $(SAMPLES:samples/%.step=build/%.smooth.step)

@@ -16,13 +16,14 @@ from models.assembly import assembly
 from models.documents import write
 from models.panel import panel, panel_clean, panel_inside
 from models.parts import blade, bottle, trimmed
+from models.shell import shell
 
 from mracad.occ.document import Document
 
 HERE = Path(__file__).resolve().parent
 
 SAMPLES: dict[str, Callable[[], Document]] = {
-    build.__name__: build for build in (panel, panel_clean, panel_inside, trimmed, bottle, blade, assembly)
+    build.__name__: build for build in (panel, panel_clean, panel_inside, shell, trimmed, bottle, blade, assembly)
 }
 
 

@@ -46,20 +46,19 @@ def panel_noise(shape: Sequence[int]) -> np.ndarray:
     return 0.05 / 3.0**0.5 * np.random.default_rng(102).standard_normal(shape)
 
 
-def panel_patches(
-    u_knots: np.ndarray, v_knots: np.ndarray, poles: np.ndarray
+def cut(
+    u_knots: np.ndarray, v_knots: np.ndarray, poles: np.ndarray, patches: tuple[int, int] = PATCHES
 ) -> list[list[tuple[np.ndarray, np.ndarray, np.ndarray]]]:
-    """Cut the panel at its seam knots into patches, each with knots in u and v and poles; exact, so C2 across."""
-    seams_u = np.linspace(0.0, PANEL[0], PATCHES[0] + 1)[1:-1]
-    seams_v = np.linspace(0.0, PANEL[1], PATCHES[1] + 1)[1:-1]
+    """Cut a net into even patches at its knots, each with knots in u and v and poles; exact, so C2 across."""
+    seams = [np.linspace(k[0], k[-1], n + 1)[1:-1] for k, n in zip((u_knots, v_knots), patches, strict=True)]
     rows = []
-    for u, strip in split(u_knots, poles, 3, seams_u):
-        columns = split(v_knots, strip.swapaxes(0, 1), 3, seams_v)
+    for u, strip in split(u_knots, poles, 3, seams[0]):
+        columns = split(v_knots, strip.swapaxes(0, 1), 3, seams[1])
         rows.append([(u, v, net.swapaxes(0, 1)) for v, net in columns])
     return rows
 
 
-def panel_shell(rows: Sequence[Sequence[tuple[np.ndarray, np.ndarray, np.ndarray]]]) -> TopoDS_Shell:
+def sewn(rows: Sequence[Sequence[tuple[np.ndarray, np.ndarray, np.ndarray]]]) -> TopoDS_Shell:
     """Join a grid of patches into one shell; neighbours share their edge and its curve."""
     count_u, count_v = len(rows), len(rows[0])
     corners = {
@@ -93,22 +92,22 @@ def panel_shell(rows: Sequence[Sequence[tuple[np.ndarray, np.ndarray, np.ndarray
 
 def panel_clean() -> Document:
     """The true panel: 3 × 2 bicubic patches of 35 × 35 control points on uneven knots, C2 across every seam."""
-    return single(panel_shell(panel_patches(*panel_net())), "panel clean")
+    return single(sewn(cut(*panel_net())), "panel clean")
 
 
 def panel() -> Document:
     """The panel with noise on every control point, added before cutting: patches are rough but C2 across the seams."""
     u, v, poles = panel_net()
-    return single(panel_shell(panel_patches(u, v, settle(poles + panel_noise(poles.shape), 6))), "panel")
+    return single(sewn(cut(u, v, settle(poles + panel_noise(poles.shape), 6))), "panel")
 
 
 def panel_inside() -> Document:
     """The panel with noise inside the patches only: two rows of points round each are clean, so every seam is G1."""
-    rows = panel_patches(*panel_net())
+    rows = cut(*panel_net())
     noise = panel_noise((*PATCHES, PATCH_SPANS + 3, PATCH_SPANS + 3, 3))
     for i, row in enumerate(rows):
         for j, (u, v, net) in enumerate(row):
             rough = net.copy()
             rough[2:-2, 2:-2] = settle(net + noise[i, j], 6)[2:-2, 2:-2]
             row[j] = u, v, rough
-    return single(panel_shell(rows), "panel inside")
+    return single(sewn(rows), "panel inside")
