@@ -1,7 +1,7 @@
 """Denoising: remove noise at wavelengths that the noise itself determines.
 
 The noise of every surface is measured unless it is stated: as the part that no smooth surface explains
-(:mod:`mracad.inspect.noise`), or, for few control points, by likelihood (:mod:`mracad.edit.evidence`).  Of the
+(:mod:`mracad.inspect.noise`), or, for few control points, by likelihood (:mod:`mracad.inspect.evidence`).  Of the
 estimates of the surface without noise (:mod:`mracad.edit.estimate`), the one with the least risk is the target, if it
 is surely better than no change.  The wavelengths of the spline, along u and v, are first searched in closed form, for
 each surface alone.
@@ -16,20 +16,18 @@ from typing import ClassVar
 import numpy as np
 
 from mracad.bspline.surface import Net
-from mracad.edit.estimate import FEW, Asked, Noisy, best
-from mracad.edit.evidence import evidence, pooled
+from mracad.edit.estimate import Asked, Noisy, best
 from mracad.edit.result import Edit, FaceOutcome, Reason
 from mracad.edit.search import FIRST, alone
 from mracad.edit.target import Sheet, Wish, stiffness
 from mracad.edit.tolerances import NOISY
 from mracad.edit.whole import edited
-from mracad.inspect.noise import Noise, calm, noise
+from mracad.inspect.evidence import noises
+from mracad.inspect.noise import Noise
 from mracad.inspect.roughness import Growth
-from mracad.model.brep import Face, Model, Surface
-from mracad.seam.hold import separate
+from mracad.model.brep import Face, Model
 from mracad.seam.interface import Joints
 from mracad.seam.ladders import Creases
-from mracad.seam.metric import creases
 from mracad.seam.solve import Problem
 from mracad.seam.white import ORDER
 from mracad.spec.quantity import length
@@ -118,37 +116,12 @@ def denoise(
     """Remove noise from the NURBS faces of a model; parameters and errors as for :func:`mracad.edit.whole.edited`."""
     stated = None if options.noise is None else length(options.noise, model.diagonal, "noise")
     chosen = scope or scope_of(model, options)
-    found = {surface.index: _noise(model, surface, chosen, stated) for surface in model.surfaces}
-    if stated is None:
-        found |= pooled({i: each for i, each in found.items() if each is not None and each.precision})
+    faces = {each.index: [model.faces[i] for i in each.faces if i in chosen.chosen] for each in model.surfaces}
+    found = noises({i: (model.surfaces[i].net, every) for i, every in faces.items() if every}, stated)
     counted = {i: replace(each, size=options.strength * each.size) for i, each in found.items() if each}
     wish = Quiet(counted, Asked(options.method == "wiener", options.outliers / 100))
     edit = edited(model, options, wish, chosen, progress)
     return replace(edit, outcomes=tuple(_said(each, model, found) for each in edit.outcomes))
-
-
-def _noise(model: Model, surface: Surface, chosen: Scope, stated: float | None) -> Noise | None:
-    """The noise of the chosen faces of a surface, if any."""
-    faces = [model.faces[i] for i in surface.faces if i in chosen.chosen]
-    if not faces:
-        return None
-    net, numbers = surface.net, [face.index for face in faces]
-    parts = separate(net, faces, numbers, "g0")
-    inner = separate(net, faces, numbers, "g1").free
-    if parts.free.any() and inner.sum() < FEW:
-        sharp = creases(net, np.ones(net.poles.shape[:2], bool))
-        told = evidence(net, (inner, parts.free, parts.visible), parts.visible, sharp, stated)
-        if told is not None or stated is None:
-            return told
-    found = noise(net, parts.free, parts.visible)
-    if found:
-        still = next(
-            (each for each in (inner, parts.free) if calm(net, parts.visible & ~each, found.size)), found.where
-        )
-        found = replace(found, where=found.where & still)
-    if stated is None:
-        return found
-    return Noise(stated, found.where if found else parts.visible, (net.u.greville(), net.v.greville()))
 
 
 def _surface(faces: Sequence[Face]) -> int:
@@ -157,12 +130,12 @@ def _surface(faces: Sequence[Face]) -> int:
     return surface
 
 
-def _said(outcome: FaceOutcome, model: Model, noises: Mapping[int, Noise | None]) -> FaceOutcome:
+def _said(outcome: FaceOutcome, model: Model, found: Mapping[int, Noise | None]) -> FaceOutcome:
     """An outcome with the noise of its face."""
     surface = model.faces[outcome.face].surface
     if surface is None or outcome.status in ("held", "unselected"):
         return outcome
-    noise, reason = noises[surface], outcome.reason
+    noise, reason = found[surface], outcome.reason
     if reason is Reason.FAIR:
         reason = Reason.UNSURE if noise else Reason.CLEAN
     before, after = (each.bending for each in outcome.roughness) if outcome.roughness else (0.0, 0.0)

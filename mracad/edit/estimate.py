@@ -27,6 +27,7 @@ from mracad.bspline.fit import through
 from mracad.bspline.vectors import cross
 from mracad.edit.search import Stiffness, searched
 from mracad.edit.target import Sheet
+from mracad.inspect.evidence import FEW
 from mracad.inspect.noise import Noise
 from mracad.model.displacement import lifted
 from mracad.seam.solve import Problem
@@ -46,9 +47,6 @@ SMALL = 0.01
 
 SURE = 3.0
 """Number of standard deviations of its risk by which an estimate must be better than no change."""
-
-FEW = 60
-"""Number of control points below which the likelihood, not the risk, determines how smooth the shape is."""
 
 LARGE = 30_000
 """Number of control points above which stiffnesses are not searched, and fewer probes of shrinkage are enough."""

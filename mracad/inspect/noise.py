@@ -47,6 +47,13 @@ FEWEST, BESIDE = 16, 8
 ROUNDING = 1e-12
 """Share of the coordinates below which differences are rounding."""
 
+MOST, UNEVEN = 0.8, 1.6
+"""A quantile of lengths of differences, and the largest factor by which it may exceed that of white noise, over the
+median: noise along one direction has 1.4; a few kinks among smooth pieces have more."""
+
+LONGEST = 2.1539
+"""That quantile of the length of a vector of three standard normal numbers."""
+
 LOCAL, CALM, RUN = 7, 0.3, 5
 """Number of differences in a row that are used together, the share of the noise below which there is none, and the
 least number of control points in a row without noise."""
@@ -98,6 +105,8 @@ def noise(net: Net, points: Array, seen: Array) -> Noise | None:
     if not mean:
         return None
     where = seen & ~_runs(_around(net, seen) <= (CALM * mean) ** 2)
+    if not even(net, where & points, seen):
+        return None
     size = _size(net, where & points, seen, where, _along_normals)
     at = net.u.greville(), net.v.greville()
     return Noise(size, where, at) if size > ROUNDING * float(np.abs(net.poles).max()) else None
@@ -111,6 +120,20 @@ def calm(net: Net, points: Array, size: float) -> bool:
         told.append(np.linalg.norm(found[within], axis=1))
     lengths = np.concatenate(told)
     return len(lengths) >= BESIDE and float(np.median(lengths)) <= CALM * size * MEDIAN
+
+
+def even(net: Net, noisy: Array, seen: Array) -> bool:
+    """Whether differences about ``noisy`` control points, of one kind at least, are as evenly long as those of noise;
+    true where there are too few."""
+    least = np.inf
+    for orders, *_ in KINDS:
+        found, share, within = _differences(net, orders, noisy, seen, noisy)
+        use = within & (share > 0)
+        if use.sum() >= FEWEST:
+            lengths = np.linalg.norm(found[use], axis=1) / np.sqrt(share[use])
+            most = float(np.quantile(lengths, MOST)) / LONGEST
+            least = min(least, most / max(float(np.median(lengths)) / MEDIAN, 1e-300))
+    return least <= UNEVEN or least == np.inf
 
 
 def _size(net: Net, points: Array, seen: Array, noisy: Array, deviation: Deviation) -> float:

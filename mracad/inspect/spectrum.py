@@ -25,11 +25,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mracad.bspline.surface import Net
-from mracad.inspect.noise import noise
+from mracad.inspect.evidence import noises
 from mracad.inspect.profiles import SIZES, lines, profiles
 from mracad.memo import kept
 from mracad.model.brep import Face, Model
-from mracad.seam.hold import separate
 
 Array = np.ndarray
 
@@ -168,12 +167,11 @@ def _modes(count: int) -> _Modes:
 
 def spectra(model: Model, faces: Sequence[int]) -> list[Spectrum]:
     """The spectra of NURBS faces of a model."""
-    found = []
-    for index in faces:
-        face = model.faces[index]
-        if face.surface is not None:
-            found.append(_of_face(model.surfaces[face.surface].net, face))
-    return found
+    every = [face for face in (model.faces[i] for i in faces) if face.surface is not None]
+    nets = {face.index: model.surfaces[face.surface].net for face in every if face.surface is not None}
+    noise = noises({face.index: (nets[face.index], [face]) for face in every})
+    sizes = {i: each.size if each else 0.0 for i, each in noise.items()}
+    return [_of_face(nets[face.index], face, sizes[face.index]) for face in every]
 
 
 def together(each: Sequence[Spectrum]) -> Spectrum:
@@ -199,13 +197,11 @@ def _middle(values: Sequence[tuple[float, float]]) -> float:
     return ordered[int(np.searchsorted(weights, weights[-1] / 2))][0]
 
 
-def _of_face(net: Net, face: Face) -> Spectrum:
-    parts = separate(net, [face], [face.index], "g0")
-    found = noise(net, parts.free, parts.visible)
+def _of_face(net: Net, face: Face, noise: float) -> Spectrum:
     ways = [_along(net, face, axis) for axis in (0, 1)]
     area = max(each for _, each in ways)
     u, v = (_direction(energies, area) for energies, _ in ways)
-    return Spectrum((face.index,), area, u, v, found.size if found else 0.0)
+    return Spectrum((face.index,), area, u, v, noise)
 
 
 def _along(net: Net, face: Face, axis: int) -> tuple[dict[int, float], float]:

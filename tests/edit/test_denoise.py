@@ -1,5 +1,8 @@
 """Denoising: noise goes, shape stays, and nobody says at what scale."""
 
+from itertools import pairwise
+
+import cadquery
 import numpy as np
 import pytest
 
@@ -9,13 +12,15 @@ from mracad.edit.estimate import Asked
 from mracad.edit.result import Reason
 from mracad.inspect.noise import Noise
 from mracad.inspect.seams import seams
+from mracad.inspect.spectrum import spectra
 from mracad.occ.view import view
 from mracad.seam.ladders import Creases
 from mracad.spec.steps.smooth import Denoise
+from samples.models import documents
 from tests.edit import panels
 from tests.edit.models import rotation, sheet
-from tests.edit.test_evidence import NOISE as SIZE
-from tests.edit.test_evidence import inner, shape, spoiled
+from tests.inspect.test_evidence import NOISE as SIZE
+from tests.inspect.test_evidence import inner, shape, spoiled
 
 NOISE = 0.3
 NONE: Creases = (frozenset(), frozenset())
@@ -79,6 +84,21 @@ def test_a_clean_face_stays_as_it_is():
         assert (outcome.status, outcome.reason) == ("unchanged", Reason.CLEAN)
 
 
+def test_a_clean_patch_filled_by_the_kernel_stays_as_it_is():
+    """Its control points, of degree 8 over three spans each way, jump about, but not everywhere alike."""
+    corners = [
+        (30 * np.cos(angle), 30 * np.sin(angle), 4 * (-1) ** k) for k, angle in enumerate(np.arange(6) * np.pi / 3)
+    ]
+    sides = [
+        cadquery.Edge.makeLine(cadquery.Vector(*a), cadquery.Vector(*b)) for a, b in pairwise([*corners, corners[0]])
+    ]
+    filled = cadquery.Face.makeNSidedSurface(sides, [cadquery.Vector(0, 0, 10)])
+    model = view(documents.single(filled.wrapped, "filled"))
+    (outcome,) = denoise(model, Denoise()).outcomes
+    assert (outcome.status, outcome.noise) == ("unchanged", 0.0)
+    assert spectra(model, [0])[0].noise == 0.0
+
+
 def test_few_control_points_full_of_noise_tell_nothing():
     (outcome,) = denoise(sheet(panels.whole(2, NOISE)[1]), Denoise()).outcomes
     assert (outcome.status, outcome.noise) == ("unchanged", 0.0)
@@ -96,6 +116,7 @@ def test_few_noisy_control_points_among_clean_ones_tell_enough():
     assert now < 0.5 * before and outcome.noise == pytest.approx(SIZE, rel=0.3)
     assert outcome.taken == pytest.approx(1 - outcome.roughness[1].bending / outcome.roughness[0].bending)
     assert not (after.poles - clean.poles)[~inner(clean, 2)].any()
+    assert spectra(sheet(noisy), [0])[0].noise == outcome.noise
 
 
 def test_outer_points_without_noise_stay():

@@ -92,3 +92,11 @@ def test_few_points_tell_nothing():
     more = np.zeros(net(0.05).poles.shape[:2], bool)
     more[10:16, 10:16] = True
     assert size(net(0.05), more) > 0.0
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_what_a_few_control_points_have_most_of_is_no_noise(seed):
+    """Surfaces fitted in high degree have kinks of any size here and there, and smooth pieces between them."""
+    clean, rng = net(0.0), np.random.default_rng(seed)
+    sizes = rng.exponential(0.6, clean.poles.shape[:2]) ** 3
+    assert size(clean.with_poles(clean.poles + sizes[..., None] * rng.standard_normal(clean.poles.shape))) == 0.0

@@ -1,4 +1,4 @@
-"""The noise of few control points, by the likelihoods with noise and without.
+"""The noise of faces: by differences of control points, or of few by the likelihoods with noise and without.
 
 Differences of order m of the shape (:mod:`mracad.seam.white`) count as independent, with variances τ_u² and τ_v², and
 some control points W as noisy, with variance σ².  With Q = τ_u⁻² D_uᵀD_u + τ_v⁻² D_vᵀD_v of rank r, b = (Q y)_W and the
@@ -12,17 +12,23 @@ noisy ones among them are enough.  Of several orders that with the least varianc
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from mracad.bspline.surface import Net
-from mracad.inspect.noise import Noise
+from mracad.inspect.noise import Noise, calm, even, noise
+from mracad.model.brep import Face
+from mracad.seam.hold import separate
 from mracad.seam.ladders import Creases
+from mracad.seam.metric import creases
 from mracad.seam.white import white
 
 Array = np.ndarray
+
+FEW = 60
+"""Number of control points below which the likelihood, not differences, tells the noise."""
 
 ORDERS = 2, 3, 4
 """Orders of differences."""
@@ -70,6 +76,42 @@ class _Fit:
     left: float
 
 
+def noises(surfaces: Mapping[int, tuple[Net, Sequence[Face]]], stated: float | None = None) -> dict[int, Noise | None]:
+    """The noise of the faces of surfaces, each a net and faces on it; None where none is found.
+
+    Parameters
+    ----------
+    surfaces : mapping of int to (Net, sequence of Face)
+    stated : float, optional
+        Standard deviation of the noise, mm, if known.
+    """
+    found = {i: _noise(net, faces, stated) for i, (net, faces) in surfaces.items()}
+    if stated is None:
+        found |= pooled({i: each for i, each in found.items() if each is not None and each.precision})
+    return found
+
+
+def _noise(net: Net, faces: Sequence[Face], stated: float | None) -> Noise | None:
+    """The noise of the faces of a surface, if any."""
+    numbers = [face.index for face in faces]
+    parts = separate(net, faces, numbers, "g0")
+    inner = separate(net, faces, numbers, "g1").free
+    if parts.free.any() and inner.sum() < FEW:
+        sharp = creases(net, np.ones(net.poles.shape[:2], bool))
+        told = evidence(net, (inner, parts.free, parts.visible), parts.visible, sharp, stated)
+        if told is not None or stated is None:
+            return told
+    found = noise(net, parts.free, parts.visible)
+    if found:
+        still = next(
+            (each for each in (inner, parts.free) if calm(net, parts.visible & ~each, found.size)), found.where
+        )
+        found = replace(found, where=found.where & still)
+    if stated is None:
+        return found
+    return Noise(stated, found.where if found else parts.visible, (net.u.greville(), net.v.greville()))
+
+
 def evidence(
     net: Net, roles: Sequence[Array], seen: Array, creases: Creases, stated: float | None = None
 ) -> Noise | None:
@@ -93,7 +135,7 @@ def evidence(
     for where in roles:
         fits = [fit for fit in every if fit.where is where]
         told = fits if stated else _telling(fits, LARGE * _spacing(net, seen))
-        if told:
+        if told and (stated or even(net, where, seen)):
             found.append(min(told, key=lambda fit: fit.left))
     if not found:
         return None

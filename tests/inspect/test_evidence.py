@@ -5,7 +5,7 @@ import pytest
 
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
-from mracad.edit.evidence import evidence, pooled
+from mracad.inspect.evidence import evidence, pooled
 from mracad.inspect.noise import Noise
 
 NONE = (frozenset(), frozenset())
