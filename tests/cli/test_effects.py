@@ -140,6 +140,7 @@ WAYS = {
     "schema": ("--schema AP203",),
     "seed": ("--seed 5", "--jitter 0.3mm"),
     "size": ("--size 0.7",),
+    "skip_off": ("--skip-off", "--at 500,5,0"),
     "spin": ("--spin 60",),
     "strength": ("--strength 4",),
     "taper": ("--taper 1.2mm",),
@@ -373,7 +374,7 @@ def test_an_option_has_an_effect(case, first, mracad, folder, tmp_path, monkeypa
     given = observed(mracad, folder, tmp_path / "with", changed, old)
     assert without != given, changed
     assert 70 not in (without[0], given[0]), (without[:3], given[:3])
-    assert re.search("clip|refine|overwrite|if_changed", case) or without[0] in (0, 1), (base, without[:3])
+    assert re.search("clip|refine|overwrite|if_changed|skip_off", case) or without[0] in (0, 1), (base, without[:3])
     assert given[0] != 2, (changed, given[:3])
 
 

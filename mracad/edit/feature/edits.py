@@ -73,7 +73,8 @@ def repeat(
     chosen = scope.movable(model)
     feature = feature_of(model, options, chosen, options.feature)
     ground = Ground.of(model, chosen).without(feature.origin.offsets if feature.origin else {})
-    return _edit(model, scope, _laid(ground, feature, places(ground, feature, options), options, scope, {}))
+    found, skipped = places(ground, feature, options)
+    return replace(_edit(model, scope, _laid(ground, feature, found, options, scope, {})), notes=skipped)
 
 
 def transferred(model: Model, options: Transfer, source: Model, scope: Scope) -> Edit:

@@ -46,7 +46,7 @@ class Feet:
     along: Array
     apart: Array
 
-    def part(self, some: slice) -> Feet:
+    def part(self, some: slice | Array) -> Feet:
         """Some of them."""
         return Feet(*(getattr(self, name)[some] for name in self.__dataclass_fields__))
 
@@ -111,25 +111,31 @@ class Ground:
         return best
 
     def feet(self, points: Array) -> Feet:
-        """The nearest points of the ground."""
+        """The nearest points of the ground.
+
+        The surface whose faces come nearest within their trims counts; where that is at a rim, the foot lies on the
+        surface beyond it.
+        """
         from scipy.spatial import cKDTree
 
-        best = np.full(len(points), np.inf)
+        best, apart = (np.full(len(points), np.inf) for _ in range(2))
         surface, uv = np.zeros(len(points), int), np.zeros((len(points), 2))
         trees = {i: cKDTree(patch.seeds[1]) for i, patch in self.patches.items() if len(patch.seeds[0])}
         far = {i: tree.query(points)[0] for i, tree in trees.items()}
-        most = np.min(list(far.values()), axis=0) if far else best
+        most = np.min([self.patches[i].marks.query(points)[0] for i in trees], axis=0) if trees else best
         for index, tree in trees.items():
             patch = self.patches[index]
             near = np.flatnonzero(far[index] - patch.apart <= most)
             count = min(3, tree.n)
             which = tree.query(points[near], k=count)[1].reshape(len(near), count)
             for k in range(count if len(near) else 0):
-                at, apart = closest(patch.net, points[near], patch.seeds[0][which[:, k]])
-                better = (apart < best[near] - 1e-12) & patch.covers(at)
-                here = near[better]
-                best[here], surface[here], uv[here] = apart[better], index, at[better]
-        return self.standing(surface, uv, best)
+                at, off = closest(patch.net, points[near], patch.seeds[0][which[:, k]])
+                some = np.flatnonzero((off < best[near] - 1e-12) & patch.covers(at))
+                reached = np.maximum(off[some], patch.beyond(points[near[some]], at[some]))
+                better = reached < best[near[some]] - 1e-12
+                here, some = near[some[better]], some[better]
+                best[here], apart[here], surface[here], uv[here] = reached[better], off[some], index, at[some]
+        return self.standing(surface, uv, apart)
 
     def standing(self, surface: Array, uv: Array, apart: Array) -> Feet:
         """Feet given by parameters."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +15,11 @@ from mracad.model.brep import Model
 from mracad.spec.places import FEATURE, PLACE, Disc, OnFace, Point, Rectangle, whole
 
 Array = np.ndarray
+
+ON = "give a point on one of them, or select others with --faces"
+
+NAMED = 5
+"""Number of places that a message names."""
 
 
 def face_number(model: Model, text: str, what: str, hint: str) -> int:
@@ -80,8 +85,22 @@ def patch_of(ground: Ground, face: int, label: str) -> Patch:
     return ground.patches[surface]
 
 
-def standing(ground: Ground, places: Sequence[Place], far: float) -> Feet:
-    """The feet of places; raises EditError for one farther than ``far`` (mm) from the ground."""
+def standing(ground: Ground, places: Sequence[Place], far: float, hint: str = ON) -> Feet:
+    """The feet of places; raises EditError that names those farther than ``far`` (mm) from the ground."""
+    feet, off = stood(ground, places, far)
+    if off:
+        raise EditError(told(off), hint)
+    return feet
+
+
+def told(off: Collection[str]) -> str:
+    """Words about places, those about the first of them in full."""
+    more = f"; and {len(off) - NAMED} more" if len(off) > NAMED else ""
+    return "; ".join(list(off)[:NAMED]) + more
+
+
+def stood(ground: Ground, places: Sequence[Place], far: float) -> tuple[Feet, dict[str, int]]:
+    """The feet of places, and words about those farther than ``far`` (mm) from the ground, with their indices."""
     points = np.array([p.point for p in places]).reshape(-1, 3)
     feet = ground.feet(points)
     surface, uv, apart = feet.surface.copy(), feet.uv.copy(), feet.apart.copy()
@@ -92,14 +111,13 @@ def standing(ground: Ground, places: Sequence[Place], far: float) -> Feet:
     on = np.isfinite(apart) & (ground.faces(surface, uv) >= 0)
     given = np.array([p.face is not None for p in places], bool)
     bad = ~on | ~(given | ((apart <= far) & (feet.beside(points) <= SIDEWAYS * far)))
-    if bad.any():
-        i = int(np.flatnonzero(bad)[0])
-        off = f"{apart[i]:.3g} mm away from" if on[i] else "not on"
-        raise EditError(
-            f"{places[i].label} is {off} the faces to edit",
-            "give a point on one of them, or select others with --faces",
-        )
-    return feet
+    off = {}
+    for i in np.flatnonzero(bad).tolist():
+        name = places[i].label
+        if "(" not in name:
+            name += f" ({','.join(f'{round(x, 6) + 0.0:g}' for x in points[i])})"
+        off[f"{name} is {f'{apart[i]:.3g} mm away from' if on[i] else 'not on'} the faces to edit"] = i
+    return feet, off
 
 
 def _domain(patch: Patch) -> str:

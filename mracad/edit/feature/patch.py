@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,7 +16,13 @@ from mracad.model.brep import Face, Model
 from mracad.model.outline import FLAT, outline
 from mracad.model.region import face_region
 
+if TYPE_CHECKING:
+    from scipy.spatial import cKDTree
+
 Array = np.ndarray
+
+RIM = 200
+"""Points of a rim across a surface, at least."""
 
 SEEDS = 90
 """Places in each direction from which a point is projected, at most."""
@@ -79,11 +86,16 @@ class Patch:
     def covers(self, uv: Array, net: Net | None = None) -> Array:
         """Whether parameters ``(q, 2)`` lie in cells, those of a finer net if there is one, that the faces touch."""
         net = net or self.net
+        return np.asarray(self.within(uv) & touched(net, self.faces)[self._cells(uv, net)])
+
+    @staticmethod
+    def _cells(uv: Array, net: Net) -> tuple[Array, Array]:
+        """Knot cells of a net at parameters ``(q, 2)``."""
         u, v = (
             np.clip(np.searchsorted(k.breaks, k.wrap(uv[:, i]), side="right") - 1, 0, k.spans - 1)
             for i, k in enumerate((net.u, net.v))
         )
-        return np.asarray(self.within(uv) & touched(net, self.faces)[u, v])
+        return u, v
 
     def signs(self, uv: Array) -> Array:
         """1.0 where S_u × S_v points outward on the face at, or nearest to, parameters ``(q, 2)``, else -1.0."""
@@ -124,6 +136,49 @@ class Patch:
         uv = pairs(*self._lines)
         uv = uv[self.covers(uv)]
         return uv, np.asarray(self.net.evaluate(uv))
+
+    def beyond(self, points: Array, uv: Array) -> Array:
+        """Distance (mm) of points ``(q, 3)`` from the boundaries of the faces where their feet ``uv`` lie outside all
+        of them; 0 elsewhere."""
+        found = np.zeros(len(uv))
+        some = np.flatnonzero(self._crossed[self._cells(uv, self.net)])
+        if len(some) and len(self._chords):
+            out = some[np.min([self._off(face, uv[some]) for face in self.faces], axis=0) > FLAT]
+            found[out] = self._rims.query(points[out])[0]
+        return found
+
+    @cached_property
+    def _crossed(self) -> Array:
+        """Knot cells that boundaries of the faces cross, a mask."""
+        crossed = [cells for face in self.faces for cells in face_region(self.net, face).crossed]
+        return np.asarray(np.logical_or.reduce(crossed)) if crossed else np.zeros([k.spans for k in self.knots], bool)
+
+    @cached_property
+    def _chords(self) -> Array:
+        """Chords ``(n, 2, 2)`` of the boundaries; none where a face covers its surface."""
+        own = [outline(face, self.net).chords for face in self.faces if face.trims]
+        return np.concatenate([each for each in own if len(each)] or [np.empty((0, 2, 2))])
+
+    @cached_property
+    def _rims(self) -> cKDTree:
+        """Points on the boundaries of the faces."""
+        from scipy.spatial import cKDTree
+
+        p, q = self._chords.swapaxes(0, 1)
+        low, high = self.domain
+        pieces = np.maximum(np.ceil(RIM * np.abs((q - p) / (high - low)).max(axis=1)).astype(int), 1)
+        which = np.repeat(np.arange(len(p)), pieces)
+        share = np.concatenate([np.arange(n) / n for n in pieces])[:, None]
+        return cKDTree(np.asarray(self.net.evaluate(p[which] + share * (q - p)[which])))
+
+    @cached_property
+    def marks(self) -> cKDTree:
+        """Points within the faces and on their boundaries."""
+        from scipy.spatial import cKDTree
+
+        uv, points = self.seeds
+        inside = points[self.beyond(points, uv) == 0]
+        return cKDTree(np.concatenate([inside, self._rims.data]) if len(self._chords) else inside)
 
     def around(self, uv: Array, centre: Array, reach: Array, count: int) -> tuple[Array, Array, Array]:
         """Samples around places, ``count`` in each direction.

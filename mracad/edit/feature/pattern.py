@@ -10,7 +10,7 @@ import numpy as np
 
 from mracad.edit.feature.detail import Feature
 from mracad.edit.feature.ground import SIDEWAYS, Feet, Ground, axes
-from mracad.edit.feature.locate import Place, place, standing
+from mracad.edit.feature.locate import ON, Place, place, standing, stood, told
 from mracad.edit.feature.patch import Patch
 from mracad.errors import EditError, UsageError
 from mracad.model.brep import Face
@@ -25,8 +25,8 @@ STRIDES = 4
 """Steps from one place of a grid to the next."""
 
 
-def places(ground: Ground, feature: Feature, options: Repeat) -> list[Place]:
-    """All places of copies, each with the rotation and scales of the copy there.
+def places(ground: Ground, feature: Feature, options: Repeat) -> tuple[list[Place], tuple[str, ...]]:
+    """All places of copies, each with the rotation and scales of the copy there, and notes on those left out.
 
     Raises
     ------
@@ -55,11 +55,19 @@ def places(ground: Ground, feature: Feature, options: Repeat) -> list[Place]:
     found = [
         replace(p, rotate=p.rotate + turn, size=p.size * options.size, height=p.height * options.height) for p in found
     ]
+    feet, off = stood(ground, found, feature.reach)
+    if off and not options.skip_off:
+        raise EditError(told(off), f"{ON}, or leave such places out with --skip-off")
+    if len(off) == len(found):
+        raise EditError(f"no place is on the faces to edit: {told(off)}", ON)
+    skipped = (f"{len(off)} of {len(found)} places left out: {told(off)}",) if off else ()
+    if off:
+        on = np.setdiff1d(np.arange(len(found)), list(off.values()))
+        found, feet = [found[i] for i in on], feet.part(on)
     if options.jitter is not None or options.spin:
         jitter = 0.0 if options.jitter is None else length(options.jitter, ground.model.diagonal, "jitter")
-        feet = standing(ground, found, feature.reach)
         found = scattered(found, feet, jitter, math.radians(options.spin), options.seed)
-    return found
+    return found, skipped
 
 
 def _beginning(ground: Ground, feature: Feature, first: Place | None) -> tuple[Array, Array]:

@@ -162,6 +162,9 @@ class Repeat(Single, frozen=True, kw_only=True, forbid_unknown_fields=True):
         Annotated[str, places.along] | None,
         Meta(description="EDGE,N[,OFFSET]: N places evenly along edge#4, OFFSET (mm) inside its first selected face."),
     ] = None
+    skip_off: Annotated[
+        bool, Meta(description="Leave out places that are not on the faces, instead of refusing them all.")
+    ] = False
     overlap: Annotated[
         Literal["add", "max", "replace"],
         Meta(

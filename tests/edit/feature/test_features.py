@@ -193,6 +193,21 @@ def _geodesic(name, a, b):
     return np.sqrt((slant + a) ** 2 + slant**2 - 2 * slant * (slant + a) * np.cos(angle))
 
 
+def test_places_off_the_faces_are_named_at_once_or_left_out(feature, plane, tmp_path, capsys):
+    grid = ("repeat", plane, "-o", tmp_path / "out.step", "--feature", feature, "--at", "120,120,0")
+    words = ("--grid", "3x2,50,40", "--at", "300,20,0")
+    run(*grid, *words, code=Code.CANNOT_EDIT)
+    said = capsys.readouterr().err
+    assert "place 3,1 of the grid (220,120,0) is 40 mm away from the faces to edit; place 3,2 of the grid" in said
+    assert "place 2 (300,20,0) is 120 mm away" in said and said.count("\n") == 1
+    assert "place 1,1" not in said and not (tmp_path / "out.step").exists()
+    run(*grid, *words, "--skip-off", "--clip", "--report", tmp_path / "r.json")
+    body = json.loads((tmp_path / "r.json").read_text())
+    assert {c["place"] for c in body["copies"]} == {f"place {i},{j} of the grid" for i in (1, 2) for j in (1, 2)}
+    assert body["notes"][0].startswith("3 of 7 places left out: place 3,1 of the grid")
+    run(*grid[:-1], "300,20,0", "--skip-off", "--overwrite", code=Code.CANNOT_EDIT)
+
+
 def test_motion_leaves_a_clean_surface(plane, tmp_path):
     _, after, report = repeated(plane, tmp_path / "out.step", "--to", "120.4,130.7,0", "--rotate", 40, use="move")
     net = after.surfaces[0].net

@@ -1,10 +1,13 @@
 """Feet on grounds of known geometry."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from mracad.edit.feature.ground import Ground, axes
+from mracad.model.brep import Surface, Trim
 from tests.edit.feature import grounds
-from tests.edit.models import sheet
+from tests.edit.models import segment, sheet
 
 
 def test_feet_are_radial():
@@ -18,6 +21,22 @@ def test_feet_are_radial():
     assert np.abs(np.abs((feet.normals * way).sum(axis=1)) - 1.0).max() < 1e-9
     assert feet.beside(far * way).max() < 1e-6
     assert np.abs(feet.part(slice(3, 5)).points - feet.points[3:5]).max() == 0
+
+
+def test_a_surface_counts_only_within_its_trims():
+    """Above a plane lies another, trimmed to its left third: over the rest of it places are on the lower one."""
+    lower, upper = grounds.uneven(), grounds.uneven(origin=(0.0, 0.0, 1.0))
+    corners = [(0, 0), (0.3, 0), (0.3, 1), (0, 1)]
+    trims = tuple(Trim(i, segment(corners[i], corners[(i + 1) % 4])) for i in range(4))
+    whole = sheet(lower)
+    faces = (whole.faces[0], replace(whole.faces[0], index=1, surface=1, trims=trims))
+    model = replace(whole, surfaces=(whole.surfaces[0], Surface(1, upper, (1,))), faces=faces, edges=())
+    points = np.array([[20.0, 90.0, 0.8], [90.0, 90.0, 0.8], [58.0, 90.0, 0.8], [60.3, 90.0, 0.8]])
+    ground = Ground.of(model, {0, 1})
+    feet = ground.feet(points)
+    assert feet.surface.tolist() == [1, 0, 1, 1]  # the last is nearest to the rim, and its foot beyond it
+    assert ground.faces(feet.surface, feet.uv).tolist() == [1, 0, 1, -1]
+    assert np.abs(feet.apart - [0.2, 0.8, 0.2, 0.2]).max() < 1e-9
 
 
 def test_beside_is_what_is_not_along_the_normal():
