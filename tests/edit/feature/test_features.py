@@ -22,7 +22,7 @@ from mracad.occ.step import read_step, write_step
 from mracad.occ.view import view
 from mracad.spec.steps import Repeat, Single
 from samples.models import geometry
-from samples.models.panel import panel_shell
+from samples.models.panel import sewn
 from samples.models.splines import split
 from tests.conftest import CORPUS
 from tests.edit import panels
@@ -169,7 +169,7 @@ def test_a_feature_of_curved_ground_is_the_same_elsewhere(source, target, tmp_pa
     bare = grounds.above(target, lambda a, b: 0 * a, half=30.0, spans=40)
     far = np.array([0.0, 300.0, 0.0])
     other = shapes.face_on(geometry.surface(bare.poles + far, bare.u.knots, bare.v.knots, (3, 3)))
-    path = shapes.save(shapes.compound(panel_shell(rows), other), tmp_path / "in.step")
+    path = shapes.save(shapes.compound(sewn(rows), other), tmp_path / "in.step")
     zero = np.zeros(1)
     top = [np.stack(grounds.GROUNDS[name](zero, zero, zero), axis=1)[0] for name in (source, target)]
     _, after, report = repeated(
