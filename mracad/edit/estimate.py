@@ -313,7 +313,7 @@ def best(noisy: Noisy, start: Stiffness, asked: Asked) -> Array:
 
     few = noisy.own.sum() < FEW
     at = start if few or len(y) > LARGE else searched(start, score)
-    tried = ((at, True), (start, False)) if noisy.problem.rimmed else ((at, True),)
+    tried = ((at, True), (at, False), (start, False)) if noisy.problem.rimmed else ((at, True),)
     every = [(noisy.linear(noisy.spline(at, held), y), at, held) for at, held in tried]
     risk, at, held = min(every, key=lambda each: each[0].total)
     delta = noisy.spline(at, held)(y)

@@ -31,10 +31,9 @@ def errors(net):
     return [float(np.sqrt((off[where] ** 2).mean())) for where in (rim, ~rim)]
 
 
-@pytest.mark.parametrize(
-    ("edit", "options", "most"), [(smooth, Smooth(scale="25mm"), 1.2), (denoise, Denoise(), np.inf)]
-)
+@pytest.mark.parametrize(("edit", "options", "most"), [(smooth, Smooth(scale="25mm"), 1.2), (denoise, Denoise(), 1.4)])
 def test_a_rim_that_moves_gets_as_fair_as_the_inside(noisy, edit, options, most):
+    """Estimates know less about a rim than about the inside; but noise of the corners, which stay, is not spread."""
     model = sheet(noisy)
     held, free = (
         edit(model, structs.replace(options, free_edges=way)).displacement.applied(model).surfaces[0].net
