@@ -184,9 +184,9 @@ def _sheet(index: int, origin: Net, every: tuple[Face, ...], faces: tuple[Face, 
     metric = smoothed(net, points, SMOOTHER**4 * stiffness(wavelength), stretch)
     form = forms(net, metric, points, sharp, stretch)
     depends = seen(net, form)
-    trend, base = (at_scale(net, stretch.times(waves * wavelength), sharp) for waves in (TREND, BASE))
-    if stretch.even and stretch.limit and stretch.limit.tight:  # projected on splines, rounds would bend all around
-        trend = net.with_poles(np.zeros_like(net.poles))
+    finer = stretch.limit.finer(net, stretch.times(TREND * wavelength)) if stretch.limit else None
+    trend = at_scale(net, stretch.times(TREND * wavelength), sharp, finer)
+    base = at_scale(net, stretch.times(BASE * wavelength), sharp)
     reach = stretch.times(wish.spread * wavelength)
     sheet = Sheet(index, origin, net, every, faces, metric, sharp, wavelength, stretch, reach, trend, base)
     alone = Problem({index: Space(net, form, depends, depends, sheet.trend.poles)})

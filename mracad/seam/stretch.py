@@ -68,13 +68,20 @@ class Limit:
                 break
         return cls(max(wavelengths) / (2 * np.pi), tuple(looks))
 
-    @property
-    def tight(self) -> bool:
-        """Whether the surface bends too much anywhere for the longest length."""
-        length, net = self.looks[0]
-        us, vs = net.u.greville()[:, None], net.v.greville()[:, None]
-        mean, half = _halves(Limit(self.length, self.looks[:1]).shape(us, vs, orthonormal(net, us, vs)))
-        return bool(((np.abs(mean) + half) * length > THETA).any())
+    def finer(self, net: Net, lengths: tuple[float, float]) -> tuple[Array, Array]:
+        """By how much lengths along u and v (mm) exceed 2 θ r in each span, r the smallest radius, where ℓ exceeds half
+        of θ r; elsewhere 1."""
+        us, vs = (((knots.breaks[:-1] + knots.breaks[1:]) / 2)[:, None] for knots in (net.u, net.v))
+        p, q, r = orthonormal(net, us, vs)
+        a, b, c = self.shape(us, vs, (p, q, r))
+        skew = q / p
+        along_v = (c - 2 * skew * b + skew * skew * a) / (1 + skew * skew)
+        bent = np.abs(a).max(axis=1), np.abs(along_v).max(axis=0)
+        one, other = (
+            np.where(2 * self.length * each > THETA, np.maximum(size * each / (2 * THETA), 1.0), 1.0)
+            for size, each in zip(lengths, bent, strict=True)
+        )
+        return one, other
 
     def shape(self, u: Array, v: Array, frame: Form) -> Form:
         """The shape operator in the frame (p, q, r: p ∂_u and q ∂_u + r ∂_v are orthonormal), ``(qu, qv)`` each."""

@@ -174,13 +174,25 @@ def at_scale(
     net: Net,
     scale: float | tuple[float, float],
     keep: tuple[AbstractSet[float], AbstractSet[float]] = (frozenset(),) * 2,
+    finer: tuple[Array, Array] | None = None,
 ) -> Net:
-    """A net over its own knots without detail finer than a scale (mm), or one scale along u and one along v; the breaks
-    in u and v given in ``keep`` stay."""
+    """A net over its own knots without detail finer than a scale.
+
+    Parameters
+    ----------
+    net : Net
+    scale : float or (float, float)
+        mm; the same, or one along u and one along v.
+    keep : (set of float, set of float)
+        Breaks in u and v that stay.
+    finer : (ndarray (spans,), ndarray (spans,)), optional
+        By how much the scale is divided in each span, along u and along v.
+    """
     poles = net.poles
     scales = scale if isinstance(scale, tuple) else (scale, scale)
     for axis, knots in enumerate((net.u, net.v)):
-        coarse = ladder_for_scale(knots, arc_lengths(net, axis), scales[axis], keep=keep[axis])
+        lengths = arc_lengths(net, axis) * (1.0 if finer is None else finer[axis])
+        coarse = ladder_for_scale(knots, lengths, scales[axis], keep=keep[axis])
         if coarse != knots:
             poles = projection(coarse, knots).apply(poles, axis=axis)
     return net.with_poles(poles)
