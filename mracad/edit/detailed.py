@@ -15,7 +15,6 @@ import numpy as np
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
 from mracad.edit.carry import Laid, Way
-from mracad.edit.fair import DETAIL
 from mracad.edit.result import Edit, Reason
 from mracad.edit.target import Sheet, Wish, largest, stiffness
 from mracad.edit.tolerances import COARSE, RESTORED
@@ -97,7 +96,7 @@ class Detailed(Wish):
     def detail(self, alone: Problem, sheet: Sheet) -> float:
         """The largest change in the target; even the smallest details count."""
         found = largest(self, alone, sheet)
-        return max(found, 2 * DETAIL[0], 2 * DETAIL[1] * sheet.wavelength) if found else 0.0
+        return max(found, 2 * sheet.least) if found else 0.0
 
     def target(self, problem: Problem, sheets: Mapping[int, Sheet], joined: Joints) -> Array:
         """The details as carried by the surfaces, ``(points, 3)``."""

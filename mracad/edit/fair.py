@@ -39,9 +39,6 @@ Array = np.ndarray
 SHARP = 0.2, 0.5
 """Curvatures times ℓ above which less is done, and above which nothing is: there the filter would remove shape."""
 
-DETAIL = 1e-7, 1e-6
-"""Least displacement that counts as detail: the tolerance of coincidence, mm, and a share of the wavelength."""
-
 
 @dataclass(frozen=True)
 class Filter(Wish):
@@ -153,7 +150,7 @@ def faired(
     if mends.moved:
         wishes = replace(wishes, fit=0.0, close_gaps=False)
     now = sheets(mends.model, movable, wish) if mends.moved else every
-    rough = {i: each for i, each in now.items() if each.detail > max(DETAIL[0], DETAIL[1] * each.wavelength)}
+    rough = {i: each for i, each in now.items() if each.detail > each.least}
     joined = joints(mends.model, _faces(rough), wishes)
     result = drive(Scene(mends.model, rough, joined, tolerances, refine), wish, progress)
     return replace(mends.before(result, every), sheets=every)

@@ -124,7 +124,8 @@ class Moved:
             return self
         (amount,), (changes,), (limits,) = amounts(self.tried, np.zeros(1), np.array([self.amount]), tolerances)
         found = replace(self, amount=amount, changes=changes, limits=limits or self.limits)
-        return found if gained(changes, tolerances) else replace(found.undone(), limits=found.limits)
+        enough = gained(changes, tolerances, self.sheet.least)
+        return found if enough else replace(found.undone(), limits=found.limits)
 
     def displacement(self) -> Offset:
         """The displacement over the original surface."""

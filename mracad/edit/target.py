@@ -31,6 +31,10 @@ TREND, BASE = 2.5, 6.0
 """Waves longer than the first (in wavelengths) are shape; those longer than the second are the base for the judge."""
 
 
+DETAIL = 1e-7, 1e-6
+"""Least displacement that counts as detail: the tolerance of coincidence, mm, and a share of the wavelength."""
+
+
 class Wish(Protocol):
     """The target of an edit, to be subclassed.
 
@@ -155,6 +159,11 @@ class Sheet:
     def movable(self) -> frozenset[int]:
         """Indices of the faces that may move."""
         return frozenset(face.index for face in self.faces)
+
+    @property
+    def least(self) -> float:
+        """Least displacement that counts, mm."""
+        return max(DETAIL[0], DETAIL[1] * self.wavelength)
 
 
 def stiffness(wavelength: float) -> float:

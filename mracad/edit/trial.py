@@ -93,6 +93,7 @@ class Trial:
         surfaces = [(space.net, members[i].base, members[i].faces) for i, space in spaces.items()]
         self.nets = [space.net for space in spaces.values()]
         self.stretches = [members[i].stretch for i in spaces]
+        self.least = [members[i].least for i in spaces]
         self.watch = Watch(surfaces, self.width, [members[i].reach for i in spaces])
 
     def most(self, target: Array) -> float:
@@ -134,8 +135,8 @@ class Trial:
     def _verdict(self, tried: Tried, target: Array, floor: Array, steps: int) -> Verdict:
         delta = np.concatenate([part.reshape(-1, 3) for part in tried.parts])
         shares, found, limits = amounts(tried, floor, self._ceilings(delta), self.tolerances, steps)
-        for i, faces in enumerate(found):
-            if not gained(faces, self.tolerances):
+        for i, (faces, least) in enumerate(zip(found, self.least, strict=True)):
+            if not gained(faces, self.tolerances, least):
                 shares[i], found[i] = 0.0, {face: change.undone() for face, change in faces.items()}
         return Verdict(tried, shares, found, limits, *self._gains(delta, target, shares))
 
@@ -163,7 +164,7 @@ class Trial:
         """Whether a displacement would reduce the roughness of each surface, whatever it adds to others."""
         both = zip(self.problem.spaces.values(), self.problem.split(delta).values(), strict=True)
         found = self.watch.changes({i: displaced(space.net, part) for i, (space, part) in enumerate(both)})
-        return [any(better(change, GAIN[0]) for change in faces.values()) for faces in found.values()]
+        return [_fairer(faces, least, GAIN[0]) for faces, least in zip(found.values(), self.least, strict=True)]
 
     def allowed_unheld(self, target: Array) -> bool:
         """Whether the judge would allow a whole target if nothing were held."""
@@ -218,9 +219,13 @@ class Trial:
         return np.array(list(ceiling.values()))
 
 
-def gained(faces: Mapping[int, Change], tolerances: Tolerances) -> bool:
-    """Whether one of the faces of a surface gained enough to be changed."""
-    return not tolerances.fairer or any(better(change, *GAIN) for change in faces.values())
+def gained(faces: Mapping[int, Change], tolerances: Tolerances, least: float) -> bool:
+    """Whether one of the faces of a surface gained enough to be changed, and moved by more than ``least`` (mm)."""
+    return not tolerances.fairer or _fairer(faces, least, *GAIN)
+
+
+def _fairer(faces: Mapping[int, Change], least: float, *gain: float) -> bool:
+    return any(each.motion > least and better(each, *gain) for each in faces.values())
 
 
 def worth(verdict: Verdict) -> float:

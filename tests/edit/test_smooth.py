@@ -124,6 +124,24 @@ def test_what_is_fair_at_a_scale_stays_and_says_so():
         assert not edit.displacement.offsets
 
 
+@pytest.mark.parametrize(("share", "status"), [(0.4, "unchanged"), (1.25, "edited")])
+def test_ripples_below_a_millionth_of_the_scale_stay(share, status):
+    """Alternating control points make a ripple of a third of their displacement along either direction."""
+    net = uniform(ripple=9 * share * 4e-6)
+    _, outcome = smoothed(net, scale="4mm", free_edges="smooth", corners="move")
+    assert outcome.status == status and outcome.detail > 4e-6
+    assert outcome.reason == (Reason.FAIR if status == "unchanged" else None)
+
+
+def uniform(ripple):
+    """A plane of even spans of a millimetre with a ripple across both."""
+    u, v = (KnotVector.clamped(np.arange(n + 1.0), 3) for n in SPANS)
+    x, y = np.meshgrid(u.greville(), v.greville(), indexing="ij")
+    sign = (-1.0) ** np.add.outer(np.arange(u.count), np.arange(v.count))
+    sign[[0, 1, -2, -1]] = sign[:, [0, 1, -2, -1]] = 0.0
+    return Net(u, v, np.stack([x, y, ripple * sign], axis=-1))
+
+
 class Nothing(Filter):
     """A filter that has no way but to stay put."""
 
