@@ -13,7 +13,7 @@ from mracad.bspline.surface import Net
 from mracad.inspect.roughness import Growth
 from mracad.model.brep import Face, Model
 from mracad.model.cells import quadrature
-from mracad.seam.energy import forms
+from mracad.seam.energy import Forms, forms
 from mracad.seam.interface import Joints
 from mracad.seam.ladders import Creases
 from mracad.seam.metric import SMOOTHER, creases, seen, smoothed
@@ -33,6 +33,9 @@ TREND, BASE = 2.5, 6.0
 
 DETAIL = 1e-7, 1e-6
 """Least displacement that counts as detail: the tolerance of coincidence, mm, and a share of the wavelength."""
+
+ROUGHEST = 2.0
+"""Bending of a trend over that of its surface above which it does not follow it."""
 
 
 class Wish(Protocol):
@@ -196,10 +199,21 @@ def _sheet(index: int, origin: Net, every: tuple[Face, ...], faces: tuple[Face, 
     finer = stretch.limit.finer(net, stretch.times(TREND * wavelength)) if stretch.limit else None
     trend = at_scale(net, stretch.times(TREND * wavelength), sharp, finer)
     base = at_scale(net, stretch.times(BASE * wavelength), sharp)
+    if not _follows(trend, net, form):
+        trend = net.with_poles(np.zeros_like(net.poles))
     reach = stretch.times(wish.spread * wavelength)
     sheet = Sheet(index, origin, net, every, faces, metric, sharp, wavelength, stretch, reach, trend, base)
     alone = Problem({index: Space(net, form, depends, depends, sheet.trend.poles)})
     return replace(sheet, detail=wish.detail(alone, sheet))
+
+
+def _follows(trend: Net, net: Net, form: Forms) -> bool:
+    """Whether a trend follows its surface: splines that cannot, for example where the parameter changes its speed, bend
+    far more than it does."""
+    middle, stiff = net.poles.mean(axis=(0, 1)), form.bending + form.creases
+    points = ((each.poles - middle).reshape(-1, 3) for each in (net, trend))
+    surface, own = (float((x * (stiff @ x)).sum()) for x in points)
+    return own <= ROUGHEST * surface
 
 
 def largest(wish: Wish, alone: Problem, sheet: Sheet) -> float:
