@@ -10,6 +10,7 @@ from typing import Protocol
 import numpy as np
 
 from mracad.bspline.surface import Net
+from mracad.bspline.vectors import cross
 from mracad.inspect.roughness import Growth
 from mracad.model.brep import Face, Model
 from mracad.model.cells import quadrature
@@ -35,7 +36,7 @@ DETAIL = 1e-7, 1e-6
 """Least displacement that counts as detail: the tolerance of coincidence, mm, and a share of the wavelength."""
 
 ROUGHEST = 2.0
-"""Bending of a trend over that of its surface above which it does not follow it."""
+"""Bending of what a trend leaves of its surface, over that of the surface, above which it does not follow it."""
 
 
 class Wish(Protocol):
@@ -199,7 +200,7 @@ def _sheet(index: int, origin: Net, every: tuple[Face, ...], faces: tuple[Face, 
     finer = stretch.limit.finer(net, stretch.times(TREND * wavelength)) if stretch.limit else None
     trend = at_scale(net, stretch.times(TREND * wavelength), sharp, finer)
     base = at_scale(net, stretch.times(BASE * wavelength), sharp)
-    if not _follows(trend, net, form):
+    if not _follows(trend, net, metric, form):
         trend = net.with_poles(np.zeros_like(net.poles))
     reach = stretch.times(wish.spread * wavelength)
     sheet = Sheet(index, origin, net, every, faces, metric, sharp, wavelength, stretch, reach, trend, base)
@@ -207,13 +208,14 @@ def _sheet(index: int, origin: Net, every: tuple[Face, ...], faces: tuple[Face, 
     return replace(sheet, detail=wish.detail(alone, sheet))
 
 
-def _follows(trend: Net, net: Net, form: Forms) -> bool:
-    """Whether a trend follows its surface: splines that cannot, for example where the parameter changes its speed, bend
-    far more than it does."""
-    middle, stiff = net.poles.mean(axis=(0, 1)), form.bending + form.creases
-    points = ((each.poles - middle).reshape(-1, 3) for each in (net, trend))
-    surface, own = (float((x * (stiff @ x)).sum()) for x in points)
-    return own <= ROUGHEST * surface
+def _follows(trend: Net, net: Net, metric: Net, form: Forms) -> bool:
+    """Whether a trend follows its surface: elsewhere what is left, along the normals, bends more than the surface."""
+    us, vs = net.u.greville(), net.v.greville()
+    normals = cross(metric.tangents(us, vs, 0), metric.tangents(us, vs, 1))
+    normals /= np.maximum(np.linalg.norm(normals, axis=-1, keepdims=True), 1e-300)
+    left = ((net.poles - trend.poles) * normals).sum(axis=-1).ravel()
+    points, stiff = (net.poles - net.poles.mean(axis=(0, 1))).reshape(-1, 3), form.bending + form.creases
+    return float(left @ (stiff @ left)) <= ROUGHEST * float((points * (stiff @ points)).sum())
 
 
 def largest(wish: Wish, alone: Problem, sheet: Sheet) -> float:
