@@ -35,6 +35,36 @@ class Failure:
         return f"{self.status} in a {self.kind}" + (f" of #{self.face + 1}" if self.face is not None else "")
 
 
+@dataclass(frozen=True, eq=False)
+class Spot:
+    """A place on a face.
+
+    Attributes
+    ----------
+    face : int
+    uv : (float, float)
+    point : ndarray (3,)
+        mm, in the part's frame.
+    distance : float
+        From the point that was asked for, mm.
+    normal : ndarray (3,) or None
+        Outward; None at a pole.
+    along : ndarray (3,) or None
+        Direction in which u runs.
+    bends : tuple of (float, ndarray (3,))
+        Principal curvatures (1/mm, positive where convex) and their directions; none where they are not defined, equal
+        ones with any direction.
+    """
+
+    face: int
+    uv: tuple[float, float]
+    point: Array
+    distance: float
+    normal: Array | None
+    along: Array | None
+    bends: tuple[tuple[float, Array], ...]
+
+
 @dataclass(frozen=True)
 class Validity:
     """The kernel's verdict on a document; a part with several instances counts once.

@@ -135,6 +135,19 @@ def test_info(mracad, samples):
     assert "nothing" not in result.out
 
 
+def test_info_at_a_place(mracad, samples):
+    result = mracad("info", samples / "panel_clean.step", "--at", "150,100,60", "--at", "-40,0,0")
+    *_, first, frame, second, _ = result.out.splitlines()
+    assert re.match(r"#\d \(bspline\) at u [\d.]+, v [\d.]+: [\d.,]+, [\d.]+ mm away", first), first
+    assert "normal" in frame and "u runs along" in frame and "1/mm along" in frame
+    assert re.search(r"[4-9]\d(\.\d+)? mm away", second), second
+    body = json.loads(mracad("info", samples / "panel_clean.step", "--at", "150,100,60", "--json").out)
+    (place,) = body["places"]
+    assert abs(np.linalg.norm(np.subtract(place["point"], (150, 100, 60))) - place["distance"]) < 1e-9
+    assert sum(face["area"] for face in body["faces"]) > 300 * 200
+    assert mracad("info", samples / "panel.step", "--at", "1,2").code == 2
+
+
 def test_info_lists_everything_on_request(mracad, samples):
     short, long = (mracad("info", samples / "assembly.step", *words).out for words in ([], ["--all"]))
     assert len(long.splitlines()) > len(short.splitlines()) and "edge#" in long

@@ -140,6 +140,7 @@ WAYS = {
     "schema": ("--schema AP203",),
     "seed": ("--seed 5", "--jitter 0.3mm"),
     "size": ("--size 0.7",),
+    "places": ("--at 1,2,3",),
     "skip_off": ("--skip-off", "--at 500,5,0"),
     "spin": ("--spin 60",),
     "strength": ("--strength 4",),

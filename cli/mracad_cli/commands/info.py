@@ -35,18 +35,31 @@ from mracad_cli.say import json_text, say
         "--all",
         "everything",
         is_flag=True,
-        help="Also list instances, faces that are not NURBS and every seam.",
+        help="Also list instances, faces that are not NURBS, the area, centre and box of faces, and every seam.",
+    ),
+    click.option(
+        "--at",
+        "places",
+        metavar="X,Y,Z",
+        multiple=True,
+        help="Also tell the face nearest to a point (mm), with its parameters, frame and curvature there; repeatable.",
     ),
     options.printing,
 )
-def command(reading: Reading, scale: str, keep: Any, everything: bool, as_json: bool) -> None:
+def command(reading: Reading, scale: str, keep: Any, everything: bool, places: tuple[str, ...], as_json: bool) -> None:
+    import numpy as np
+
     from mracad.inspect.scales import scales
     from mracad.inspect.seams import seams
     from mracad.occ.check import check
+    from mracad.occ.measure import face_masses
+    from mracad.occ.probe import middles, nearest
     from mracad.occ.view import view
+    from mracad.spec.places import vector
     from mracad_cli.outputs import read
     from mracad_cli.render import info
 
+    points = [np.array(vector(text, "at")) for text in places]
     with Progress() as progress:
         progress("reading", 0, 1)
         document = read(reading)
@@ -58,5 +71,7 @@ def command(reading: Reading, scale: str, keep: Any, everything: bool, as_json: 
         measures = seams(model)
         progress("checking", 0, 1)
         valid = check(document)
-    seen = info.Seen(document, model, width, keep, found, measures, valid)
+        sizes = list(zip(face_masses(document), middles(document), strict=True)) if everything or as_json else []
+        spots = [nearest(document, model, point) for point in points] if model.faces else []
+    seen = info.Seen(document, model, width, keep, found, measures, valid, sizes, spots)
     say(*([json_text(info.body(seen))] if as_json else info.lines(seen, everything)))

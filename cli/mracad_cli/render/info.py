@@ -15,13 +15,17 @@ if TYPE_CHECKING:
     from mracad.inspect.scales import FaceScales
     from mracad.inspect.seams import SeamMeasure
     from mracad.model.brep import Face, Model
-    from mracad.model.facts import Validity
+    from mracad.model.facts import Mass, Spot, Validity
     from mracad.occ.document import Document
 
 
 @dataclass(frozen=True)
 class Seen:
-    """What was read and measured; ``width`` is the scale, mm, and ``keep`` the continuity that edges keep."""
+    """What was read and measured.
+
+    ``width`` is the scale, mm, ``keep`` the continuity that edges keep, ``sizes`` those of faces with places in their
+    middles, and ``spots`` the places that were asked for.
+    """
 
     document: Document
     model: Model
@@ -30,6 +34,8 @@ class Seen:
     scales: Mapping[int, FaceScales]
     seams: list[SeamMeasure]
     valid: Validity
+    sizes: Sequence[tuple[Mass, Spot]]
+    spots: Sequence[Spot]
 
 
 def body(seen: Seen) -> dict[str, Any]:
@@ -48,9 +54,10 @@ def body(seen: Seen) -> dict[str, Any]:
         "diagonal": model.diagonal,
         "scale": seen.width,
         "faces": [
-            {**_facts(model, face, own), **_judged(face, seen.scales.get(face.index))}
-            for face, own in zip(model.faces, face_boxes(seen.document, model), strict=True)
+            {**_facts(model, face, own), **_size(*size), **_judged(face, seen.scales.get(face.index))}
+            for face, own, size in zip(model.faces, face_boxes(seen.document, model), seen.sizes, strict=True)
         ],
+        "places": [_place(each) for each in seen.spots],
         "seams": {**json.plain(summary(seen.seams)), "each": [json.seam(m) for m in seen.seams]},
         "valid": json.validity(seen.valid),
     }
@@ -59,6 +66,7 @@ def body(seen: Seen) -> dict[str, Any]:
 def lines(seen: Seen, everything: bool) -> list[str]:
     """A summary; with ``everything`` also instances, faces that are not NURBS and every seam."""
     from mracad.inspect.seams import summary
+    from mracad.occ.boxes import face_boxes
     from mracad.occ.instance import instances
 
     model, kinds = seen.model, Counter(face.kind for face in seen.model.faces)
@@ -75,10 +83,57 @@ def lines(seen: Seen, everything: bool) -> list[str]:
         said.append(f"detail below {text.mm(seen.width)}, free with all edges held at {seen.keep.upper()}")
         head = ["face", "type", "degree", "net", "shape", "free", "spans mm", "at this scale", "from", "name"]
         said += _table([head, *(_row(model, face, seen.scales.get(face.index)) for face in shown)])
+    if everything and seen.sizes:
+        head = ["face", "area mm²", "centre", "box", "u runs along"]
+        boxes = face_boxes(seen.document, model)
+        said += _table([head, *(_size_row(i, *seen.sizes[i], box) for i, box in enumerate(boxes))])
     if everything and seen.seams:
         head = ["edge", "faces", "gap mm", "angle °", "curvature jump 1/mm", "relative", "at"]
         said += _table([head, *map(_seam_row, seen.seams)])
+    for each in seen.spots:
+        said += _spot_lines(model.faces[each.face], each)
     return said
+
+
+def _size(mass: Mass, middle: Spot) -> dict[str, Any]:
+    """Area and centre of a face (mm), and the direction of u in the middle of its parameters."""
+    along = None if middle.along is None else middle.along.tolist()
+    return {"area": mass.area, "centre": list(mass.centre), "along_u": along}
+
+
+def _size_row(index: int, mass: Mass, middle: Spot, box: np.ndarray) -> Sequence[str]:
+    low, high = box
+    along = "" if middle.along is None else _vector(middle.along)
+    return f"#{index + 1}", f"{mass.area:.6g}", _vector(mass.centre), f"{_vector(low)} to {_vector(high)}", along
+
+
+def _place(spot: Spot) -> dict[str, Any]:
+    """A place on a face; lengths in millimetres, curvatures in 1/mm, positive where convex."""
+    ways = {"normal": spot.normal, "along_u": spot.along}
+    return {
+        "face": spot.face + 1,
+        "uv": list(spot.uv),
+        "point": spot.point.tolist(),
+        "distance": spot.distance,
+        **{name: None if way is None else way.tolist() for name, way in ways.items()},
+        "curvature": [{"value": k, "along": way.tolist()} for k, way in spot.bends],
+    }
+
+
+def _spot_lines(face: Face, spot: Spot) -> list[str]:
+    u, v = spot.uv
+    said = [
+        f"#{spot.face + 1} ({face.kind}) at u {u:.6g}, v {v:.6g}: {_vector(spot.point)}, {text.mm(spot.distance)} away"
+    ]
+    ways = {"normal": spot.normal, "u runs along": spot.along}
+    frame = [f"{name} {_vector(way)}" for name, way in ways.items() if way is not None]
+    bends = [f"{k:.4g} 1/mm along {_vector(way)}" if k else "0" for k, way in spot.bends]
+    curvature = f"curvature {' and '.join(bends)}" if bends else "no curvature there"
+    return [*said, "  " + "; ".join([*frame, curvature])]
+
+
+def _vector(values: Sequence[float] | np.ndarray) -> str:
+    return ",".join(f"{round(float(x), 6) + 0.0:.6g}" for x in values)
 
 
 def _seam_row(m: SeamMeasure) -> Sequence[str]:
