@@ -16,7 +16,7 @@ from mracad.bspline.fit import Knots, divided, middles, missing, offsets_over, s
 from mracad.bspline.surface import Net, pairs
 from mracad.bspline.vectors import cross
 from mracad.edit.carry import Laid
-from mracad.edit.feature.fit import MISSED, MOST, NARROWEST
+from mracad.edit.feature.fit import MOST, NARROWEST
 from mracad.edit.feature.ground import Ground
 from mracad.edit.feature.ideal import Way
 from mracad.edit.feature.patch import Patch
@@ -200,8 +200,8 @@ class Carried:
         The displacement ``(q, 3)`` at its parameters, in the part's frame, mm.
     own : Net
         Offsets that its own detail gets, in the part's frame.
-    height : float
-        Size of the displacement, mm.
+    missed : float
+        Allowed error of the displacement, mm; 0 if there is none.
     least : float
         Width of the knot spans that hold it, mm.
     wavelength : float
@@ -211,7 +211,7 @@ class Carried:
     target: Patch
     ideal: Callable[[Array], Array]
     own: Net
-    height: float
+    missed: float
     least: float
     wavelength: float
 
@@ -224,10 +224,10 @@ class Carried:
             uv = uv[self.target.covers(uv)]
             sites = [(uv, spans(kv, uv[:, axis])) for axis, kv in enumerate(knots)]
             delta = offsets_over(self.target.net, knots, self._through(self.target.net.over(*knots)))
-            wanted, limit = self.ideal(uv), MISSED * self.height
-            return missing(self.target.net, delta, sites, lambda _: wanted, limit, (self.least, self.least))
+            wanted = self.ideal(uv)
+            return missing(self.target.net, delta, sites, lambda _: wanted, self.missed, (self.least, self.least))
 
-        return net.over(*divided((net.u, net.v), more)) if self.height else net
+        return net.over(*divided((net.u, net.v), more)) if self.missed else net
 
     def laid(self, net: Net) -> Laid:
         """The displacement as offsets over the knots of a net of the surface."""

@@ -11,16 +11,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from mracad.edit.atlas import charts, corners
 from mracad.edit.character import NOTHING, Along, Carried, Character, Nearest, wide_enough
 from mracad.edit.detailed import Detailed, detailed
 from mracad.edit.details import Detail
 from mracad.edit.feature.edits import FACE, transferred
+from mracad.edit.feature.fit import MISSED
 from mracad.edit.feature.ground import Ground
 from mracad.edit.feature.ideal import Way
 from mracad.edit.feature.locate import face_number, patch_of
 from mracad.edit.feature.patch import Patch
 from mracad.edit.mra import load
 from mracad.edit.result import Edit, Reason
+from mracad.edit.texture import Grown, grown
 from mracad.errors import EditError, UsageError
 from mracad.model.brep import Model
 from mracad.spec.places import is_feature
@@ -36,6 +39,12 @@ Shares = Sequence[tuple[float, float, float, float]]
 
 NEAR = 0.05
 """Share of the model's diagonal up to which faces of another model are over its own."""
+
+ROUGHLY = 0.02
+"""Share of its root mean square height by which a texture may be missed."""
+
+FINER = 0.65
+"""Width of knot spans for a texture, in those of its source: its waves are in other places than the knots."""
 
 SOME = 500
 """Number of points at which surfaces are asked whether there is detail over them."""
@@ -165,20 +174,40 @@ def _mapped(origin: Origin, options: Transfer, ground: Ground) -> tuple[dict[int
         if before.index != source.index:
             message = f"{other}: #{face + 1} shares its surface with another face, which gets other detail"
             raise UsageError(message, "give both the detail of one face", other)
-    way = Way(np.radians(options.rotate), options.size, options.height, options.mirror)
-    pieces = {}
     for index, (source, target, text) in taken.items():
         target = replace(target, faces=tuple(face for face in target.faces if face.index in chosen))
         if origin.details:  # which side is outward is not in the file
             faces = tuple(replace(face, reversed=target.faces[0].reversed) for face in source.faces)
             source = replace(source, faces=faces)
-        one, two = origin.own(target), origin.character(source)
-        height = two.height * abs(options.height)
-        if height <= NOTHING and not one.height and origin.gives:
+        taken[index] = source, target, text
+    own = {index: origin.own(target) for index, (_, target, _) in taken.items()}
+    others = {source.index: origin.character(source) for source, *_ in taken.values()}
+    for index, (source, _, text) in taken.items():
+        if others[source.index].height * abs(options.height) <= NOTHING and not own[index].height and origin.gives:
             raise EditError(f"{label}: {text} has no detail in the band", "give another --band")
-        least, wavelength = wide_enough(two.spacing, options.size), origin.wavelength([source.index])
-        pieces[index] = Carried(target, Along(one, two, way), one.detail, height, least, wavelength)
+    pieces = {}
+    for given in others:
+        some = {index: own[index] for index, (source, *_) in taken.items() if source.index == given}
+        wavelength = origin.wavelength([given])
+        least = wide_enough(others[given].spacing * (FINER if options.grow else 1.0), options.size)
+        for index, (ideal, missed) in _ideals(ground.model, some, others[given], wavelength, options).items():
+            pieces[index] = Carried(taken[index][1], ideal, own[index].detail, missed, least, wavelength)
     return pieces, frozenset(chosen)
+
+
+def _ideals(
+    model: Model, own: Mapping[int, Character], other: Character, wavelength: float, options: Transfer
+) -> dict[int, tuple[Callable[[Array], Array], float]]:
+    """For surfaces that get the detail of another one, what they get, and by how much they may miss it (mm)."""
+    way = Way(np.radians(options.rotate), options.size, options.height, options.mirror)
+    if not (options.grow and other.height > NOTHING):
+        missed = MISSED * other.height * abs(options.height)
+        return {i: (Along(each, other, way), missed) for i, each in own.items()}
+    laid = charts(model, own)
+    places = way.back(corners(own, laid))
+    texture = grown(other, wavelength, places.min(axis=0), places.max(axis=0), options.seed)
+    missed = ROUGHLY * float(texture.heights.std()) * abs(options.height)
+    return {i: (Grown(each, laid[i], way, texture), missed) for i, each in own.items()}
 
 
 def _over(model: Model, origin: Origin, options: Transfer, ground: Ground) -> dict[int, Carried]:
@@ -196,7 +225,7 @@ def _over(model: Model, origin: Origin, options: Transfer, ground: Ground) -> di
         ideal = Nearest(own, others, coarse, options.height, NEAR * model.diagonal, wavelength / 2)
         some = target.seeds[0][:: max(len(target.seeds[0]) // SOME, 1)]
         if own.height or not origin.gives or np.abs(ideal(some)).max(initial=0.0) > NOTHING:
-            pieces[index] = Carried(target, ideal, own.detail, height, least, wavelength)
+            pieces[index] = Carried(target, ideal, own.detail, MISSED * height, least, wavelength)
     if not pieces:
         message = f"map: no face of {origin.model.name} with detail in the band is over one of {model.name}"
         raise EditError(message, "give another --band, or pairs of faces, as --map '#3=#7,#4=#8'")

@@ -94,8 +94,8 @@ TOGETHER: Mapping[str, Sequence[tuple[str, Sequence[Words]]]] = {
     ],
     "transfer": [
         (
-            "from_ to map base band mode blend clip taper rotate size height mirror amount max_deviation refine "
-            "gap_tolerance fit_g1 close_gaps free_edges corners",
+            "from_ to map base band mode blend grow seed clip taper rotate size height mirror amount max_deviation "
+            "refine gap_tolerance fit_g1 close_gaps free_edges corners",
             [
                 ("--from", "#1", "--to", "#1", "--band", "0mm:8mm"),
                 ("--map", "place", "--band", "0mm:8mm", "--mode", "replace", "--amount", "0.5"),
@@ -103,6 +103,7 @@ TOGETHER: Mapping[str, Sequence[tuple[str, Sequence[Words]]]] = {
                 ("--map", "#1=#1", "--blend", ":2mm=0", "--blend", "2mm:8mm=0.3", "--free-edges", "smooth"),
                 ("--map", "#1=#1", "--band", ":8mm", "--max-deviation", "0.01mm", "--rotate", "30", "--fit-g1", "10"),
                 ("--map", "#1=#1", "--band", ":8mm", "--gap-tolerance", "0.01mm", "--size", "0.8", "--taper", "0.5mm"),
+                ("--map", "#1=#1", "--band", ":3mm", "--grow", "--seed", "3"),
                 ("--from", "near:5,5,0,radius:1.5", "--to", "5,7,0"),
                 ("--from", "near:5,5,0,radius:1.5", "--to", "5,7,0", "--clip", "--height", "0.5"),
                 ("--from", "near:5,5,0,radius:1.5", "--to", "5,7,0", "--base", "level", "--band", "0mm:8mm"),

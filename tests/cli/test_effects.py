@@ -200,6 +200,8 @@ OWN = {
     "transfer fit_g1": ("--fit-g1 20", f"IN sheet.step {TEXTURES}"),
     "transfer free_edges": ("--free-edges smooth", TEXTURE),
     "transfer gap_tolerance": ("--gap-tolerance 1mm", f"IN halves.step {TEXTURES}"),
+    "transfer grow": ("--grow", "LESS --from LESS --to --map #1=#1 --band 0mm:3mm"),
+    "transfer seed": ("--seed 5", "LESS --from LESS --to --map #1=#1 --band 0mm:3mm --grow"),
     "transfer map": ("--map #1=#2", "LESS --from LESS --to --map #1=#1 --band 0mm:8mm"),
     "transfer max_deviation": ("--max-deviation 0.01mm", TEXTURE),
     "transfer refine": ("--refine never", f"IN strips.step {TEXTURE}"),

@@ -76,6 +76,14 @@ class Transfer(Fairing, frozen=True, kw_only=True, forbid_unknown_fields=True):
             "face's own; 2mm:10mm=0.3 does so in a band of its own, repeatable."
         ),
     ] = ()
+    grow: Annotated[
+        bool,
+        Meta(
+            description="Instead of the other face's detail, which is mirrored where it ends, heights with the same "
+            "spectrum, which go on over any size and across seams without repeating."
+        ),
+    ] = False
+    seed: Annotated[int, Meta(description="Seed of the random numbers of --grow.", ge=0)] = 0
     band: features.Band = None
     edges: Edges = "coupled"
     taper: Annotated[
@@ -123,6 +131,9 @@ class Transfer(Fairing, frozen=True, kw_only=True, forbid_unknown_fields=True):
             raise UsageError("map: place names no faces, and cannot be combined with pairs", "give one of them", "map")
         if self.by_place:
             self._refuse(("rotate", "size", "mirror"), "detail that goes to the nearest place keeps its own")
+            self._refuse(("grow",), "it needs pairs of faces, as --map '#1=#3'")
+        if not self.grow:
+            self._refuse(("seed",), "it needs --grow")
         if self.blend and self.mode == "replace":
             raise UsageError("blend and mode cannot be combined", "give --blend 1 to replace detail")
         banded = any("=" in text for text in self.blend)
