@@ -37,6 +37,9 @@ MOST = 1 << 24
 PASSES = 4
 """How often the energies of octaves are set."""
 
+CHANCE = 2.0
+"""Largest factor by which the heights of an octave are changed: a part that is used may be too small for its waves."""
+
 FAINT = 1e-5
 """Share of the energy up to which that of octaves is left to chance."""
 
@@ -115,18 +118,18 @@ def grown(other: Character, wavelength: float, low: Array, high: Array, seed: in
     Raises
     ------
     EditError
-        For one that would have too many samples.
+        For one that would have too many samples, or none to start from.
     """
     from scipy.fft import irfft2, next_fast_len, rfft2
 
-    step = EDGE / 2.0 ** np.ceil(
-        np.log2(SAMPLES * EDGE / other.spacing)
-    )  # octaves end at 10 mm, as those of spectra do
+    step = EDGE / 2.0 ** np.ceil(np.log2(SAMPLES * EDGE / other.spacing))  # octaves then end where those of spectra do
     counts = [int(size / step) + 1 for size in other.sizes]
     shape = [next_fast_len(int(x / step) + 1 + count, True) for x, count in zip(high - low, counts, strict=True)]
     if max(np.prod(shape, dtype=float), np.prod(counts, dtype=float)) > MOST:
         raise EditError(f"grow: {shape[0]} × {shape[1]} samples are too many", "use a larger --size, or fewer faces")
     heights, away = _sampled(other, step, counts)
+    if not away.any():
+        raise EditError("grow: the face to take detail from is too narrow for it", "leave out --grow, or take another")
     window = faded(away, WIDE * min(other.sizes) / step)
     narrow = np.ones(away.shape) if away.all() else faded(away, NARROW * wavelength / step)
     wanted = _energies(heights, narrow)
@@ -135,11 +138,13 @@ def grown(other: Character, wavelength: float, low: Array, high: Array, seed: in
     field = np.sqrt(np.prod(shape, dtype=float) / (window**2).sum()) * spectrum * noise / np.abs(noise)
     bands = _octaves(np.fft.fftfreq(shape[0]), np.fft.rfftfreq(shape[1]), wanted.shape)
     used = [int(x / step) + 1 for x in high - low]
+    gains = np.ones(wanted.shape)
     for _ in range(PASSES):
-        got = _energies(irfft2(field, shape)[: used[0], : used[1]], None, wanted.shape)
+        got = _energies(irfft2(gains[bands] * field, shape)[: used[0], : used[1]], None, wanted.shape)
         strong = (wanted > FAINT * wanted.sum()) & (got > 0)
-        field = field * np.sqrt(np.where(strong, wanted / np.where(strong, got, 1.0), 1.0))[bands]
-    return Texture(irfft2(field, shape), low, step)
+        change = np.sqrt(np.where(strong, wanted / np.where(strong, got, 1.0), 1.0))
+        gains = np.clip(gains * change, 1.0 / CHANCE, CHANCE)
+    return Texture(irfft2(gains[bands] * field, shape), low, step)
 
 
 def _sampled(other: Character, step: float, counts: Sequence[int]) -> tuple[Array, Array]:

@@ -114,6 +114,12 @@ def test_a_texture_fades_out_at_rims_that_stay(source):
     assert np.abs(half - held / 2).max() <= 1e-9
 
 
+def test_a_part_too_small_for_the_waves_is_not_amplified(source):
+    own = Character.of(Patch.of(sheet(source), 0, {0}), [(0.0, LONGEST, 1.0)])
+    found = grown(own, LONGEST, np.zeros(2), np.array([5.0, 3.0]), 0)
+    assert found.heights.std() <= 2.1 * heights(own.detail, SIZE).std()
+
+
 @pytest.mark.parametrize("wavelength", [3.7, 8.0])
 def test_energies_of_a_wave_are_in_its_octave(wavelength):
     """With steps of 1, octaves are 2 to 4, 4 to 8 …; a wave along u is in the lowest along v."""

@@ -87,6 +87,18 @@ def test_the_detail_of_a_model_replaced_by_its_own_is_the_model(mode, where):
     assert not edit.displacement.offsets
 
 
+def test_points_on_long_spans_are_found():
+    """On a disc whose first span is long, all ends of spans nearest to points in it are the pole."""
+    u = KnotVector.clamped(np.linspace(0.0, 1.0, 25), 3)
+    v = KnotVector.clamped(np.r_[0.0, 20.0 + 0.5 * np.arange(100.0)], 3)
+    angle, radius = np.meshgrid(1.9 * np.pi * u.greville(), v.greville(), indexing="ij")
+    height = 0.05 * np.random.default_rng(0).standard_normal(angle.shape) * (radius > 1.0)
+    net = Net(u, v, np.stack([radius * np.cos(angle), radius * np.sin(angle), height], axis=-1))
+    options = Transfer(source="x.step", map=("place",), band=":8mm", mode="replace")
+    edit = transfer(sheet(net), options, sheet(net))
+    assert not edit.displacement.offsets
+
+
 @pytest.fixture(scope="module")
 def two():
     """A clean and a noisy panel of two patches, as nets and as models."""

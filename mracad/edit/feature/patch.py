@@ -15,6 +15,7 @@ from mracad.bspline.vectors import unit
 from mracad.model.brep import Face, Model
 from mracad.model.outline import FLAT, outline
 from mracad.model.region import face_region
+from mracad.wavelet.ladder import arc_lengths
 
 if TYPE_CHECKING:
     from scipy.spatial import cKDTree
@@ -25,7 +26,7 @@ RIM = 200
 """Points of a rim across a surface, at least."""
 
 SEEDS = 90
-"""Places in each direction from which a point is projected, at most."""
+"""Number of parameters in each direction, at most, by spans and again by length, from which a point is projected."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,12 +117,13 @@ class Patch:
 
     @cached_property
     def _lines(self) -> tuple[Array, Array]:
-        """Parameters of the seeds in u and v."""
-        counts = (int(np.clip(3 * k.spans, 16, SEEDS)) for k in self.knots)
-        u, v = (
-            np.interp(np.linspace(0, k.spans, count), np.arange(k.spans + 1), k.breaks)
-            for k, count in zip(self.knots, counts, strict=True)
-        )
+        """Parameters of the seeds in u and v, spread evenly over the spans and over the length."""
+        found = []
+        for axis, k in enumerate(self.knots):
+            share = np.linspace(0.0, 1.0, int(np.clip(3 * k.spans, 16, SEEDS)))
+            ends = np.arange(k.spans + 1.0), np.append(0.0, np.cumsum(arc_lengths(self.net, axis)))
+            found.append(np.unique(np.concatenate([np.interp(share * each[-1], each, k.breaks) for each in ends])))
+        u, v = found
         return u, v
 
     @cached_property
