@@ -17,7 +17,8 @@ from mracad.bspline.surface import Net
 from mracad.bspline.vectors import cross
 from mracad.edit.carry import turns
 from mracad.edit.target import stiffness
-from mracad.seam.solve import Problem
+from mracad.model.region import grown
+from mracad.seam.solve import Problem, Space
 
 Array = np.ndarray
 
@@ -26,6 +27,9 @@ HALVINGS = 4
 
 AREA = 0.9
 """Share of its area that a surface must keep for its tangents to be used."""
+
+AROUND = 12
+"""Number of nearest places whose mean rotation is taken where a surface has no coarse shape of its own."""
 
 
 class Rider:
@@ -46,6 +50,7 @@ class Rider:
             self.coarse = {i: s.net.with_poles(s.net.poles + low[i]) for i, s in problem.spaces.items()}
             if not any(_shrunk(s.net, self.coarse[i], s.seen) for i, s in problem.spaces.items()):
                 break
+        self.odd = {i: _beside(s) for i, s in problem.spaces.items()}
 
     def carried(self, delta: Array) -> Array:
         """(R − 1)(f − c) for a displacement of the coarse shape, both ``(points, 3)``."""
@@ -53,7 +58,7 @@ class Rider:
         for (i, space), part in zip(self.problem.spaces.items(), self.problem.split(delta).values(), strict=True):
             net, before = space.net, self.coarse[i]
             at = net.u.greville(), net.v.greville()
-            turned = turns(before, before.with_poles(before.poles + part))
+            turned = _mended(turns(before, before.with_poles(before.poles + part)), net, self.odd[i])
             detail = np.asarray(net.with_poles(self.details[i]).grid(*at))
             found.append(through(net, np.einsum("uvij,uvj->uvi", turned, detail) - detail).reshape(-1, 3))
         return np.concatenate(found)
@@ -72,3 +77,25 @@ def _shrunk(net: Net, coarse: Net, seen: Array) -> bool:
         for each in (coarse, net)
     ]
     return bool(areas[0] < AREA * areas[1])
+
+
+def _beside(space: Space) -> Array:
+    """The Greville points at which the surface depends on control points that its faces do not: those stay."""
+    knots = space.net.u, space.net.v
+    return grown(~space.seen, knots, max(each.degree for each in knots)) if not space.seen.all() else ~space.seen
+
+
+def _mended(turned: Array, net: Net, odd: Array) -> Array:
+    """Rotations ``(nu, nv, 3, 3)`` at the Greville points; at odd ones, means of those nearby."""
+    if not odd.any() or odd.all():
+        return turned
+    from scipy.spatial import KDTree
+
+    places = np.asarray(net.grid(net.u.greville(), net.v.greville()))
+    count = min(AROUND, int((~odd).sum()))
+    near = KDTree(places[~odd]).query(places[odd], k=[*range(1, count + 1)])[1]
+    u, _, vt = np.linalg.svd(turned[~odd][near].mean(axis=1))
+    u[:, :, 2] *= np.linalg.det(u @ vt)[:, None]
+    turned = turned.copy()
+    turned[odd] = u @ vt
+    return turned

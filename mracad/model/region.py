@@ -59,6 +59,18 @@ def supported(net: Net, cells: Array) -> Array:
     return np.asarray((rows[:, last_v] - rows[:, first_v]) > 0)
 
 
+def grown(near: Array, knots: tuple[KnotVector, KnotVector], steps: int = 1) -> Array:
+    """Mask ``(nu, nv)`` of control points at most some ``steps`` from those of a mask."""
+    for axis, kv in enumerate(knots):
+        for _ in range(steps):
+            before, after = np.roll(near, 1, axis), np.roll(near, -1, axis)
+            if not kv.periodic:
+                np.moveaxis(before, axis, 0)[0] = False
+                np.moveaxis(after, axis, 0)[-1] = False
+            near = near | before | after
+    return near
+
+
 def _supports(knots: KnotVector) -> tuple[Array, Array]:
     """First and one-past-last cell of each basis function's support (beyond the end when periodic)."""
     breaks = knots.breaks

@@ -1,6 +1,7 @@
 """Sweeps: the kernel in closed form, points that are met, details that ride, seams, what is held, what is refused."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,12 +14,13 @@ from mracad.bspline.surface import Net
 from mracad.edit.sweep import sweep
 from mracad.errors import EditError, UsageError
 from mracad.inspect.seams import seams
+from mracad.model.brep import Trim
 from mracad.occ.step import read_step
 from mracad.occ.view import view
 from mracad.spec.steps.shape import Sweep
 from tests import zoo
 from tests.edit import panels
-from tests.edit.models import fitted, sheet
+from tests.edit.models import fitted, free_edge, segment, sheet
 from tests.edit.test_equalize import even, graded, rational, swapped, uneven
 from tests.occ import shapes
 
@@ -248,3 +250,20 @@ def test_a_point_beside_what_stays_is_refused():
     net = fitted(even(30), even(30), wavy)
     with pytest.raises(EditError, match="is held, or too near"):
         swept(sheet(net), net.evaluate([[0.5, 0.002]]), [0, 0, 3], 60, edges="frozen")
+
+
+def test_a_face_on_half_of_its_surface_turns_up_to_its_rim():
+    """An aerofoil round its nose, of which a face has one side: what lies beyond the rim does not turn its details."""
+    u, v = even(30), even(60, 8)
+    along, turn = np.meshgrid(1000.0 * u.greville(), 2 * np.pi * v.greville(), indexing="ij")
+    wing = Net(u, v, interpolated(u, v, np.stack([along, 30 * np.cos(turn), 4 * np.sin(turn)], axis=-1)))
+    whole = sheet(wing)
+    ends = [(0.0, 0.0), (1.0, 0.0), (1.0, 0.507), (0.0, 0.507)]
+    trims = tuple(Trim(i, segment(ends[i], ends[(i + 1) % 4])) for i in range(4))
+    edges = tuple(free_edge(i, wing, trim.curve) for i, trim in enumerate(trims))
+    half = replace(whole, faces=(replace(whole.faces[0], trims=trims),), edges=edges)
+    at = wing.evaluate([[0.5, 0.25]])
+    (net,) = swept(half, at, [0, 0, 10], 240)
+    moved = np.asarray(net.grid(np.linspace(0, 1, 101), np.linspace(0, 0.5, 201)))
+    moved = moved - np.asarray(wing.grid(np.linspace(0, 1, 101), np.linspace(0, 0.5, 201)))
+    assert np.linalg.norm(moved, axis=-1).max() <= 1.02 * 10

@@ -17,6 +17,7 @@ from mracad.bspline.knots import KnotVector
 from mracad.edit.feature.ideal import Copies
 from mracad.edit.feature.patch import Patch
 from mracad.errors import EditError
+from mracad.model.region import grown
 from mracad.wavelet.ladder import arc_lengths
 
 Array = np.ndarray
@@ -88,18 +89,6 @@ def over_knots(copies: Copies, patch: Patch, knots: Knots) -> Array:
 def _least(copies: Copies, kv: KnotVector) -> float:
     """Width of the spans that hold the smallest copy at this degree, mm."""
     return copies.feature.spacing * float(copies.sizes.min()) * (1.0 if kv.degree > 2 else 0.5)
-
-
-def grown(near: Array, knots: Knots, steps: int = 1) -> Array:
-    """Mask ``(nu, nv)`` of control points at most some ``steps`` from those of a mask."""
-    for axis, kv in enumerate(knots):
-        for _ in range(steps):
-            before, after = np.roll(near, 1, axis), np.roll(near, -1, axis)
-            if not kv.periodic:
-                np.moveaxis(before, axis, 0)[0] = False
-                np.moveaxis(after, axis, 0)[-1] = False
-            near = near | before | after
-    return near
 
 
 def _first(copies: Copies, patch: Patch, longest: float) -> tuple[Array, Array]:

@@ -13,12 +13,11 @@ import numpy as np
 
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
-from mracad.edit.feature.fit import grown
 from mracad.edit.pose import WITHIN, worth
 from mracad.edit.tolerances import Tolerances
 from mracad.model.brep import Face
 from mracad.model.cells import quadrature
-from mracad.model.region import supported
+from mracad.model.region import grown, supported
 from mracad.seam.border import Border
 from mracad.seam.conditions import SAME, doubled, matched
 from mracad.seam.conditions import rows as seam_rows

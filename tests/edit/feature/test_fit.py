@@ -3,8 +3,9 @@
 import numpy as np
 
 from mracad.bspline.knots import KnotVector
-from mracad.edit.feature.fit import grown, holding, over_knots
+from mracad.edit.feature.fit import holding, over_knots
 from mracad.edit.feature.locate import Place
+from mracad.model.region import grown
 from tests.edit.feature.test_ideal import HEIGHT, bump, laid
 
 
