@@ -35,7 +35,8 @@ def list_(reading: Reading, chosen: Selection, as_json: bool) -> None:
     model, scope = looked_at(read(reading), chosen)
     features = found(model, scope.chosen)
     if as_json:
-        body = [{**plain(f), "face": f.face + 1, "feature": f.text} for f in features]
+        own = ("place", "size", "height", "scales")
+        body = [{"face": f.face + 1, **{k: plain(f)[k] for k in own}, "feature": f.text} for f in features]
         say(json_text({"file": model.name, "features": body}))
         return
     for f in features:

@@ -38,9 +38,11 @@ BETTER = 1.25
 SECTORS = 16
 """Number of directions in three quarters of which the ring must be covered."""
 
-PLATE, CLOSE, CELLS = 600, 1.2, 64
-"""Number of points of the ring through which the thin plate passes; the distance, over the reach, of those taken first;
-and the number of cells, up to there, over which it is tabulated."""
+PLATE, TRIED = 600, 200
+"""Number of points of the ring through which the thin plate passes, and while forms are compared."""
+
+CLOSE, CELLS = 1.2, 64
+"""Distance, over the reach, of those taken first, and number of cells, up to there, over which it is tabulated."""
 
 NORMALS = 6
 """Steps to find the foot of a point."""
@@ -156,6 +158,10 @@ class Base:
         The kind of form.
     error : float
         How far the form is off one half of the ring when fitted to the other, root mean square, mm.
+    points : ndarray (q, 3)
+        Samples of the ground under the window, mm.
+    heights : ndarray (q,)
+        How high they stand above the base, mm.
     """
 
     chart: Charts
@@ -165,6 +171,8 @@ class Base:
     level: float
     name: str
     error: float
+    points: Array
+    heights: Array
 
     def feet(self, local: Array) -> Array:
         """The feet on the base of points ``(q, 3)``, along its normals; both in the chart's axes, mm."""
@@ -206,7 +214,7 @@ def under(ground: Ground, window: Window) -> Base:
     form = FORMS[name](own)
     side = np.linspace(-CLOSE, CLOSE, CELLS + 1)
     ab = pairs(side, side)
-    rest = RectBivariateSpline(side, side, _plate(form, _thinned(own))(ab).reshape(CELLS + 1, -1))
+    rest = RectBivariateSpline(side, side, _plate(form, _thinned(own, PLATE))(ab).reshape(CELLS + 1, -1))
     some = ab[np.linalg.norm(ab, axis=1) <= CLOSE][::8]
     points, there = _over(form, rest, np.concatenate([np.zeros((1, 2)), some]), own)
     # the chart's origin is the place on the base, not on the feature
@@ -214,7 +222,9 @@ def under(ground: Ground, window: Window) -> Base:
     origin = window.point + reach * level * frame[2]
     spread = window.point + reach * points[1:] @ frame
     chart = charts(origin[None], frame[None], np.array([CLOSE * reach]), spread[None], there[None, 1:])
-    return Base(chart, form, rest, reach, level, name, error * reach)
+    heights = reach * _off(form, rest, inside)[0]
+    inner = window.point + local[within] @ frame
+    return Base(chart, form, rest, reach, level, name, error * reach, inner, heights)
 
 
 def _best(own: Array, inside: Array) -> tuple[str, float]:
@@ -237,8 +247,7 @@ def _best(own: Array, inside: Array) -> tuple[str, float]:
 
 def _missed(fit: Callable[[Array], Form], known: Array, asked: Array) -> Array:
     """How far some points ``(q, 3)`` lie off the base through others."""
-    some = _thinned(known)
-    form = fit(some)
+    some, form = _thinned(known, TRIED), fit(known)
     return np.asarray(form.distance(asked)[0] - _plate(form, some)(asked[:, :2]))
 
 
@@ -298,13 +307,13 @@ def _levelled(ground: Ground, window: Window) -> tuple[Array, Array, Array, Arra
         a, b, _ = np.linalg.lstsq(rows, local[ring, 2], rcond=None)[0]
         normal = frame.T @ (np.array([-a, -b, 1.0]) / np.sqrt(1 + a**2 + b**2))
     frame = axes(normal[None], feet.along)[0]
-    return frame, (points - window.point) @ frame.T, ring, near & ~ring
+    return frame, (points - window.point) @ frame.T, ring, near & (radius <= reach)
 
 
-def _thinned(points: Array) -> Array:
+def _thinned(points: Array, count: int) -> Array:
     """Some of the points ``(q, 3)`` of a ring, the nearest first, each place once."""
     order = np.random.default_rng(0).permutation(len(points))
     far = np.linalg.norm(points[order, :2], axis=1) > CLOSE
-    some = points[order[np.argsort(far, kind="stable")][:PLATE]]
+    some = points[order[np.argsort(far, kind="stable")][:count]]
     # samples of two faces coincide along their seam
     return some[np.sort(np.unique(some[:, :2].round(9), axis=0, return_index=True)[1])]

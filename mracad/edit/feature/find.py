@@ -1,31 +1,50 @@
-"""Proposed features: places where the detail of a face stands out.
+"""Proposed features: places where the detail of a face stands out of its surroundings.
 
-On each surface the detail finer than a scale (by a projection, as for smoothing) is measured at scales that double.  A
-place stands out if that detail is much larger than its median, on a small part of the face; the smallest scale with
-nearly all of it counts.
+On each surface the detail finer than a scale (by a projection, as for smoothing) is measured at scales that double, and
+places where it is much larger than its median are looked at.  One is a feature if, under the window that shows it best,
+it stands far higher above its base than that base is uncertain, which noise, rims and the shape itself never do, and if
+it can be separated there.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from mracad.edit.feature.base import Base, under
+from mracad.edit.feature.extract import above_surroundings
+from mracad.edit.feature.ground import Ground
+from mracad.edit.feature.locate import Window, window
 from mracad.edit.feature.patch import Patch
+from mracad.errors import EditError
 from mracad.model.brep import Model
+from mracad.spec import places
 from mracad.wavelet.ladder import arc_lengths
 from mracad.wavelet.project import at_scale
 
 Array = np.ndarray
 
-USUAL = 8.0
-"""Ratio to the median above which detail stands out."""
+USUAL = 3.0
+"""Ratio to the median above which detail is looked at."""
+
+MOST = 25
+"""Number of places that are looked at, those of the largest detail first."""
+
+CLEAR = 8.0
+"""Height of a feature over the error of its base, at least."""
+
+FLOOR = 16.0
+"""Height of a feature over the median of the finest detail of its face, which is noise, at least."""
+
+WINDOWS, SMALLER = 4, 0.65
+"""Number of windows that are tried at a place, and the ratio of their radii."""
 
 RIM = 0.1
 """A feature ends where its detail falls below this share of its height."""
 
-LARGEST = 0.2
+LARGEST = 0.5
 """Share of a face that one feature may cover."""
 
 GROWS = 1.25
@@ -51,6 +70,10 @@ class Found:
         Diameter and height, mm.
     scales : (float, float)
         Wavelengths between which most of it lies, mm.
+    floor : float
+        Height below which it would be noise, mm.
+    window : (float, float, float, float), optional
+        Middle and radius of a window that shows it, mm.
     """
 
     face: int
@@ -58,23 +81,91 @@ class Found:
     size: float
     height: float
     scales: tuple[float, float]
+    floor: float = 0.0
+    window: tuple[float, float, float, float] | None = None
 
     @property
     def text(self) -> str:
-        """The value for ``--feature``: a window twice as wide as the feature, so that its rim lies on flat
-        surroundings."""
-        x, y, z = (f"{value:.6g}" for value in np.round(self.place, 6) + 0.0)
-        return f"near:{x},{y},{z},radius:{self.size:.4g}"
+        """The value for ``--feature``: a window twice as wide as the feature unless another is known to show it."""
+        x, y, z, radius = self.around
+        return f"near:{x:.6g},{y:.6g},{z:.6g},radius:{radius:.4g}"
+
+    @property
+    def around(self) -> tuple[float, ...]:
+        """Middle and radius of that window, rounded as in the text, mm."""
+        *middle, radius = np.round(self.window or (*self.place, self.size), 6) + 0.0
+        return *(float(f"{x:.6g}") for x in middle), float(f"{radius:.4g}")
 
 
 def found(model: Model, faces: Collection[int]) -> list[Found]:
     """Features of faces, the highest first."""
-    result = []
+    proposed: list[Found] = []
     for surface in model.surfaces:
         own = [i for i in surface.faces if i in faces]
         if own:
-            result += _on(Patch.of(model, surface.index, own))
-    return sorted(result, key=lambda f: -f.height)
+            proposed += _on(Patch.of(model, surface.index, own))
+    ground, kept = Ground.of(model, faces), list[Found]()
+    for each in sorted(proposed, key=lambda f: -f.height)[:MOST]:
+        if not any(_within(each, f) for f in kept):
+            kept += [f for f in _confirmed(ground, each) if not any(_within(f, g) for g in kept)]
+    return sorted(kept, key=lambda f: -f.height)
+
+
+def _within(f: Found, g: Found) -> bool:
+    """Whether the place of ``f`` belongs to ``g``."""
+    return bool(np.linalg.norm(np.subtract(f.place, g.place)) < g.size)
+
+
+def _confirmed(ground: Ground, proposed: Found) -> Iterator[Found]:
+    """The feature at a place, if there is one."""
+    sizes = (proposed.size * SMALLER**k for k in range(WINDOWS))
+    seen = [(each, base) for size in sizes for each in [replace(proposed, size=size)] for base in _bases(ground, each)]
+    first, base = max(seen, key=lambda pair: _clear(pair[1]), default=(proposed, None))
+    if base is None or _clear(base) < CLEAR / 2:
+        return
+    better = _measured(ground, first, base)
+    for each in (better, replace(better, size=first.size), first):
+        for base in _bases(ground, each):
+            if _clear(base) >= CLEAR and np.abs(base.heights).max() > each.floor and _separable(ground, each):
+                yield replace(_measured(ground, each, base), window=(*each.place, each.size))
+                return
+
+
+def _bases(ground: Ground, found: Found) -> Iterator[Base]:
+    """The base under the window of a feature, if there is one."""
+    try:
+        yield under(ground, _window(ground, found))
+    except EditError:
+        return
+
+
+def _window(ground: Ground, found: Found) -> Window:
+    *middle, radius = found.around
+    return window(ground, places.Disc(places.Point(tuple(middle)), radius), found.text, None)
+
+
+def _clear(base: Base) -> float:
+    """Height of what stands on a base over the error of the base."""
+    return float(np.abs(base.heights).max(initial=0.0)) / max(base.error, LEAST / CLEAR)
+
+
+def _measured(ground: Ground, found: Found, base: Base) -> Found:
+    """A feature with the height, middle and diameter that it has above a base."""
+    size = np.abs(base.heights)
+    height = float(size.max())
+    own = size > max(RIM * height, 3 * base.error)
+    middle = np.average(base.points[own], axis=0, weights=size[own] ** 2)
+    place = ground.feet(middle[None]).points[0]
+    across = 2 * float(np.linalg.norm(base.points[own] - place, axis=1).max())
+    return replace(found, place=tuple(place.tolist()), size=across, height=height)
+
+
+def _separable(ground: Ground, found: Found) -> bool:
+    """Whether a feature can be moved."""
+    try:
+        return bool(above_surroundings(ground, _window(ground, found), "as-is").origin)
+    except EditError:
+        return False
 
 
 def _on(patch: Patch) -> list[Found]:
@@ -93,10 +184,12 @@ def _on(patch: Patch) -> list[Found]:
     area = np.linalg.norm(np.cross(su, sv), axis=-1) * np.outer(np.gradient(us), np.gradient(vs))
     scale = 4 * min(float(np.median(x)) for x in lengths)
     kept: list[Found] = []
+    floor = 0.0
     while scale < max(float(x.sum()) for x in lengths) / 2:
         finer = net.with_poles(net.poles - at_scale(net, scale).poles)
         height = (np.asarray(finer.grid(us, vs)) * normals).sum(axis=-1)
         size = np.where(seen, np.abs(height), 0.0)
+        floor = floor or FLOOR * float(np.median(size[seen]))
         usual = max(USUAL * float(np.median(size[seen])), LEAST)
         regions, count = label(size > usual, np.ones((3, 3)))
         for k in range(1, count + 1):
@@ -110,10 +203,10 @@ def _on(patch: Patch) -> list[Found]:
             place = points[own][np.linalg.norm(points[own] - middle, axis=1).argmin()]
             across = 2 * float(np.linalg.norm(points[own] - place, axis=1).max())
             face = next((f.index for f in patch.faces), 0)
-            new = Found(face, tuple(float(x) for x in place), across, float(size[peak]), (scale / 2, scale))  # type: ignore[arg-type]
+            new = Found(face, tuple(float(x) for x in place), across, float(size[peak]), (scale / 2, scale), floor)  # type: ignore[arg-type]
             kept = _merged(kept, new)
         scale *= 2
-    return [f for f in kept if not any(_lobe(f, g) for g in kept)]
+    return [f for f in kept if f.height > floor and not any(_lobe(f, g) for g in kept)]
 
 
 def _lobe(f: Found, g: Found) -> bool:

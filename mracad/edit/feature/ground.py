@@ -116,11 +116,9 @@ class Ground:
         The surface whose faces come nearest within their trims counts; where that is at a rim, the foot lies on the
         surface beyond it.
         """
-        from scipy.spatial import cKDTree
-
         best, apart = (np.full(len(points), np.inf) for _ in range(2))
         surface, uv = np.zeros(len(points), int), np.zeros((len(points), 2))
-        trees = {i: cKDTree(patch.seeds[1]) for i, patch in self.patches.items() if len(patch.seeds[0])}
+        trees = {i: patch.spots for i, patch in self.patches.items() if len(patch.seeds[0])}
         far = {i: tree.query(points)[0] for i, tree in trees.items()}
         most = np.min([self.patches[i].marks.query(points)[0] for i in trees], axis=0) if trees else best
         for index, tree in trees.items():

@@ -139,6 +139,13 @@ class Patch:
         uv = uv[self.covers(uv)]
         return uv, np.asarray(self.net.evaluate(uv))
 
+    @cached_property
+    def spots(self) -> cKDTree:
+        """The points of the seeds."""
+        from scipy.spatial import cKDTree
+
+        return cKDTree(self.seeds[1])
+
     def beyond(self, points: Array, uv: Array) -> Array:
         """Distance (mm) of points ``(q, 3)`` from the boundaries of the faces where their feet ``uv`` lie outside all
         of them; 0 elsewhere."""
