@@ -7,11 +7,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mracad.edit.feature.ground import Ground
+from mracad.edit.feature.ground import Feet, Ground
 from mracad.edit.feature.locate import place
+from mracad.edit.region import around, of_edge, turned
 from mracad.errors import EditError
 from mracad.model.brep import Face, Model
+from mracad.spec import motions
 from mracad.spec import places as spec
+from mracad.spec.quantity import length
 from mracad.spec.select import Scope
 from mracad.spec.steps.shape import Sweep
 
@@ -67,7 +70,7 @@ class Led:
     def refuse(self, places: Mapping[int, Array], wrong: Array, why: str) -> None:
         """Raise EditError for points in ``places`` for which ``wrong`` is true."""
         labels = [label for i in places for label in self.labels[i]]
-        bad = [label for label, each in zip(labels, wrong, strict=True) if each]
+        bad = dict.fromkeys(label for label, each in zip(labels, wrong, strict=True) if each)
         if bad:
             raise EditError(f"{_listed(bad)} {why}", "choose other points, or a larger --scale")
 
@@ -75,31 +78,29 @@ class Led:
 @dataclass(frozen=True)
 class _Given:
     label: str
-    where: spec.Point | spec.OnFace
+    where: spec.Point | spec.OnFace | motions.Rim
     by: tuple[float, ...] | None
     to: tuple[float, ...] | None = None
 
 
 def _given(options: Sweep) -> list[_Given]:
-    """The points as given; raises FileError for an invalid file, and EditError for too many."""
+    """The points as given; raises FileError for an invalid file."""
     found: list[_Given] = []
     single = 0
     for text in options.at:
-        where = spec.place(text, "at")
+        where = motions.start(text, "at")
         if isinstance(where, spec.Listed):
             for name, row in spec.moves(where.path):
                 label = f"{name} ({','.join(f'{x:g}' for x in row[:3])})"
                 found.append(_Given(label, spec.Point(row[:3]), row[3:]))
             continue
-        label = f"point {single + 1} ({text})"
-        if options.by:
-            by = options.by[single if len(options.by) > 1 else 0]
-            found.append(_Given(label, where, spec.vector(by, "by")))
-        else:
+        label = text if isinstance(where, motions.Rim) else f"point {single + 1} ({text})"
+        if options.to:
             found.append(_Given(label, where, None, spec.vector(options.to[single], "to")))
+        else:
+            by = options.by[single if len(options.by) > 1 else 0] if options.by else "0,0,0"
+            found.append(_Given(label, where, motions.step(by, "by")))
         single += 1
-    if len(found) > MOST:
-        raise EditError(f"{len(found)} points are too many for a sweep", f"give {MOST} at most: others follow")
     return found
 
 
@@ -109,35 +110,69 @@ def led(model: Model, options: Sweep, scope: Scope, scale: float) -> Led:
     Raises
     ------
     EditError
-        For points that are not on faces that may move; all of them are named.
+        For points that are not on faces that may move; all of them are named.  For more than 500 points.
     FileError
         For an invalid file of points.
     """
     given = _given(options)
-    movable = scope.movable(model)
-    ground = Ground.of(model, movable)
-    every = [place(ground, each.where, each.label) for each in given]
+    ground = Ground.of(model, scope.movable(model))
+    spots = [each for each in given if not isinstance(each.where, motions.Rim)]
+    standing = iter(_standing(ground, scope, spots, scale))
+    radius = length(options.radius, model.diagonal, "radius") if options.radius else 0.0
+    feet, goals, labels = [], [], []
+    for each in given:
+        if isinstance(each.where, motions.Rim):
+            own = of_edge(ground, each.where.number, scale)
+            point = own.points[len(own.points) // 2]
+        else:
+            foot, point = next(standing)
+            own = around(ground, foot, radius, scale) if radius else foot
+        feet.append(own)
+        goals.append(_goals(each, own, point, options))
+        labels += [each.label] * len(own.points)
+        if len(labels) > MOST:
+            raise EditError(f"more than {MOST} points are too many for a sweep", "give fewer, or a larger --scale")
+    return _led(ground, feet, np.concatenate(goals), labels)
+
+
+def _led(ground: Ground, feet: Sequence[Feet], goals: Array, labels: Sequence[str]) -> Led:
+    surface, uv, points = (np.concatenate([getattr(f, name) for f in feet]) for name in ("surface", "uv", "points"))
+    every = {i: np.flatnonzero(surface == i) for i in dict.fromkeys(surface.tolist())}
+    moves = {i: (goals - points)[own] @ ground.patches[i].turn for i, own in every.items()}
+    return Led(
+        {i: uv[own] for i, own in every.items()},
+        moves,
+        {i: [labels[k] for k in own.tolist()] for i, own in every.items()},
+        points,
+    )
+
+
+def _standing(ground: Ground, scope: Scope, given: Sequence[_Given], scale: float) -> list[tuple[Feet, Array]]:
+    """The foot of each point, and the point as given; raises EditError for those off the ground."""
+    every = [place(ground, each.where, each.label) for each in given if not isinstance(each.where, motions.Rim)]
+    if not every:
+        return []
     points = np.array([each.point for each in every])
     feet = ground.feet(points)
     surface, uv = feet.surface.copy(), feet.uv.copy()
     off = np.where(ground.faces(surface, uv) >= 0, feet.apart, np.inf)
     for i, each in enumerate(every):
         if each.face is not None and each.uv is not None:
-            surface[i], uv[i], off[i] = model.faces[each.face].surface, each.uv, 0.0
-    _refuse_off(model, scope, given, points, off > max(NEAR[0] * scale, NEAR[1]))
+            surface[i], uv[i], off[i] = ground.model.faces[each.face].surface, each.uv, 0.0
+    _refuse_off(ground.model, scope, given, points, off > max(NEAR[0] * scale, NEAR[1]))
     feet = ground.standing(surface, uv, off)
-    places, moves, labels = {}, {}, {}
-    for i in dict.fromkeys(surface.tolist()):
-        own = np.flatnonzero(surface == i)
-        turn = ground.patches[i].turn
-        goals = [_goal(given[k], points[k]) - feet.points[k] for k in own]
-        places[i], moves[i] = uv[own], np.array(goals) @ turn
-        labels[i] = [given[k].label for k in own]
-    return Led(places, moves, labels, feet.points)
+    return [(feet.part(slice(i, i + 1)), points[i]) for i in range(len(every))]
 
 
-def _goal(given: _Given, point: Array) -> Array:
-    return np.array(given.to) if given.to is not None else point + np.array(given.by)
+def _goals(given: _Given, feet: Feet, point: Array, options: Sweep) -> Array:
+    """Where the points of one place go, ``(q, 3)``; ``point`` is the place as given."""
+    middle = len(feet.points) // 2 if isinstance(given.where, motions.Rim) else 0
+    alone = len(feet.points) == 1 and not options.turns
+    found = point[None] if alone else turned(feet.points, feet.points[middle], feet.normals[middle], options)
+    if given.to is not None:
+        return np.asarray(found + (np.array(given.to) - point))
+    assert given.by is not None
+    return np.asarray(found + (given.by[0] * feet.normals if len(given.by) == 1 else np.array(given.by)))
 
 
 def _refuse_off(model: Model, scope: Scope, given: Sequence[_Given], points: Array, off: Array) -> None:

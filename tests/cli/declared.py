@@ -112,11 +112,13 @@ TOGETHER: Mapping[str, Sequence[tuple[str, Sequence[Words]]]] = {
     ],
     "sweep": [
         (
-            "at by to",
+            "at by to radius rotate stretch",
             [
                 ("--at", "#1@0.5,0.5", "--by", "0,0,0.2"),
                 ("--at", "#1@0.5,0.5", "--at", "#2@0.3,0.4", "--by", "0,0,0.2", "--by", "0,0.1,0"),
                 ("--at", "#1@0.4,0.6", "--to", "4,6,0.5"),
+                ("--at", "#1@0.5,0.5", "--radius", "2mm", "--rotate", "normal,10", "--stretch", "1.1"),
+                ("--at", "edge#1", "--by", "0.2"),
             ],
         )
     ],

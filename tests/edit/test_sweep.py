@@ -11,12 +11,14 @@ from OCP.BRepPrimAPI import BRepPrimAPI_MakeSphere
 import mracad
 from mracad.bspline.fit import interpolated
 from mracad.bspline.surface import Net
+from mracad.edit.led import led
 from mracad.edit.sweep import sweep
 from mracad.errors import EditError, UsageError
 from mracad.inspect.seams import seams
 from mracad.model.brep import Trim
 from mracad.occ.step import read_step
 from mracad.occ.view import view
+from mracad.spec.select import scope
 from mracad.spec.steps.shape import Sweep
 from tests import zoo
 from tests.edit import panels
@@ -267,3 +269,74 @@ def test_a_face_on_half_of_its_surface_turns_up_to_its_rim():
     moved = np.asarray(net.grid(np.linspace(0, 1, 101), np.linspace(0, 0.5, 201)))
     moved = moved - np.asarray(wing.grid(np.linspace(0, 1, 101), np.linspace(0, 0.5, 201)))
     assert np.linalg.norm(moved, axis=-1).max() <= 1.02 * 10
+
+
+def test_regions_rotate_and_stretch():
+    """Their points go where the motion takes them, what lies between does too, and far away nothing moves."""
+    net = fitted(even(60), even(60), lambda x, y: 5 * np.sin(x / 80), size=300.0)
+    model, middle = sheet(net), net.evaluate([[0.5, 0.5]])[0]
+    normal = net.normals(np.array([[0.5, 0.5]]))[0]
+    word = ",".join(map(repr, map(float, middle)))
+    us = np.linspace(0, 1, 121)
+    before = np.asarray(net.grid(us, us))
+    away = np.linalg.norm(before - middle, axis=-1)
+
+    def moved(**options):
+        options = Sweep(at=(word,), radius="20mm", scale="50mm", **options)
+        points = led(model, options, scope(model, options), 50.0)
+        after = sweep(model, options).displacement.applied(model).surfaces[0].net
+        got = after.evaluate(points.places[0])
+        assert np.abs(got - net.evaluate(points.places[0]) - points.moves[0]).max() <= 1e-6
+        far = np.linalg.norm(np.asarray(after.grid(us, us)) - before, axis=-1)[away > 20 + 2 * 50].max()
+        assert far <= 0.01 * points.largest
+        return net.evaluate(points.places[0]) - middle, got - middle, np.asarray(after.grid(us, us)), points.largest
+
+    start, end, grid, largest = moved(rotate="normal,12")
+    c, s = np.cos(np.radians(12)), np.sin(np.radians(12))
+    wanted = c * start + s * np.cross(normal, start) + (1 - c) * (start @ normal)[:, None] * normal
+    assert np.abs(end - wanted).max() <= 1e-6
+    inside, off = away < 18, before - middle
+    wanted = c * off + s * np.cross(normal, off) + (1 - c) * (off @ normal)[..., None] * normal
+    assert np.linalg.norm(grid - middle - wanted, axis=-1)[inside].max() <= 0.01 * largest
+    start, end, *_ = moved(stretch="1.1")
+    assert np.abs(end - 1.1 * start).max() <= 1e-6
+    start, end, *_ = moved(stretch="x,1.2", rotate=f"{middle[0] - 10},0,0,0,1,0,5", by=("0,0,3",))
+    c, s = np.cos(np.radians(5)), np.sin(np.radians(5))
+    pivot = np.array([-10.0, 0.0, -middle[2]])
+    off = start * [1.2, 1, 1] - pivot
+    turned = np.stack([c * off[:, 0] + s * off[:, 2], off[:, 1], c * off[:, 2] - s * off[:, 0]], axis=1)
+    assert np.abs(end - (turned + pivot + [0, 0, 3])).max() <= 1e-6
+
+
+def test_an_edge_moves_as_a_whole():
+    net = fitted(even(40), even(40), lambda x, y: 5 * np.sin(x / 40))
+    model, rim = sheet(net), np.stack([np.linspace(0, 1, 101), np.zeros(101)], axis=1)
+    for by, way in (("0,1,3", [0, 1, 3]), ("2", 2 * net.normals(rim))):
+        options = Sweep(at=("edge#1",), by=(by,), scale="40mm")
+        points = led(model, options, scope(model, options), 40.0)
+        after = sweep(model, options).displacement.applied(model).surfaces[0].net
+        missed = after.evaluate(points.places[0]) - net.evaluate(points.places[0]) - points.moves[0]
+        assert np.abs(missed).max() <= 1e-6 and len(missed) >= 25
+        assert np.abs(after.evaluate(rim) - net.evaluate(rim) - way)[:, 2].max() <= 0.02 * points.largest
+        far = np.stack([np.linspace(0, 1, 101), np.full(101, 0.9)], axis=1)
+        assert np.abs(after.evaluate(far) - net.evaluate(far)).max() <= 0.01 * points.largest
+
+
+@pytest.mark.parametrize(
+    ("options", "what"),
+    [
+        ({"rotate": "z,10"}, "no region"),
+        ({"stretch": "1.1"}, "no region"),
+        ({"radius": "5mm"}, "no move"),
+        ({"radius": "5mm", "rotate": "10"}, "no axis"),
+        ({"radius": "5mm", "rotate": "0,0,0,10"}, "no axis"),
+        ({"radius": "5mm", "rotate": "z,much"}, "not an angle"),
+        ({"radius": "5mm", "stretch": "0"}, "no factor"),
+        ({"at": ("edge#1",), "radius": "5mm", "by": ("1",)}, "no region"),
+        ({"at": ("edge#x",), "by": ("1",)}, "not a place"),
+        ({"by": ("1,2",)}, "three numbers"),
+    ],
+)
+def test_bad_words_about_regions_are_refused(options, what):
+    with pytest.raises(UsageError, match=what):
+        Sweep(**{"scale": "10mm", "at": ("1,2,3",), **options})

@@ -133,7 +133,7 @@ def polar(given: spec.Polar, origin: Array, frame: Array, own: bool) -> list[Pla
     size = float(np.linalg.norm(axis))
     found = []
     for k in range(1 if own else 0, count):
-        turn = _rotation(axis / size, 2 * np.pi * k / count)
+        turn = rotation(axis / size, 2 * np.pi * k / count)
         label = f"place {k + 1} of {count} around the axis"
         found.append(Place(label, centre + turn @ (origin - centre), direction=turn @ frame[0]))
     return found
@@ -141,21 +141,27 @@ def polar(given: spec.Polar, origin: Array, frame: Array, own: bool) -> list[Pla
 
 def along(ground: Ground, given: spec.Along) -> list[Place]:
     """Places along an edge, in the middles of equal parts of it."""
-    number, count, offset, model = given.edge, given.count, given.offset, ground.model
-    if not 1 <= number <= len(model.edges):
-        known = f"edges edge#1 to edge#{len(model.edges)}" if model.edges else "no edges"
-        raise UsageError(f"along: edge#{number}: the model has {known}", spec.ALONG)
-    edge = model.edges[number - 1]
-    side = next((s for s in edge.sides if s.face in ground.chosen and s.uv is not None), None)
-    if side is None or edge.degenerate:
-        raise EditError(f"along: edge#{number} bounds no face to edit", "select one of its faces with --faces")
-    face = model.faces[side.face]
+    number, count, offset = given.edge, given.count, given.offset
+    face, trace = edge_of(ground, number, "along", spec.ALONG)
     assert face.surface is not None
-    trace = trace_of(model, face, face.trim(edge.index))
     points, tangents = _even(ground.patches[face.surface], trace, count)
     if offset:
         points = points + offset * _inward(ground, face, points, tangents)
     return [Place(f"place {k + 1} along edge#{number}", points[k], direction=tangents[k]) for k in range(count)]
+
+
+def edge_of(ground: Ground, number: int, name: str, hint: str) -> tuple[Face, Trace]:
+    """A face of the ground that an edge bounds, by its number, and its trace; raises UsageError and EditError."""
+    model = ground.model
+    if not 1 <= number <= len(model.edges):
+        known = f"edges edge#1 to edge#{len(model.edges)}" if model.edges else "no edges"
+        raise UsageError(f"{name}: edge#{number}: the model has {known}", hint)
+    edge = model.edges[number - 1]
+    side = next((s for s in edge.sides if s.face in ground.chosen and s.uv is not None), None)
+    if side is None or edge.degenerate:
+        raise EditError(f"{name}: edge#{number} bounds no face to edit", "select one of its faces with --faces")
+    face = model.faces[side.face]
+    return face, trace_of(model, face, face.trim(edge.index))
 
 
 def _even(patch: Patch, trace: Trace, count: int) -> tuple[Array, Array]:
@@ -195,7 +201,7 @@ def scattered(places: Sequence[Place], feet: Feet, jitter: float, spin: float, s
     ]
 
 
-def _rotation(axis: Array, angle: float) -> Array:
+def rotation(axis: Array, angle: float) -> Array:
     x, y, z = axis
     cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
     return np.asarray(np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross)

@@ -9,7 +9,7 @@ from typing import Annotated, ClassVar
 from msgspec import Meta
 
 from mracad.errors import UsageError
-from mracad.spec import places
+from mracad.spec import motions, places
 from mracad.spec.quantity import Length, gain_of
 from mracad.spec.steps.levels import Shaped
 from mracad.spec.steps.smooth import Fairing
@@ -82,20 +82,38 @@ class Sweep(Shaped, frozen=True, kw_only=True, forbid_unknown_fields=True):
     function: ClassVar[str] = "mracad.edit.sweep:sweep"
 
     at: Annotated[
-        tuple[places.Place, ...],
+        tuple[motions.Start, ...],
         Meta(
             description="A point of the model: X,Y,Z (mm) on a selected face, #face@u,v, or @points.csv with lines "
-            "x,y,z,dx,dy,dz; repeatable."
+            "x,y,z,dx,dy,dz; or a whole edge, edge#4; repeatable."
         ),
     ] = ()
     by: Annotated[
-        tuple[places.Vector, ...],
-        Meta(description="DX,DY,DZ (mm): how far the point moves; one for each --at in their order, or for all."),
+        tuple[motions.Step, ...],
+        Meta(
+            description="DX,DY,DZ (mm): how far the point moves, or one number: along the outward normal; one for each "
+            "--at in their order, or for all."
+        ),
     ] = ()
     to: Annotated[
         tuple[places.Vector, ...],
         Meta(description="X,Y,Z (mm): where the point goes, instead of --by; one for each --at in their order."),
     ] = ()
+    radius: Annotated[
+        Length | None,
+        Meta(description="Radius of a region around each point, along the surface, that moves as a whole with it."),
+    ] = None
+    rotate: Annotated[
+        motions.Turn | None,
+        Meta(
+            description="AXIS,ANGLE (degrees): rotates regions and edges about their middle; AXIS is x, y, z, normal, "
+            "DX,DY,DZ, or X,Y,Z,DX,DY,DZ: a point and a direction."
+        ),
+    ] = None
+    stretch: Annotated[
+        motions.Stretch | None,
+        Meta(description="FACTOR, or AXIS,FACTOR: stretches regions and edges from their middle, before they rotate."),
+    ] = None
     scale: Annotated[
         Length,
         Meta(
@@ -106,17 +124,33 @@ class Sweep(Shaped, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        single = sum(not text.startswith("@") for text in self.at)
         if not self.at:
             raise UsageError("at: no point is given", "give --at X,Y,Z --by DX,DY,DZ", "at")
+        self._check_moves()
+        rims = [isinstance(motions.start(text, "at"), motions.Rim) for text in self.at]
+        if self.radius and all(rims):
+            raise UsageError("radius: an edge is no region", "give points with --at", "radius")
+        if self.turns and not self.radius and not all(rims):
+            raise UsageError("radius: no region is given to rotate or stretch", "give --radius 20mm", "radius")
+
+    def _check_moves(self) -> None:
+        """Raise UsageError unless there is a move for each point."""
+        single = sum(not text.startswith("@") for text in self.at)
         if self.by and self.to:
             raise UsageError("by and to cannot be combined", "give one of them")
+        if not (self.by or self.to) and (self.turns or not single):
+            return
         if single and not (self.by or self.to):
             raise UsageError("by: no move is given for the points", "give --by DX,DY,DZ, or --to X,Y,Z", "by")
         given, name = (self.by, "by") if self.by else (self.to, "to")
         if len(given) != single and not (len(self.by) == 1 and single):
             message = f"{name}: {len(given)} for {single} points"
             raise UsageError(message, f"give --{name} for each --at that names no file", name)
+
+    @property
+    def turns(self) -> bool:
+        """Whether regions and edges rotate or stretch."""
+        return bool(self.rotate or self.stretch)
 
     @property
     def done(self) -> str:
