@@ -214,7 +214,7 @@ def test_what_holds_faces_holds_them_here(two):
     held = transfer(target, Transfer(**words, hold=("near:50,50,0,radius:30",)), source).displacement.applied(target)
     before, after = (np.asarray(each.surfaces[0].net.evaluate([[50.0, 50.0]])) for each in (target, held))
     assert np.abs(before - after).max() <= 1e-12
-    with pytest.raises(EditError, match=r"#1 .* is not among the faces to edit") as caught:
+    with pytest.raises(EditError, match=r"#1 is not among the faces to edit") as caught:
         transfer(target, Transfer(**words, hold=("#1",)), source)
     assert caught.value.code == Code.CANNOT_EDIT
 
@@ -254,7 +254,7 @@ def test_options_that_do_not_go_together(options, said):
         ({"map": ("lid=#1",)}, UsageError, "no faces are named 'lid'"),
         ({"map": ("#1=#1,#2=#1",)}, UsageError, "#1 gets the detail of two faces"),
         ({"map": ("#3=#1",)}, EditError, "#3 .plane. is not a NURBS face"),
-        ({"map": ("#1=#3",)}, EditError, "#3 .plane. is not among the faces to edit"),
+        ({"map": ("#1=#3",)}, EditError, "#3 .plane. is not a NURBS face"),
         ({"map": ("#1=#1",), "size": 1e-9, "band": ":40mm"}, EditError, "closer than"),
         ({"map": ("#1=#1",), "band": ":0.001mm"}, EditError, "#1 has no detail in the band"),
     ],

@@ -77,11 +77,12 @@ def place(ground: Ground, given: Point | OnFace, label: str) -> Place:
 def patch_of(ground: Ground, face: int, label: str) -> Patch:
     """The patch of a face; raises EditError if the face does not belong to the ground."""
     surface = ground.model.faces[face].surface
-    if face not in ground.chosen or surface is None:
-        kind = ground.model.faces[face].kind
+    if surface is None:
         raise EditError(
-            f"{label}: #{face + 1} ({kind}) is not among the faces to edit", f"select it with --faces '#{face + 1}'"
+            f"{label}: #{face + 1} ({ground.model.faces[face].kind}) is not a NURBS face", "name another face"
         )
+    if face not in ground.chosen:
+        raise EditError(f"{label}: #{face + 1} is not among the faces to edit", f"select it with --faces '#{face + 1}'")
     return ground.patches[surface]
 
 
