@@ -35,7 +35,7 @@ def test_print_json_and_csv_agree(mracad, tmp_path):
     assert body["model"]["scale"] == min(body["model"][way]["shape"] for way in "uv") / 2
 
 
-@pytest.mark.parametrize("name", ["a.png", "a", "none/a.csv"])
+@pytest.mark.parametrize("name", ["a.pdf", "a", "none/a.csv", "none/a.png"])
 def test_what_cannot_be_written_is_refused(name, mracad, tmp_path):
     result = mracad("spectrum", PANEL, "-o", tmp_path / name)
     assert result.code in (2, 3) and result.err.count("mracad: ") == 1 and not list(tmp_path.iterdir())
@@ -58,3 +58,13 @@ def test_a_model_without_nurbs_faces_says_so(mracad, tmp_path):
     result = mracad("spectrum", tmp_path / "box.step")
     assert (result.code, result.out) == (0, "box.step: no NURBS face\n")
     assert json.loads(mracad("spectrum", tmp_path / "box.step", "--json").out) == {"file": "box.step", "faces": []}
+
+
+def test_a_picture_shows_the_bands_of_the_model(mracad, tmp_path):
+    from matplotlib.image import imread
+
+    for name, faces in (("a.png", ("--faces", "#1")), ("b.png", ("--faces", "#1")), ("c.png", ("--faces", "#2"))):
+        assert mracad("spectrum", PANEL, *faces, "-o", tmp_path / name).code == 0
+    one, same, other = (imread(tmp_path / name) for name in ("a.png", "b.png", "c.png"))
+    assert one.shape[:2] == (400, 1000) and (one == same).all() and (one != other).any()
+    assert (tmp_path / "a.png").stat().st_size < 1e5

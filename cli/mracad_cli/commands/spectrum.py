@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import click
 
-from mracad.errors import UsageError
+from mracad.errors import EditError, UsageError
 from mracad.spec.steps import Selection
 from mracad_cli import options
 from mracad_cli.command import Command
@@ -18,7 +19,7 @@ from mracad_cli.say import json_text
 OTHERS = "instance hold keep edges"
 """Options of edits that do not apply here."""
 
-ENDINGS = ".csv", ".json"
+ENDINGS = ".csv", ".json", ".png"
 
 
 @click.command("spectrum", cls=Command, help=__doc__)
@@ -26,7 +27,11 @@ ENDINGS = ".csv", ".json"
     options.reading(),
     options.of(Selection, "chosen", OTHERS),
     click.option(
-        "-o", "--output", metavar="F", type=options.path, help="Write all bands of all faces to a .csv or .json file."
+        "-o",
+        "--output",
+        metavar="F",
+        type=options.path,
+        help="Write all bands of all faces to a .csv, .json or .png file.",
     ),
     options.overwrite,
     options.printing,
@@ -34,11 +39,13 @@ ENDINGS = ".csv", ".json"
 def command(reading: Reading, chosen: Selection, output: str | None, overwrite: bool, as_json: bool) -> None:
     if output:
         if Path(output).suffix not in ENDINGS:
-            raise UsageError(f"cannot write {output}: unknown extension {Path(output).suffix!r}", "use .csv or .json")
+            raise UsageError(
+                f"cannot write {output}: unknown extension {Path(output).suffix!r}", "use .csv, .json or .png"
+            )
         check_target(Path(output), overwrite)
     from mracad.inspect.spectrum import spectra
     from mracad.job.look import looked_at
-    from mracad_cli.render import spectrum
+    from mracad_cli.render import plot, spectrum
 
     with Progress() as progress:
         progress("reading", 0, 1)
@@ -49,5 +56,12 @@ def command(reading: Reading, chosen: Selection, output: str | None, overwrite: 
             progress("measuring waves", done, len(every))
             found += spectra(model, [face])
     body = json_text(spectrum.body(model.name, found))
-    files = {output: spectrum.csv(found) if output.endswith(".csv") else body + "\n"} if output else {}
+    if output and output.endswith(".png") and not found:
+        raise EditError(f"{model.name}: there is no NURBS face to draw", "choose others with --faces")
+    forms: dict[str, Callable[[], str | bytes]] = {
+        ".csv": lambda: spectrum.csv(found),
+        ".json": lambda: body + "\n",
+        ".png": lambda: plot.png(model.name, found),
+    }
+    files: dict[str, str | bytes | None] = {output: forms[Path(output).suffix]()} if output else {}
     deliver(files, [body] if as_json else spectrum.lines(model.name, found))
