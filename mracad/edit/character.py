@@ -31,6 +31,9 @@ Array = np.ndarray
 NOTHING = 1e-7
 """Height up to which there is no detail, mm."""
 
+NONE = 0.03
+"""Share of the allowed error up to which a displacement is none: rounding of nearest points."""
+
 STEPS, LINES = 4000, 9
 """Steps along (at least one per span), and lines across, to measure arc lengths."""
 
@@ -232,7 +235,7 @@ class Carried:
     def laid(self, net: Net) -> Laid:
         """The displacement as offsets over the knots of a net of the surface."""
         offset = self._through(net) + lifted(self.target.net, net, self.own.poles)
-        if np.abs(offset).max() <= NOTHING:
+        if np.abs(offset).max() <= max(NOTHING, NONE * self.missed):
             offset = np.zeros_like(offset)
         return Laid(offset @ self.target.turn, "carried")
 

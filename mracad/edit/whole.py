@@ -78,7 +78,7 @@ def edited(
             break
         every_one = (slide.edge for slide in result.joints.slides)
         lost |= {edge: cannot_slide(model, edge) for edge in (failed if left > 1 else every_one)}
-    outcomes = tuple(_outcome(face, result, movable, scope, options) for face in model.faces)
+    outcomes = tuple(_outcome(face, result, scope, options, wish) for face in model.faces)
     edges = treatments(model, movable, result, options, lost)
     return Edit(result.displacement(), outcomes, edges=edges, restored=restored)
 
@@ -112,9 +112,9 @@ def wished(model: Model, options: Fitting, scope: Scope) -> Wishes:
     return replace(wishes, slide=able, open=not isinstance(options, Fairing | Shaped))
 
 
-def _outcome(face: Face, result: Result, movable: Collection[int], scope: Scope, options: Fitting) -> FaceOutcome:
+def _outcome(face: Face, result: Result, scope: Scope, options: Fitting, wish: Wish) -> FaceOutcome:
     """The outcome for one face."""
-    outcome = untouched(face, scope, movable)
+    outcome = untouched(face, scope, scope.chosen)
     if outcome:
         return outcome
     assert face.surface is not None
@@ -143,19 +143,20 @@ def _outcome(face: Face, result: Result, movable: Collection[int], scope: Scope,
             points=math.prod(offset.poles.shape[:2]),
             inserted=len(offset.u_knots) + len(offset.v_knots),
         )
-    status, reason, said = _left(moved, options)
+    status, reason, said = _left(moved, options, math.isfinite(wish.growth.curvature))
     return replace(known, status=status, reason=reason, said=said)
 
 
-def _left(moved: Moved, options: Fitting) -> tuple[Status, Reason, str]:
-    """Status, reason and details of a face that has detail and stays."""
+def _left(moved: Moved, options: Fitting, smooths: bool) -> tuple[Status, Reason, str]:
+    """Status, reason and details of a face that has detail and stays, for an edit that must not make it rougher or one
+    that may."""
     if options.amount == 0:
         return "unchanged", Reason.AMOUNT, ""
     if not moved.rough or not moved.wanted:
         return "unchanged", Reason.FAIR, ""
     if not moved.free:
         return "left", Reason.NO_FREE, ""
-    if not isinstance(options, Fairing):
+    if not smooths:
         return "left", Reason.FOLDED if moved.limits else Reason.STUCK, ""
     if moved.limits:
         return "left", Reason.ROUGHER, _figures(moved.limits)

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from itertools import pairwise
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,9 +13,13 @@ from mracad.edit.compose import compose
 from mracad.edit.details import Details
 from mracad.edit.level import level
 from mracad.edit.mra import save
+from mracad.edit.result import Reason
+from mracad.edit.tolerances import COARSE, GROWTH
 from mracad.edit.transfer import transfer
+from mracad.edit.whole import _left
 from mracad.errors import Code, EditError, FileError, UsageError
 from mracad.inspect.deviation import deviations
+from mracad.inspect.roughness import Rougher, Worse
 from mracad.inspect.seams import seams
 from mracad.model.brep import Face, Model
 from mracad.occ.view import view
@@ -273,3 +278,14 @@ def test_files_that_hold_no_details(two, tmp_path):
     for name in ("bad.mra", "none.mra"):
         with pytest.raises(FileError, match=name):
             transfer(target, Transfer(source=str(tmp_path / name), map=("#1=#1",)))
+
+
+@pytest.mark.parametrize(
+    ("growth", "limits", "reason"),
+    [(COARSE, (), "STUCK"), (COARSE, (Worse(Rougher.FOLD, 0.0, 170.0),), "FOLDED"), (GROWTH, (), "RIM")],
+)
+def test_why_a_face_stays_depends_on_what_is_asked(growth, limits, reason):
+    """An edit that need not make faces fairer does not say that one cannot get fairer."""
+    moved = SimpleNamespace(rough=True, wanted=1.0, free=3, limits=limits)
+    options = Transfer(source="x.step", map=("place",), band=":9mm")
+    assert _left(moved, options, np.isfinite(growth.curvature))[:2] == ("left", Reason[reason])
