@@ -2,8 +2,8 @@
 
 The noise of every surface is measured unless it is stated: as the part that no smooth surface explains
 (:mod:`mracad.inspect.noise`), or, for few control points, by likelihood (:mod:`mracad.inspect.evidence`).  Of the
-estimates of the surface without noise (:mod:`mracad.edit.estimate`), the one with the least risk is the target, if it
-is surely better than no change.  The wavelengths of the spline, along u and v, are first searched in closed form, for
+estimates of the surface without noise (:mod:`mracad.edit.estimate`), that with the least risk is the target, if it is
+surely better than no change.  The wavelengths of the spline, along u and v, are first searched in closed form, for
 each surface alone.
 """
 

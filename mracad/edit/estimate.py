@@ -108,6 +108,22 @@ class Risk:
         """Whether it is below 0, and along normals not above by more than chance."""
         return self.total < 0 and bool(self.size[1] - 2 * self.removed[1] < self.spread)
 
+    def mixed(self, other: Risk, between: Array) -> tuple[Risk, float]:
+        """The least risk of a mean of the estimate and another, and the share of the other, from 0 to 1.
+
+        Parameters
+        ----------
+        other : Risk
+        between : ndarray (2,)
+            ∫ δ·δ' dA and ∫ (δ·n)(δ'·n) dA of both, mm⁴.
+        """
+        apart = float((self.size - 2 * between + other.size).sum())
+        gain = float((self.size - between - self.removed + other.removed).sum())
+        a = min(max(gain / apart, 0.0), 1.0) if apart > 0.0 else 0.0
+        size = (1 - a) ** 2 * self.size + 2 * a * (1 - a) * between + a**2 * other.size
+        removed = (1 - a) * self.removed + a * other.removed
+        return Risk(size, removed, (1 - a) * self.spread + a * other.spread), a
+
     @property
     def validated(self) -> float:
         """The score of generalised cross-validation."""
@@ -255,7 +271,7 @@ class Noisy:
             found.append(normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300))
         return np.concatenate(found)
 
-    def _products(self, one: Array, other: Array) -> Array:
+    def products(self, one: Array, other: Array) -> Array:
         """∫ a·b dA of two displacements, and ∫ (a·n)(b·n) dA, mm⁴."""
         mass = self.problem.mass
         along = [(each * self._normals).sum(axis=1, keepdims=True) for each in (one, other)]
@@ -267,15 +283,15 @@ class Noisy:
         taken = self.problem.mass @ estimate(z)
         removed = -float((z * taken).sum()) / z.shape[1]
         spread = float(np.sqrt(2 * ((z * z).mean(axis=1, keepdims=True) * taken**2).sum() / z.shape[1]))
-        return Risk(self._products(delta, delta), removed * np.array([3.0, 1.0]), spread)
+        return Risk(self.products(delta, delta), removed * np.array([3.0, 1.0]), spread)
 
     def nonlinear(self, estimate: Estimator, y: Array, delta: Array, spread: float) -> Risk:
         """The risk of another estimate, whose change of the control points is ``delta``."""
         removed, count = np.zeros(2), int(np.clip(LARGE // len(delta), 1, WIENER))
         for probe in range(count):
             z = np.take(self.probes, np.arange(3 * probe, 3 * probe + 3), axis=1, mode="wrap")
-            removed -= self._products(z, estimate(y + SMALL * z) - delta) / SMALL
-        return Risk(self._products(delta, delta), removed / count, spread)
+            removed -= self.products(z, estimate(y + SMALL * z) - delta) / SMALL
+        return Risk(self.products(delta, delta), removed / count, spread)
 
     def mended(self, stiffness: Stiffness, share: float) -> tuple[Noisy, Array]:
         """The same surfaces with up to a share of the control points marked as wrong, and the change of these to the
@@ -320,8 +336,7 @@ def best(noisy: Noisy, start: Stiffness, asked: Asked) -> Array:
     if asked.shrink and not few:
         estimate = noisy.shrunk(at, held)
         other = estimate(y)
-        now = noisy.nonlinear(estimate, y, other, risk.spread)
-        if now.total < risk.total:
-            risk, delta = now, other
+        risk, share = noisy.nonlinear(estimate, y, other, risk.spread).mixed(risk, noisy.products(other, delta))
+        delta = share * delta + (1 - share) * other
     better = risk.likely if few else risk.sure
     return delta + wrong if better else np.zeros_like(delta)

@@ -8,7 +8,7 @@ import pytest
 
 from mracad.bspline.surface import Net
 from mracad.edit.denoise import Quiet, denoise
-from mracad.edit.estimate import Asked
+from mracad.edit.estimate import Asked, Risk
 from mracad.edit.result import Reason
 from mracad.inspect.noise import Noise
 from mracad.inspect.seams import seams
@@ -201,3 +201,19 @@ def test_outliers_go_and_the_rest_is_as_without_them(edges):
         f"{errors[1] / errors[0]:.3f} of the error without outliers; {errors[2] / errors[0]:.3f} if they are not named"
     )
     assert held.any() and errors[1] < 1.15 * errors[0] and errors[2] > 1.5 * errors[0]
+
+
+@pytest.mark.parametrize("removed", [0.3, 1.0, 3.0])
+def test_the_mean_of_two_estimates_with_the_least_risk(removed):
+    rng = np.random.default_rng(2)
+    one, other = rng.standard_normal((2, 2, 50))
+
+    def risk(change, gone):
+        return Risk((change**2).sum(axis=1), gone * np.array([60.0, 20.0]), 1.0)
+
+    first, second = risk(one, 1.0), risk(other, removed)
+    found, share = first.mixed(second, (one * other).sum(axis=1))
+    shares = np.linspace(0, 1, 101)
+    every = [risk((1 - a) * one + a * other, 1 - a + a * removed).total for a in shares]
+    assert found.total == pytest.approx(risk((1 - share) * one + share * other, 1 - share + share * removed).total)
+    assert min(every) - 0.1 < found.total <= min(every) + 1e-9 and abs(share - shares[np.argmin(every)]) <= 0.01
