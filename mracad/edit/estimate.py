@@ -45,6 +45,9 @@ WIENER = 4
 """Number of random probes of the divergence of shrinkage, and their size over σ."""
 SMALL = 0.01
 
+SHARES = 0.0, 0.25, 0.5, 0.75, 1.0
+"""Shares of the spline in the estimate; finer ones would follow the random probes, and not commute with rotations."""
+
 SURE = 3.0
 """Number of standard deviations of its risk by which an estimate must be better than no change."""
 
@@ -109,7 +112,7 @@ class Risk:
         return self.total < 0 and bool(self.size[1] - 2 * self.removed[1] < self.spread)
 
     def mixed(self, other: Risk, between: Array) -> tuple[Risk, float]:
-        """The least risk of a mean of the estimate and another, and the share of the other, from 0 to 1.
+        """The least risk of a mean of the estimate and another, and the share of the other: one of :data:`SHARES`.
 
         Parameters
         ----------
@@ -117,12 +120,14 @@ class Risk:
         between : ndarray (2,)
             ∫ δ·δ' dA and ∫ (δ·n)(δ'·n) dA of both, mm⁴.
         """
-        apart = float((self.size - 2 * between + other.size).sum())
-        gain = float((self.size - between - self.removed + other.removed).sum())
-        a = min(max(gain / apart, 0.0), 1.0) if apart > 0.0 else 0.0
-        size = (1 - a) ** 2 * self.size + 2 * a * (1 - a) * between + a**2 * other.size
-        removed = (1 - a) * self.removed + a * other.removed
-        return Risk(size, removed, (1 - a) * self.spread + a * other.spread), a
+
+        def mean(a: float) -> Risk:
+            size = (1 - a) ** 2 * self.size + 2 * a * (1 - a) * between + a**2 * other.size
+            removed = (1 - a) * self.removed + a * other.removed
+            return Risk(size, removed, (1 - a) * self.spread + a * other.spread)
+
+        share = min(SHARES, key=lambda a: mean(a).total)
+        return mean(share), share
 
     @property
     def validated(self) -> float:
