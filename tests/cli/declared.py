@@ -163,6 +163,7 @@ VALUES: Mapping[str, Sequence[Any]] = {
     "noise": ["0.01mm"],
     "outliers": ["0.5%"],
     "output": ["out.feature"],
+    "places": ["1,2,3"],
     "reference_unit": ["mm"],
     "report": ["report.json"],
     "retry": ["1"],
