@@ -128,13 +128,13 @@ def _cyclides(exponents: Array) -> Array:
     return mix
 
 
-FORMS: dict[str, Callable[[Array], Form]] = {
-    "plane": lambda points: Form(np.array([(0, 0, 1)]), np.ones(1)),
-    "polynomial of degree 4": lambda points: _graph(points, 4),
-    "quadric": lambda points: _algebraic(points, False),
-    "polynomial of degree 6": lambda points: _graph(points, 6),
-    "cyclide": lambda points: _algebraic(points, True),
-}
+FORMS: tuple[Callable[[Array], Form], ...] = (
+    lambda points: Form(np.array([(0, 0, 1)]), np.ones(1)),
+    lambda points: _graph(points, 4),
+    lambda points: _algebraic(points, False),
+    lambda points: _graph(points, 6),
+    lambda points: _algebraic(points, True),
+)
 """How each form is fitted to points ``(q, 3)`` around the origin, in units of the reach; the simplest first."""
 
 
@@ -154,8 +154,6 @@ class Base:
         mm.
     level : float
         Height of the chart's origin over that of the window.
-    name : str
-        The kind of form.
     error : float
         How far the form is off one half of the ring when fitted to the other, root mean square, mm.
     points : ndarray (q, 3)
@@ -169,7 +167,6 @@ class Base:
     rest: Any
     reach: float
     level: float
-    name: str
     error: float
     points: Array
     heights: Array
@@ -210,8 +207,8 @@ def under(ground: Ground, window: Window) -> Base:
     reach = window.reach
     frame, local, ring, within = _levelled(ground, window)
     own, inside = local[ring] / reach, local[within] / reach
-    name, error = _best(own, inside)
-    form = FORMS[name](own)
+    fit, error = _best(own, inside)
+    form = fit(own)
     side = np.linspace(-CLOSE, CLOSE, CELLS + 1)
     ab = pairs(side, side)
     rest = RectBivariateSpline(side, side, _plate(form, _thinned(own, PLATE))(ab).reshape(CELLS + 1, -1))
@@ -224,24 +221,24 @@ def under(ground: Ground, window: Window) -> Base:
     chart = charts(origin[None], frame[None], np.array([CLOSE * reach]), spread[None], there[None, 1:])
     heights = reach * _off(form, rest, inside)[0]
     inner = window.point + local[within] @ frame
-    return Base(chart, form, rest, reach, level, name, error * reach, inner, heights)
+    return Base(chart, form, rest, reach, level, error * reach, inner, heights)
 
 
-def _best(own: Array, inside: Array) -> tuple[str, float]:
-    """The form for points of a ring around points inside, and its error there; lengths are fractions of the reach.
+def _best(own: Array, inside: Array) -> tuple[Callable[[Array], Form], float]:
+    """How to fit the form for points of a ring, and its error there; lengths are fractions of the reach.
 
-    A form under which the points inside would stand higher than they can is none.
+    A form above which points inside the ring would stand higher than they can is none.
     """
     radius = np.linalg.norm(own[:, :2], axis=1)
     inner = radius < np.median(radius)
     tallest = _tallest(own, inside)
-    best, least = "", np.inf
-    for name, fit in FORMS.items():
+    best, least = FORMS[0], np.inf
+    for fit in FORMS:
         missed = np.concatenate([_missed(fit, own[part], own[~part]) for part in (inner, ~inner)])
         error = float(np.sqrt((missed**2).mean()))
         tame = np.abs(_missed(fit, own, inside)).max(initial=0.0) <= tallest
-        if not best or (tame and error * BETTER < least):
-            best, least = name, error
+        if fit is best or (tame and error * BETTER < least):
+            best, least = fit, error
     return best, least
 
 

@@ -8,7 +8,7 @@ it can be separated there.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -106,8 +106,11 @@ def found(model: Model, faces: Collection[int]) -> list[Found]:
             proposed += _on(Patch.of(model, surface.index, own))
     ground, kept = Ground.of(model, faces), list[Found]()
     for each in sorted(proposed, key=lambda f: -f.height)[:MOST]:
-        if not any(_within(each, f) for f in kept):
-            kept += [f for f in _confirmed(ground, each) if not any(_within(f, g) for g in kept)]
+        if any(_within(each, f) for f in kept):
+            continue
+        new = _confirmed(ground, each)
+        if new is not None and not any(_within(new, f) for f in kept):
+            kept.append(new)
     return sorted(kept, key=lambda f: -f.height)
 
 
@@ -116,27 +119,32 @@ def _within(f: Found, g: Found) -> bool:
     return bool(np.linalg.norm(np.subtract(f.place, g.place)) < g.size)
 
 
-def _confirmed(ground: Ground, proposed: Found) -> Iterator[Found]:
+def _confirmed(ground: Ground, proposed: Found) -> Found | None:
     """The feature at a place, if there is one."""
-    sizes = (proposed.size * SMALLER**k for k in range(WINDOWS))
-    seen = [(each, base) for size in sizes for each in [replace(proposed, size=size)] for base in _bases(ground, each)]
+    tried = [replace(proposed, size=proposed.size * SMALLER**k) for k in range(WINDOWS)]
+    seen = [(each, base) for each in tried if (base := _base(ground, each)) is not None]
     first, base = max(seen, key=lambda pair: _clear(pair[1]), default=(proposed, None))
     if base is None or _clear(base) < CLEAR / 2:
-        return
+        return None
     better = _measured(ground, first, base)
     for each in (better, replace(better, size=first.size), first):
-        for base in _bases(ground, each):
-            if _clear(base) >= CLEAR and np.abs(base.heights).max() > each.floor and _separable(ground, each):
-                yield replace(_measured(ground, each, base), window=(*each.place, each.size))
-                return
+        base = _base(ground, each)
+        if base is not None and _stands_out(base, each.floor) and _separable(ground, each):
+            return replace(_measured(ground, each, base), window=(*each.place, each.size))
+    return None
 
 
-def _bases(ground: Ground, found: Found) -> Iterator[Base]:
+def _base(ground: Ground, found: Found) -> Base | None:
     """The base under the window of a feature, if there is one."""
     try:
-        yield under(ground, _window(ground, found))
+        return under(ground, _window(ground, found))
     except EditError:
-        return
+        return None
+
+
+def _stands_out(base: Base, floor: float) -> bool:
+    """Whether what stands on a base is above its error and the noise."""
+    return _clear(base) >= CLEAR and float(np.abs(base.heights).max()) > floor
 
 
 def _window(ground: Ground, found: Found) -> Window:
@@ -155,9 +163,11 @@ def _measured(ground: Ground, found: Found, base: Base) -> Found:
     height = float(size.max())
     own = size > max(RIM * height, 3 * base.error)
     middle = np.average(base.points[own], axis=0, weights=size[own] ** 2)
-    place = ground.feet(middle[None]).points[0]
+    feet = ground.feet(middle[None])
+    (place,), (face,) = feet.points, ground.faces(feet.surface, feet.uv).tolist()
     across = 2 * float(np.linalg.norm(base.points[own] - place, axis=1).max())
-    return replace(found, place=tuple(place.tolist()), size=across, height=height)
+    face = found.face if face < 0 else face
+    return replace(found, face=face, place=tuple(place.tolist()), size=across, height=height)
 
 
 def _separable(ground: Ground, found: Found) -> bool:

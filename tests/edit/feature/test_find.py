@@ -25,7 +25,7 @@ def test_what_is_proposed_can_be_moved(samples):
     faces = {face.index for face in shell.faces}
     (one,) = found(shell, faces)
     print(one)
-    assert np.abs(np.array(one.place)[:2] - [90, -2]).max() < 2.0
+    assert np.abs(np.array(one.place)[:2] - [90, -2]).max() < 2.0 and one.face == 4
     assert abs(one.height - 1.5) < 0.25 and 26 < one.size < 36
     edit = move(shell, Move(feature=one.text, to="150,-2,44"))
     assert abs(edit.copies[0].deviation) < 0.02 * one.height
