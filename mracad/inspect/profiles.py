@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -13,8 +15,10 @@ from mracad.wavelet.ladder import arc_lengths
 
 Array = np.ndarray
 
-LINES = 48
-"""Number of profiles along each direction."""
+LINES = 16, 48
+"""Least and largest number of profiles along each direction: :data:`ACROSS` per span, within these limits."""
+
+ACROSS = 2
 
 SIZES = 64, 128, 256, 512, 1024
 """Numbers of points of profiles: the first that gives :data:`PER_SPAN` points per span, or the last."""
@@ -29,8 +33,28 @@ CLOSED = 1e-6
 """Share of its length within which the ends of a closed profile meet."""
 
 
-def profiles(net: Net, face: Face, axis: int) -> Iterator[tuple[Array, Array, float, bool]]:
-    """Points and normals at even arc lengths along lines on a face, the length (mm), and whether the line closes."""
+@dataclass(frozen=True, eq=False)
+class Profiles:
+    """Profiles with the same number of points.
+
+    Attributes
+    ----------
+    points, normals : ndarray (p, n, 3)
+        Points at even arc lengths, mm, and unit normals there (0 where there is none).
+    lengths : ndarray (p,)
+        mm.
+    closed : bool
+        Whether the lines close.
+    """
+
+    points: Array
+    normals: Array
+    lengths: Array
+    closed: bool
+
+
+def profiles(net: Net, face: Face, axis: int) -> list[Profiles]:
+    """The profiles of a face along u (axis 0) or v, by their number of points and whether they close."""
     along = (net.u, net.v)[axis]
     low, high = _extent(net, face, axis)
     inner = along.breaks[(along.breaks > low) & (along.breaks < high)]
@@ -40,28 +64,39 @@ def profiles(net: Net, face: Face, axis: int) -> Iterator[tuple[Array, Array, fl
     others, _ = lines(net, face, 1 - axis)
     us, vs = (at, others) if axis == 0 else (others, at)
     grid, mask = net.grid(us, vs), inside_grid(face, net, us, vs)
-    for k, other in enumerate(others):
-        line, on = (grid[:, k], mask[:, k]) if axis == 0 else (grid[k], mask[k])
-        for first, last in _runs(on):
-            steps = np.linalg.norm(np.diff(line[first : last + 1], axis=0), axis=1)
-            length = float(steps.sum())
-            if not length > 0.0:
-                continue
-            closed = last - first + 1 == len(at) and np.linalg.norm(line[0] - line[-1]) <= CLOSED * length
-            spans = np.count_nonzero((inner > at[first]) & (inner < at[last])) + 1
-            count = next((size for size in SIZES if size >= PER_SPAN * spans), SIZES[-1])
-            share = np.arange(count) / (count if closed else count - 1)
-            place = np.interp(share * length, np.append(0.0, np.cumsum(steps)), at[first : last + 1])
-            uv = np.stack([place, np.full(count, other)][:: 1 if axis == 0 else -1], axis=1)
-            points, su, sv = net.evaluate(uv, 1)
-            yield points, np.nan_to_num(net.normals(uv, tangents=(su, sv))), length, bool(closed)
+    if axis == 0:
+        grid, mask = grid.swapaxes(0, 1), mask.T
+    steps = np.linalg.norm(np.diff(grid, axis=1), axis=2)
+    groups: defaultdict[tuple[int, bool], list[tuple[Array, float]]] = defaultdict(list)
+    for k, first, last in _runs(mask):
+        far = np.append(0.0, np.cumsum(steps[k, first:last]))
+        length = float(far[-1])
+        if not length > 0.0:
+            continue
+        closed = last - first + 1 == len(at) and np.linalg.norm(grid[k, 0] - grid[k, -1]) <= CLOSED * length
+        spans = np.count_nonzero((inner > at[first]) & (inner < at[last])) + 1
+        count = next((size for size in SIZES if size >= PER_SPAN * spans), SIZES[-1])
+        share = np.arange(count) / (count if closed else count - 1)
+        place = np.interp(share * length, far, at[first : last + 1])
+        uv = np.stack([place, np.full(count, others[k])][:: 1 if axis == 0 else -1], axis=1)
+        groups[count, bool(closed)].append((uv, length))
+    return [_evaluated(net, each, closed) for (_, closed), each in groups.items()]
 
 
-def _runs(on: Array) -> list[tuple[int, int]]:
-    """First and last positions of runs of at least :data:`SHORTEST` points that are on the face."""
-    change = np.flatnonzero(np.diff(np.concatenate([[0], on.astype(int), [0]])))
-    pairs = zip(change[::2].tolist(), (change[1::2] - 1).tolist(), strict=True)
-    return [(first, last) for first, last in pairs if last - first + 1 >= SHORTEST]
+def _evaluated(net: Net, each: Sequence[tuple[Array, float]], closed: bool) -> Profiles:
+    uv = np.concatenate([at for at, _ in each])
+    points, su, sv = net.evaluate(uv, 1)
+    normals = np.nan_to_num(net.normals(uv, tangents=(su, sv)))
+    shape = len(each), -1, 3
+    return Profiles(points.reshape(shape), normals.reshape(shape), np.array([length for _, length in each]), closed)
+
+
+def _runs(on: Array) -> list[tuple[int, int, int]]:
+    """Lines (rows), first and last positions of runs of at least :data:`SHORTEST` points that are on the face."""
+    change = np.diff(np.pad(on.astype(np.int8), ((0, 0), (1, 1))), axis=1)
+    (line, first), (_, after) = np.nonzero(change > 0), np.nonzero(change < 0)
+    long = after - first >= SHORTEST
+    return list(zip(line[long].tolist(), first[long].tolist(), (after[long] - 1).tolist(), strict=True))
 
 
 def _extent(net: Net, face: Face, axis: int) -> tuple[float, float]:
@@ -84,5 +119,7 @@ def lines(net: Net, face: Face, axis: int) -> tuple[Array, float]:
     at = np.concatenate([knots.breaks + turn * knots.period for turn in turns])
     total = np.concatenate([lengths + turn * lengths[-1] for turn in turns])
     first, last = np.interp(ends, at, total)
-    step = (last - first) / LINES
-    return np.interp(first + step * (np.arange(LINES) + 0.5), total, at), float(step)
+    spans = np.count_nonzero((total > first) & (total < last)) + 1
+    count = int(np.clip(ACROSS * spans, *LINES))
+    step = (last - first) / count
+    return np.interp(first + step * (np.arange(count) + 0.5), total, at), float(step)

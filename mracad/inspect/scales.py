@@ -1,32 +1,18 @@
-"""Detail on the faces of a model at a scale, from knots and nets alone: no edit is made, no seam is measured.
-
-At a scale s the surface S_f of each face is projected onto the coarse space of its knots at that scale, as in
-smoothing; the difference d = S_f − S_{Pf} is measured in the knot cells that the face touches.
-"""
+"""Detail on the faces of a model below a scale, from their nets alone: no edit is made, no seam is measured."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import numpy as np
-
-from mracad.bspline.basis import gauss
 from mracad.bspline.crease import crease_lines
-from mracad.bspline.knots import KnotVector
-from mracad.bspline.surface import Net
+from mracad.inspect.spectrum import NOTHING, spectrum
 from mracad.model.brep import Face, Model, Surface
-from mracad.model.region import face_region
 from mracad.seam.hold import separate
-from mracad.wavelet.ladder import arc_lengths, finest_scale
-from mracad.wavelet.project import at_scale
+from mracad.wavelet.ladder import arc_lengths
 
-Array = np.ndarray
-
-LEAST = 1e-7
+LEAST = NOTHING[0]
 """Smallest height that counts as detail, mm: the kernel's coincidence tolerance."""
-
-_POINTS = 2  # places at which a knot cell is sampled in each direction
 
 
 @dataclass(frozen=True)
@@ -39,25 +25,21 @@ class FaceScales:
         Index in ``Model.faces``.
     spans : (float, float)
         Smallest and largest knot span, mm.
-    finest : float
-        Smallest wavelength that the knots allow to remove, mm; 0 if there is none.
+    first : float
+        The shortest wavelength at which there are waves, mm; 0 if there are none.
     creases : int
         Crease lines inside the face, which every edit keeps.
-    coarser : bool
-        Whether the knots allow a coarser surface at the scale.
-    detail, rms : float
-        Largest and root mean square height of the detail that smoothing would remove if nothing were held, mm.
+    detail : float
+        Root mean square height that smoothing at the scale would remove if nothing were held, mm.
     free, points : int
         Numbers of control points that can move while all edges stay, and of all on which the face depends.
     """
 
     face: int
     spans: tuple[float, float]
-    finest: float
+    first: float
     creases: int
-    coarser: bool
     detail: float
-    rms: float
     free: int
     points: int
 
@@ -94,43 +76,12 @@ def _of_surface(model: Model, surface: Surface, scale: float, keep: str) -> list
     net, faces = surface.net, [model.faces[i] for i in surface.faces]
     spans = arc_lengths(net, 0), arc_lengths(net, 1)
     separation = separate(net, faces, surface.faces, keep)
-    creases = crease_lines(net, 0, separation.visible), crease_lines(net, 1, separation.visible)
-    directions = list(zip((net.u, net.v), spans, creases, strict=True))
-    finest = [finest_scale(*each) for each in directions]
-    smoothed = at_scale(net, scale, creases)
-    coarser = smoothed.poles is not net.poles
-    squares = _squares(net, net.poles - smoothed.poles) if coarser else np.zeros((net.u.spans, net.v.spans, 1))
-    area = np.multiply.outer(*spans)
+    creases = sum(len(crease_lines(net, axis, separation.visible)) for axis in (0, 1))
+    extent = float(min(s.min() for s in spans)), float(max(s.max() for s in spans))
 
     def of(face: Face) -> FaceScales:
-        inside, reach = face_region(net, face).inside, separation.reach[face.index]
-        heights = squares[inside]
-        mean = np.average(heights.mean(axis=-1), weights=area[inside]) if area[inside].any() else 0.0
-        return FaceScales(
-            face.index,
-            (float(min(s.min() for s in spans)), float(max(s.max() for s in spans))),
-            min(filter(None, finest), default=0.0),
-            sum(map(len, creases)),
-            coarser,
-            float(np.sqrt(heights.max(initial=0.0))),
-            float(np.sqrt(mean)),
-            int((reach & separation.free).sum()),
-            int(reach.sum()),
-        )
+        waves, reach = spectrum(net, face), separation.reach[face.index]
+        free, points = int((reach & separation.free).sum()), int(reach.sum())
+        return FaceScales(face.index, extent, waves.first, creases, waves.below(scale), free, points)
 
     return [of(face) for face in faces]
-
-
-def _squares(net: Net, offsets: Array) -> Array:
-    """Squared lengths of offsets at a few places of every knot cell, ``(cells_u, cells_v, places)``."""
-    us, vs = (_places(knots) for knots in (net.u, net.v))
-    heights = net.with_poles(offsets).grid(us, vs)
-    squares = np.square(heights).sum(axis=-1)
-    cells = squares.reshape(net.u.spans, _POINTS, net.v.spans, _POINTS)
-    return np.asarray(cells.swapaxes(1, 2).reshape(net.u.spans, net.v.spans, _POINTS**2))
-
-
-def _places(knots: KnotVector) -> Array:
-    """Parameters of the places in every span."""
-    span, offset, _ = gauss(knots, _POINTS)
-    return np.asarray((knots.knots[span][:, None] + offset).ravel())

@@ -18,8 +18,7 @@ of a ring, which do not need this.
 from __future__ import annotations
 
 import math
-from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -65,6 +64,8 @@ class Band:
     ----------
     low, high : float
         Wavelengths, mm.
+    middle : float
+        Mean wavelength of the energy, on a logarithmic scale, mm.
     rms : float
         Root mean square height, mm: A / √2 for a wave of amplitude A.
     energy : float
@@ -75,6 +76,7 @@ class Band:
 
     low: float
     high: float
+    middle: float
     rms: float
     energy: float
     share: float
@@ -96,9 +98,24 @@ class Direction:
     shape: float
 
     @property
+    def waves(self) -> tuple[Band, ...]:
+        """The bands of waves shorter than the shape."""
+        return tuple(band for band in self.bands if band.low < self.shape)
+
+    @property
     def detail(self) -> float:
         """Root mean square height of the waves shorter than the shape, mm."""
-        return float(np.sqrt(sum(band.rms**2 for band in self.bands if band.low < self.shape)))
+        return float(np.sqrt(sum(band.rms**2 for band in self.waves)))
+
+    @property
+    def first(self) -> float:
+        """Wavelength from which there are waves shorter than the shape, mm; 0 if there are none."""
+        least = _least(self.bands[-1].high) if self.bands else 0.0
+        return next((band.low for band in self.waves if band.rms > least), 0.0)
+
+    def below(self, scale: float) -> float:
+        """Root mean square height of waves shorter than the shape that smoothing at a scale (mm) would remove, mm."""
+        return float(np.sqrt(sum((band.rms * _removed(band.middle / scale)) ** 2 for band in self.waves)))
 
 
 @dataclass(frozen=True)
@@ -127,6 +144,15 @@ class Spectrum:
         """A scale that removes waves shorter than the shape and keeps the shape, mm; None if there are none."""
         found = [way.shape for way in (self.u, self.v) if way.shape]
         return min(found) / KEPT if found else None
+
+    @property
+    def first(self) -> float:
+        """Wavelength from which there are waves shorter than the shape, mm; 0 if there are none."""
+        return min((way.first for way in (self.u, self.v) if way.first), default=0.0)
+
+    def below(self, scale: float) -> float:
+        """Root mean square height of waves shorter than the shape that smoothing at a scale (mm) would remove, mm."""
+        return max(self.u.below(scale), self.v.below(scale))
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,23 +197,21 @@ def spectra(model: Model, faces: Sequence[int]) -> list[Spectrum]:
     nets = {face.index: model.surfaces[face.surface].net for face in every if face.surface is not None}
     noise = noises({face.index: (nets[face.index], [face]) for face in every})
     sizes = {i: each.size if each else 0.0 for i, each in noise.items()}
-    return [_of_face(nets[face.index], face, sizes[face.index]) for face in every]
+    return [spectrum(nets[face.index], face, sizes[face.index]) for face in every]
 
 
 def together(each: Sequence[Spectrum]) -> Spectrum:
     """The spectrum of several faces as one, from those of each; the shape begins where it does on half of the area."""
-    area = sum(spectrum.area for spectrum in each)
+    area = sum(one.area for one in each)
     ways = []
     for name in ("u", "v"):
-        energies: defaultdict[int, float] = defaultdict(float)
-        for spectrum in each:
-            for band in getattr(spectrum, name).bands:
-                energies[_band(band.low * 1.5)] += band.energy
-        whole = _direction({k: energy / area for k, energy in energies.items()}, area)
+        bands = [band for one in each for band in getattr(one, name).bands]
+        waves, energies = np.array([[band.middle, band.energy] for band in bands]).reshape(-1, 2).T
+        whole = _direction(waves, energies / max(area, 1e-300), area)
         ways.append(replace(whole, shape=_middle([(getattr(s, name).shape, s.area) for s in each])))
-    noises = [(spectrum.area, spectrum.noise) for spectrum in each]
+    noises = [(one.area, one.noise) for one in each]
     size = float(np.sqrt(sum(a * s**2 for a, s in noises) / area)) if area else 0.0
-    return Spectrum(tuple(face for spectrum in each for face in spectrum.faces), area, ways[0], ways[1], size)
+    return Spectrum(tuple(face for one in each for face in one.faces), area, ways[0], ways[1], size)
 
 
 def _middle(values: Sequence[tuple[float, float]]) -> float:
@@ -197,86 +221,85 @@ def _middle(values: Sequence[tuple[float, float]]) -> float:
     return ordered[int(np.searchsorted(weights, weights[-1] / 2))][0]
 
 
-def _of_face(net: Net, face: Face, noise: float) -> Spectrum:
+def spectrum(net: Net, face: Face, noise: float = 0.0) -> Spectrum:
+    """The spectrum of a face on a net, with a noise that is known."""
     ways = [_along(net, face, axis) for axis in (0, 1)]
     area = max(each for _, each in ways)
-    u, v = (_direction(energies, area) for energies, _ in ways)
+    u, v = (_direction(*waves, area) for waves, _ in ways)
     return Spectrum((face.index,), area, u, v, noise)
 
 
-def _along(net: Net, face: Face, axis: int) -> tuple[dict[int, float], float]:
-    """The mean square height by band along one direction, mm², and the area of the face, mm²."""
-    groups: dict[tuple[int, bool, int], list[Array]] = defaultdict(list)
-    lengths: dict[tuple[int, bool, int], list[float]] = defaultdict(list)
-    for points, normals, length, closed in profiles(net, face, axis):
-        key = len(points), closed, round(np.log(length) / np.log(ALIKE))
-        groups[key].append(length * (_of_ring if closed else _of_beam)(points, normals))
-        lengths[key].append(length)
-    total = sum(sum(each) for each in lengths.values())
-    energies: defaultdict[int, float] = defaultdict(float)
-    for key, each in groups.items():
-        count, closed, _ = key
-        energy, length = np.sum(each, axis=0), float(np.mean(lengths[key]))
-        waves, explained = (1.0 / np.arange(1, len(energy) + 1), energy) if closed else _explained(energy, count)
-        for wave, part in zip(length * waves, explained.tolist(), strict=True):
-            energies[_band(wave)] += part / total
-    return dict(energies), total * lines(net, face, 1 - axis)[1]
+def _along(net: Net, face: Face, axis: int) -> tuple[tuple[Array, Array], float]:
+    """Wavelengths (mm) and mean square heights (mm²) of waves along one direction, and the area of the face, mm²."""
+    waves, energies, total = np.zeros(0), np.zeros(0), 0.0
+    for group in profiles(net, face, axis):
+        found = (_of_rings if group.closed else _of_beams)(group.points, group.normals)
+        alike, which = np.unique(np.round(np.log(group.lengths) / np.log(ALIKE)), return_inverse=True)
+        share = (np.arange(len(alike))[:, None] == which).astype(float)
+        energy, length = (share * group.lengths) @ found, (share @ group.lengths) / share.sum(axis=1)
+        if group.closed:
+            relative = 1.0 / np.arange(1, energy.shape[1] + 1)
+        else:
+            relative, energy = _explained(energy, group.points.shape[1])
+        waves = np.append(waves, np.multiply.outer(length, relative))
+        energies = np.append(energies, energy)
+        total += float(group.lengths.sum())
+    return (waves, energies / max(total, 1e-300)), total * lines(net, face, 1 - axis)[1]
 
 
 def _explained(energy: Array, count: int) -> tuple[Array, Array]:
-    """Wavelengths over the length, and the energies of such waves that explain those of modes."""
+    """Wavelengths over the length, and the energies ``(r, j)`` of such waves that explain the modes of each row."""
     modes = _modes(count)
-    found = np.full(len(modes.waves), energy.sum() / len(modes.waves))
+    found = np.repeat(energy.sum(axis=1, keepdims=True) / len(modes.waves), len(modes.waves), axis=1)
     for _ in range(PASSES):
-        found *= modes.table.T @ (energy / np.maximum(modes.table @ found, 1e-300))
+        found *= (energy / np.maximum(found @ modes.table.T, 1e-300)) @ modes.table
     return modes.waves, found
 
 
-def _of_beam(points: Array, normals: Array) -> Array:
-    """Energies of the modes of a profile other than rigid motions, mm²."""
-    modes = _modes(len(points))
+def _of_beams(points: Array, normals: Array) -> Array:
+    """Energies of the modes of profiles other than rigid motions ``(p, n - 2)``, mm²."""
+    count = points.shape[1]
+    modes = _modes(count)
     slow = int((modes.lengths > SLOW).sum())
     shapes = modes.shapes[:, :slow]
-    found = modes.shapes.T @ points
-    calm = shapes @ (shapes.T @ normals)
-    calm /= np.maximum(np.linalg.norm(calm, axis=1, keepdims=True), 1e-300)
-    heights = ((points - shapes @ found[:slow]) * calm).sum(axis=1)
-    energy = (modes.shapes.T @ heights) ** 2
-    energy[:slow] = (found[:slow] ** 2).sum(axis=1)
-    return np.asarray(energy[2:] / len(points))
+    found = np.einsum("nm,pnk->pmk", modes.shapes, points, optimize=True)
+    calm = _unit(shapes @ (shapes.T @ normals))
+    heights = ((points - shapes @ found[:, :slow]) * calm).sum(axis=2)
+    energy = (heights @ modes.shapes) ** 2
+    energy[:, :slow] = (found[:, :slow] ** 2).sum(axis=2)
+    return np.asarray(energy[:, 2:] / count)
 
 
-def _of_ring(points: Array, normals: Array) -> Array:
-    """Energies of the waves of a closed profile, with one, two, three … periods, mm²."""
-    count = len(points)
-    found = np.fft.rfft(points, axis=0)
-    slow = np.where(np.arange(len(found))[:, None] <= 1.0 / SLOW, found, 0.0)
-    calm = np.where(np.arange(len(found))[:, None] <= 1.0 / SLOW, np.fft.rfft(normals, axis=0), 0.0)
-    calm = np.fft.irfft(calm, count, axis=0)
-    calm /= np.maximum(np.linalg.norm(calm, axis=1, keepdims=True), 1e-300)
-    heights = np.fft.rfft(((points - np.fft.irfft(slow, count, axis=0)) * calm).sum(axis=1))
-    energy = np.abs(heights) ** 2
-    low = np.arange(len(found)) <= 1.0 / SLOW
-    energy[low] = (np.abs(found[low]) ** 2).sum(axis=1)
-    return np.asarray(2.0 * energy[1:] / count**2)
+def _of_rings(points: Array, normals: Array) -> Array:
+    """Energies of the waves of closed profiles, with one, two, three … periods, ``(p, m)``, mm²."""
+    count = points.shape[1]
+    found, calm = np.fft.rfft(points, axis=1), np.fft.rfft(normals, axis=1)
+    slow = np.arange(found.shape[1]) <= 1.0 / SLOW
+    calm = _unit(np.fft.irfft(np.where(slow[:, None], calm, 0.0), count, axis=1))
+    low = np.fft.irfft(np.where(slow[:, None], found, 0.0), count, axis=1)
+    energy = np.abs(np.fft.rfft(((points - low) * calm).sum(axis=2), axis=1)) ** 2
+    energy[:, slow] = (np.abs(found[:, slow]) ** 2).sum(axis=2)
+    return np.asarray(2.0 * energy[:, 1:] / count**2)
 
 
-def _band(wavelength: float) -> int:
-    """The number of the octave in which a wavelength lies."""
-    return int(np.floor(np.log2(wavelength / EDGE)))
+def _unit(vectors: Array) -> Array:
+    return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-300))
 
 
-def _direction(energies: Mapping[int, float], area: float) -> Direction:
-    """Bands without gaps, from their mean squares (mm²), and where the shape begins."""
-    if not energies:
+def _direction(waves: Array, energies: Array, area: float) -> Direction:
+    """Bands without gaps, from wavelengths (mm) and mean squares (mm²), and where the shape begins."""
+    if not len(waves):
         return Direction((), 0.0)
-    numbers = range(min(energies), max(energies) + 1)
-    total = sum(energies.values())
+    octaves = np.log2(waves / EDGE)
+    numbers = np.floor(octaves).astype(int)
+    least = int(numbers.min())
+    means, moments = (np.bincount(numbers - least, weights) for weights in (energies, energies * octaves))
+    total = float(means.sum())
     bands = []
-    for k in numbers:
-        mean = energies.get(k, 0.0)
-        share = mean / total if total > 0.0 else 0.0
-        bands.append(Band(EDGE * 2.0**k, EDGE * 2.0 ** (k + 1), float(np.sqrt(mean)), mean * area, share))
+    for k, (mean, moment) in enumerate(zip(means.tolist(), moments.tolist(), strict=True), least):
+        middle = moment / mean if mean > 0.0 else k + 0.5
+        limits = EDGE * 2.0**k, EDGE * 2.0 ** (k + 1), EDGE * 2.0**middle
+        bands.append(Band(*limits, math.sqrt(mean), mean * area, mean / total if total > 0.0 else 0.0))
     return Direction(tuple(bands), _begin(bands))
 
 
@@ -287,5 +310,14 @@ def _begin(bands: Sequence[Band]) -> float:
     first = max((k for k, band in enumerate(bands) if FORM * band.low <= longest), default=0)
     while first and energy[first - 1] < energy[first]:
         first -= 1
-    least = max(NOTHING[0], NOTHING[1] * longest)
-    return math.sqrt(bands[first].low * bands[first].high) if sum(energy[:first]) > least**2 else 0.0
+    return math.sqrt(bands[first].low * bands[first].high) if sum(energy[:first]) > _least(longest) ** 2 else 0.0
+
+
+def _least(longest: float) -> float:
+    """The largest root mean square height that counts as zero, mm, where waves have at most this length, mm."""
+    return max(NOTHING[0], NOTHING[1] * longest)
+
+
+def _removed(scales: float) -> float:
+    """Share of its height that smoothing removes from a wave of this many scales."""
+    return 1.0 / (1.0 + scales**8)

@@ -108,36 +108,6 @@ def ladder_for_scale(
     return kv if thinned == kv else thinned
 
 
-def finest_scale(
-    kv: KnotVector,
-    lengths: Array,
-    keep: AbstractSet[float] | Array = frozenset(),
-    tolerance: float = 1e-4,
-) -> float:
-    """The smallest scale for which :func:`ladder_for_scale` finds a coarser knot vector, mm; 0 if there is none.
-
-    The parameters are those of :func:`ladder_for_scale`.
-    """
-    lengths = np.asarray(lengths, dtype=float)
-    apart = lengths[lengths >= max(tolerance, 1e-6 * float(lengths.sum()))]
-    if not len(apart):
-        return 0.0
-    ladder = _Ladder(kv, keep, lengths, tolerance, float(apart.min()))
-    beside = ladder.beside() * (float(apart.min()) / _RESOLUTION)
-    total = np.add.reduceat(kv.multiplicities, ladder.first)
-    stays = ladder.kept.copy()
-    stays[[0, -1]] |= not kv.periodic
-    cut = (total > 1) & ~np.logical_and.reduceat(stays, ladder.first)
-    # a cluster goes as a whole, or is reduced to one knot or to three per scale
-    scales = np.concatenate([beside[~ladder.fixed], beside[cut] / 2, 1.5 * (beside / total)[cut & (total > 3)]])
-    if not kv.periodic:
-        return float(scales.min()) if len(scales) else 0.0
-    for least in np.unique(scales):  # a loop needs some spans: not all may go
-        if ladder_for_scale(kv, lengths, float(least) * (1 + 4 / _RESOLUTION), keep, tolerance) != kv:
-            return float(least)
-    return 0.0
-
-
 def arc_lengths(net: Net, direction: int) -> Array:
     """Mean length of the iso-curves on each knot span.
 

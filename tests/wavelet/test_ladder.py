@@ -11,7 +11,7 @@ from mracad.bspline.knots import KnotVector
 from mracad.bspline.refine import is_nested
 from mracad.bspline.surface import Net
 from mracad.errors import UsageError
-from mracad.wavelet.ladder import arc_lengths, finest_scale, ladder_for_scale, rungs_by_level
+from mracad.wavelet.ladder import arc_lengths, ladder_for_scale, rungs_by_level
 from mracad.wavelet.project import projection
 from tests.bspline.spaces import KINDS, random_knots
 from tests.bspline.test_surface import circle, sphere
@@ -221,24 +221,3 @@ def test_bad_requests_are_refused():
             ladder_for_scale(kv, lengths, scale)
     with pytest.raises(UsageError):
         rungs_by_level(kv, np.ones(2, dtype=bool))
-
-
-@pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("most", [1, 3, 5])
-def test_the_finest_scale_is_the_least_at_which_knots_go(kind, most):
-    for seed in range(12):
-        kv = random_knots(5, kind, 5 + 3 * seed, seed, most)
-        lengths = np.diff(kv.breaks) * 40.0
-        keep = frozenset(kv.breaks[2 : 2 + seed % 4])
-        least = finest_scale(kv, lengths, keep)
-        assert least == 0.0 or ladder_for_scale(kv, lengths, least * (1 + 1e-5), keep) != kv
-        below = [least * (1 - 1e-5)] if least else [1e-3, 1.0, 100.0, 1e6]
-        assert all(ladder_for_scale(kv, lengths, scale, keep) == kv for scale in below)
-
-
-def test_a_single_span_has_no_finest_scale():
-    assert finest_scale(uniform(3, 0), np.array([7.0])) == 0.0
-
-
-def test_the_finest_scale_of_plain_knots_is_two_spans():
-    assert finest_scale(uniform(3, 3), np.full(8, 2.5)) == pytest.approx(5.0, rel=1e-5)

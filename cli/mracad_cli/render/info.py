@@ -178,11 +178,10 @@ def _judged(face: Face, scales: FaceScales | None) -> dict[str, Any]:
         "smoothing": status,
         "reason": reason,
         "detail": scales.detail if scales else 0.0,
-        "detail_rms": scales.rms if scales else 0.0,
         "free_poles": scales.free if scales else 0,
         "visible_poles": scales.points if scales else 0,
         "spans": list(scales.spans) if scales else [0.0, 0.0],
-        "finest_scale": scales.finest if scales else 0.0,
+        "shortest_wavelength": scales.first if scales else 0.0,
         "crease_lines": scales.creases if scales else 0,
     }
 
@@ -193,11 +192,8 @@ def _status(face: Face, scales: FaceScales | None) -> tuple[str, str]:
 
     if scales is None:
         return "analytic", f"{face.kind}, not a NURBS face"
-    if not scales.coarser:
-        creases = scales.creases and not scales.finest
-        return "unchanged", "crease lines only" if creases else "no span finer than the scale"
     if scales.detail <= LEAST:
-        return "unchanged", "no detail"
+        return "unchanged", "no waves below the scale" if scales.first else "no waves"
     return "changes", ""
 
 
@@ -216,7 +212,7 @@ def _row(model: Model, face: Face, scales: FaceScales | None) -> Sequence[str]:
         )
         if true
     ]
-    change = f"changes by {scales.detail:.2g} mm, rms {scales.rms:.2g}"
+    change = f"changes by {scales.detail:.2g} mm rms"
     return (
         f"#{face.index + 1}",
         face.kind,
@@ -226,7 +222,7 @@ def _row(model: Model, face: Face, scales: FaceScales | None) -> Sequence[str]:
         f"{scales.free}/{scales.points}",
         f"{scales.spans[0]:.3g}–{scales.spans[1]:.3g}",
         change if status == "changes" else reason,
-        f"{scales.finest:.3g} mm" if scales.finest else "never",
+        f"{scales.first:.3g} mm" if scales.first else "never",
         name,
     )
 

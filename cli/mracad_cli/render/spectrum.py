@@ -17,7 +17,7 @@ WIDTH = 20
 DECADES = 5.0
 """Number of decades of height that bars show."""
 
-HEAD = "face,direction,from_mm,to_mm,rms_mm,energy_mm4,share"
+HEAD = "face,direction,from_mm,to_mm,wavelength_mm,rms_mm,energy_mm4,share"
 
 
 def body(name: str, each: Sequence[Spectrum]) -> dict[str, Any]:
@@ -39,7 +39,8 @@ def _values(spectrum: Spectrum) -> dict[str, Any]:
 
 
 def _way(way: Direction) -> dict[str, Any]:
-    bands = [{"from": b.low, "to": b.high, "rms": b.rms, "energy": b.energy, "share": b.share} for b in way.bands]
+    names = {"from": "low", "to": "high", "wavelength": "middle", "rms": "rms", "energy": "energy", "share": "share"}
+    bands = [{name: getattr(band, own) for name, own in names.items()} for band in way.bands]
     return {"shape": way.shape or None, "detail": way.detail, "bands": bands}
 
 
@@ -53,7 +54,7 @@ def csv(each: Sequence[Spectrum]) -> str:
     for face, spectrum in rows:
         for name in ("u", "v"):
             bands = getattr(spectrum, name).bands
-            values = ((b.low, b.high, b.rms, b.energy, b.share) for b in bands)
+            values = ((b.low, b.high, b.middle, b.rms, b.energy, b.share) for b in bands)
             found += [",".join([face, name, *(f"{value:.9g}" for value in row)]) for row in values]
     return "\n".join(found) + "\n"
 
