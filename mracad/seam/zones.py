@@ -81,6 +81,13 @@ class Zoned:
         return np.asarray(np.min([_distance(zone, face.placed(points)) for face in self.faces], axis=0))
 
     @property
+    def within(self) -> Array:
+        """Parameters ``(q, 2)`` of examined points in a region."""
+        us, vs = self._parameters
+        i, j = np.nonzero(self._inside)
+        return np.stack([us.ravel()[i], vs.ravel()[j]], axis=1)
+
+    @property
     def held(self) -> Array:
         """Control points ``(nu, nv)`` on which a part of the surface in a region depends."""
         if not self.zones:

@@ -91,6 +91,13 @@ TOGETHER: Mapping[str, Sequence[tuple[str, Sequence[Words]]]] = {
                 ("--along", "edge#1,3,3"),
             ],
         ),
+        (
+            "at grid polar along fill margin skip_off",
+            [
+                ("--fill", "poisson,spacing:4mm", "--margin", "1mm"),
+                ("--fill", "poisson,spacing:20%"),
+            ],
+        ),
     ],
     "transfer": [
         (

@@ -218,6 +218,8 @@ OWN = {
     "move keep": ("--keep g2", "IN tangent.step --to 9.4,5,0 --clip --faces #1"),
     "repeat keep": ("--keep g2", "IN tangent.step --at 9.4,5,0 --clip --faces #1"),
     "transfer keep": ("--keep g2", "IN tangent.step --to 9.4,5,0 --clip --faces #1"),
+    "repeat fill": ("--fill poisson,spacing:5mm", "LESS --at --fill poisson,spacing:4mm"),
+    "repeat margin": ("--margin 1mm", "LESS --at --fill poisson,spacing:4mm"),
     "repeat polar": ("--polar 2,8,5,0,0,0,1",),
 }
 
@@ -323,7 +325,10 @@ def words(case):
         base.remove("--json")
         return base, [*base, "--json"], old
     changed, own = list(base), given.split()
-    if option in ("scale", "by", "to", "from_", "feature", "folder", "output", "keep", "map") and own[0] in changed:
+    if (
+        option in ("scale", "by", "to", "from_", "feature", "folder", "output", "keep", "map", "fill")
+        and own[0] in changed
+    ):
         _give(changed, own)
     else:
         changed += own

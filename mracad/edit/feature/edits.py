@@ -73,7 +73,7 @@ def repeat(
     chosen = scope.movable(model)
     feature = feature_of(model, options, chosen, options.feature)
     ground = Ground.of(model, chosen).without(feature.origin.offsets if feature.origin else {})
-    found, skipped = places(ground, feature, options)
+    found, skipped = places(ground, feature, options, _wishes(options, scope))
     return replace(_edit(model, scope, _laid(ground, feature, found, options, scope, {})), notes=skipped)
 
 
@@ -119,8 +119,11 @@ def _laid(
         )
     overlap = options.overlap if isinstance(options, Repeat) else "add"
     every = copies(ground, feature, found, standing(ground, found, feature.reach), overlap, options.mirror)
-    wishes = Wishes(options.keep, hold=scope.edges, zones=scope.zones)
-    return laid(every, wishes, options.edges == "coupled", options.clip, removed)
+    return laid(every, _wishes(options, scope), options.edges == "coupled", options.clip, removed)
+
+
+def _wishes(options: Copied | Transfer, scope: Scope) -> Wishes:
+    return Wishes(options.keep, hold=scope.edges, zones=scope.zones)
 
 
 def _edit(model: Model, scope: Scope, laid: Laid) -> Edit:

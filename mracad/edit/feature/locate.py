@@ -103,14 +103,14 @@ def told(off: Collection[str]) -> str:
 def stood(ground: Ground, places: Sequence[Place], far: float) -> tuple[Feet, dict[str, int]]:
     """The feet of places, and words about those farther than ``far`` (mm) from the ground, with their indices."""
     points = np.array([p.point for p in places]).reshape(-1, 3)
-    feet = ground.feet(points)
-    surface, uv, apart = feet.surface.copy(), feet.uv.copy(), feet.apart.copy()
-    for i, p in enumerate(places):
-        if p.face is not None and p.uv is not None:
-            surface[i], uv[i], apart[i] = ground.model.faces[p.face].surface, p.uv, 0.0
+    given = np.array([p.face is not None for p in places], bool)
+    feet = ground.feet(points[~given])
+    surface, uv, apart = np.zeros(len(places), int), np.zeros((len(places), 2)), np.zeros(len(places))
+    surface[~given], uv[~given], apart[~given] = feet.surface, feet.uv, feet.apart
+    for i in np.flatnonzero(given).tolist():
+        surface[i], uv[i] = ground.model.faces[places[i].face or 0].surface, places[i].uv
     feet = ground.standing(surface, uv, apart)
     on = np.isfinite(apart) & (ground.faces(surface, uv) >= 0)
-    given = np.array([p.face is not None for p in places], bool)
     bad = ~on | ~(given | ((apart <= far) & (feet.beside(points) <= SIDEWAYS * far)))
     off = {}
     for i in np.flatnonzero(bad).tolist():

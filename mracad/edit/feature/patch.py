@@ -228,7 +228,13 @@ class Patch:
 
     def inside(self, face: Face, uv: Array) -> Array:
         """Whether parameters ``(q, 2)`` lie within a face or on its boundary, by its outline."""
-        return np.asarray(self._off(face, uv) <= FLAT)
+        region = face_region(self.net, face)
+        cells = self._cells(uv, self.net)
+        found = self.within(uv) & region.inside[cells]
+        if region.crossed:
+            some = np.flatnonzero(np.logical_or.reduce(region.crossed)[cells])
+            found[some] = self._off(face, uv[some]) <= FLAT
+        return np.asarray(found)
 
     def _off(self, face: Face, uv: Array) -> Array:
         """How far parameters ``(q, 2)`` lie outside a face, in shares of the domain; 0 within."""

@@ -9,12 +9,14 @@ from dataclasses import replace
 import numpy as np
 
 from mracad.edit.feature.detail import Feature
+from mracad.edit.feature.fill import filled
 from mracad.edit.feature.ground import SIDEWAYS, Feet, Ground, axes
 from mracad.edit.feature.locate import ON, Place, place, standing, stood, told
 from mracad.edit.feature.patch import Patch
 from mracad.errors import EditError, UsageError
 from mracad.model.brep import Face
 from mracad.seam.trace import EVENLY, Trace, trace_of
+from mracad.seam.wishes import Wishes
 from mracad.spec import places as spec
 from mracad.spec.quantity import length
 from mracad.spec.steps import Repeat
@@ -25,7 +27,7 @@ STRIDES = 4
 """Steps from one place of a grid to the next."""
 
 
-def places(ground: Ground, feature: Feature, options: Repeat) -> tuple[list[Place], tuple[str, ...]]:
+def places(ground: Ground, feature: Feature, options: Repeat, wishes: Wishes) -> tuple[list[Place], tuple[str, ...]]:
     """All places of copies, each with the rotation and scales of the copy there, and notes on those left out.
 
     Raises
@@ -37,7 +39,7 @@ def places(ground: Ground, feature: Feature, options: Repeat) -> tuple[list[Plac
     FileError
         For an invalid file of places.
     """
-    found = listed(ground, options.at)
+    found = filled(ground, feature, options, wishes) if options.fill else listed(ground, options.at)
     if options.grid or options.polar:
         first = found[0] if found else None
         own = feature.origin is not None and first is None

@@ -162,6 +162,20 @@ class Repeat(Single, frozen=True, kw_only=True, forbid_unknown_fields=True):
         Annotated[str, places.along] | None,
         Meta(description="EDGE,N[,OFFSET]: N places evenly along edge#4, OFFSET (mm) inside its first selected face."),
     ] = None
+    fill: Annotated[
+        Annotated[str, places.fill] | None,
+        Meta(
+            description="poisson,spacing:4mm: places all over the selected faces, at random, nowhere nearer than this "
+            "along the surface, over smooth seams."
+        ),
+    ] = None
+    margin: Annotated[
+        Length | None,
+        Meta(
+            description="With --fill: width kept clear of copies along borders, which are free and held edges, creases "
+            "and holes. Default: copies just fit, or with --clip may run over borders."
+        ),
+    ] = None
     skip_off: Annotated[
         bool, Meta(description="Leave out places that are not on the faces, instead of refusing them all.")
     ] = False
@@ -181,10 +195,20 @@ class Repeat(Single, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not (self.at or self.grid or self.polar or self.along):
-            raise UsageError("at: no place is given for the copies", "give --at, --grid, --polar or --along", "at")
-        if sum(x is not None for x in (self.grid, self.polar, self.along)) > 1:
-            raise UsageError("grid, polar and along cannot be combined", "give one of them")
+        if not (self.at or self.grid or self.polar or self.along or self.fill):
+            hint = "give --at, --grid, --polar, --along or --fill"
+            raise UsageError("at: no place is given for the copies", hint, "at")
+        if sum(x is not None for x in (self.grid, self.polar, self.along, self.fill)) > 1:
+            raise UsageError("grid, polar, along and fill cannot be combined", "give one of them")
+        self._filled()
+
+    def _filled(self) -> None:
+        """Raise UsageError for places besides those that fill the faces, and for options that only these take."""
+        if self.fill and (self.at or self.skip_off):
+            name = "at" if self.at else "skip-off"
+            raise UsageError(f"fill: it finds all places itself, without --{name}", f"leave --{name} out", "fill")
+        if self.margin and not self.fill:
+            raise UsageError("margin: only --fill keeps borders clear", "give --fill poisson,spacing:4mm", "margin")
 
     @property
     def done(self) -> str:

@@ -184,3 +184,50 @@ def bumped(net, span, distance, normal):
     weight = Net(fine.u, fine.v, fine.weights[..., None]).grid(*at)
     delta = at_greville(fine.u, fine.v, weight * bump(distance(points))[..., None] * normal(points))
     return Net(fine.u, fine.v, fine.poles + delta / fine.weights[..., None], fine.weights)
+
+
+def ball(radius, spans=12, degree=3):
+    """A sphere of six sewn patches, those of a cube: bicubic, equiangular, outside out."""
+    k = KnotVector.clamped(np.linspace(-np.pi / 4, np.pi / 4, spans + 1), degree)
+    u, v = np.tan(np.meshgrid(k.greville(), k.greville(), indexing="ij"))
+    nets = []
+    for axis in range(3):
+        for sign in (1.0, -1.0):
+            normal = sign * np.eye(3)[axis]
+            a = np.eye(3)[(axis + 1) % 3]
+            points = normal + u[..., None] * a + v[..., None] * np.cross(normal, a)
+            points *= radius / np.linalg.norm(points, axis=-1, keepdims=True)
+            nets.append(Net(k, k, at_greville(k, k, points)))
+    return nets
+
+
+def sewn(nets, name="sewn"):
+    """Patches over natural domains as one shell: sides whose control points agree share an edge, corners a vertex."""
+    vertices, edges, faces = {}, {}, []
+    for net in nets:
+        (u0, u1), (v0, v1) = net.u.domain, net.v.domain
+        sides = [
+            (net.poles[:, 0], net.u, (0.0, v0), (1, 0), True),
+            (net.poles[-1], net.v, (u1, 0.0), (0, 1), True),
+            (net.poles[:, -1], net.u, (0.0, v1), (1, 0), False),
+            (net.poles[0], net.v, (u0, 0.0), (0, 1), False),
+        ]
+        loop = []
+        for poles, k, at, way, forward in sides:
+            ends = [tuple(np.round(p, 6) + 0.0) for p in (poles[0], poles[-1])]
+            for end, p in zip(ends, (poles[0], poles[-1]), strict=True):
+                vertices.setdefault(end, topology.vertex(p))
+            key = (*sorted(ends), *np.round(np.sort(poles.mean(axis=0)), 5).tolist())
+            if key not in edges:
+                curve = geometry.curve(poles, k.knots, k.degree)
+                edges[key] = topology.edge(curve, (vertices[ends[0]], vertices[ends[1]]), k.domain), ends[0]
+            shape, first = edges[key]
+            turned = first != ends[0]
+            low, high = k.domain
+            start = np.array(at) + np.array(way) * (low + high if turned else 0.0)
+            line = geometry.line2d(tuple(start), tuple(-w if turned else w for w in way))
+            loop.append(topology.Side(shape, line, forward != turned))
+        surface = geometry.surface(net.poles, net.u.knots, net.v.knots, (net.u.degree, net.v.degree))
+        faces.append(topology.face(surface, [loop]))
+    closed = len(edges) == 2 * len(nets)
+    return documents.single(topology.solid(faces) if closed else topology.shell(faces), name)
