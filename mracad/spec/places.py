@@ -18,7 +18,6 @@ ZONE = "write a region as near:X,Y,Z,radius:R or box:X,Y,Z,X,Y,Z (mm), or radius
 GRID = "write it as NxM,DX,DY: 4x3,25,25"
 POLAR = "write it as N,x|y|z or N,X,Y,Z,DX,DY,DZ: 6,z"
 HEADING = "write it as X, Y, Z, u, v or edge#4"
-FILL = "write it as poisson with a distance: poisson,spacing:4mm"
 ALONG = "write it as EDGE,N or EDGE,N,OFFSET: edge#4,10,15"
 
 FAR = 1e12
@@ -26,9 +25,6 @@ FAR = 1e12
 
 MOST_PLACES = 10_000
 """Places that one edit takes."""
-
-MOST_FILLED = 50_000
-"""Places that fill the faces of one edit, at most."""
 
 AXES = {"x": (0.0, 0.0, 0.0, 1.0, 0.0, 0.0), "y": (0.0, 0.0, 0.0, 0.0, 1.0, 0.0), "z": (0.0, 0.0, 0.0, 0.0, 0.0, 1.0)}
 
@@ -113,14 +109,6 @@ class Polar:
     count: int
     centre: tuple[float, ...]
     axis: tuple[float, ...]
-
-
-@dataclass(frozen=True)
-class Fill:
-    """Places all over the faces: how they are arranged, and their distance as text, a length."""
-
-    kind: str
-    spacing: str
 
 
 @dataclass(frozen=True)
@@ -297,15 +285,6 @@ def polar(text: str, name: str) -> Polar:
     if not any(six[3:]):
         raise UsageError(f"{name}: {text!r} has no direction", POLAR)
     return Polar(count, six[:3], six[3:])
-
-
-def fill(text: str, name: str) -> Fill:
-    """Places all over the faces from ``KIND,spacing:LENGTH``; raises UsageError."""
-    match = re.fullmatch(r"\s*(poisson)\s*,\s*spacing\s*:\s*(.+)", text)
-    if match is None:
-        raise _wrong(name, text, "a way to fill faces", FILL)
-    length(match[2], 1.0, f"{name}: spacing")
-    return Fill(match[1], match[2])
 
 
 def heading(text: str, name: str) -> str:

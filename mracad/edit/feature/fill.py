@@ -18,7 +18,7 @@ from mracad.edit.feature.spread import Area, Spots, apart, nearest, thrown
 from mracad.errors import Code, EditError, MracadError
 from mracad.seam.interface import Joints, joints
 from mracad.seam.wishes import Wishes
-from mracad.spec import places as spec
+from mracad.spec import fill as spec
 from mracad.spec.quantity import length
 from mracad.spec.steps import Repeat
 

@@ -8,6 +8,7 @@ from msgspec import Meta
 
 from mracad.errors import UsageError
 from mracad.spec import places
+from mracad.spec.fill import fill as read_fill
 from mracad.spec.quantity import Angle, Length, band_of
 from mracad.spec.steps.base import Selection
 
@@ -163,7 +164,7 @@ class Repeat(Single, frozen=True, kw_only=True, forbid_unknown_fields=True):
         Meta(description="EDGE,N[,OFFSET]: N places evenly along edge#4, OFFSET (mm) inside its first selected face."),
     ] = None
     fill: Annotated[
-        Annotated[str, places.fill] | None,
+        Annotated[str, read_fill] | None,
         Meta(
             description="poisson,spacing:4mm: places all over the selected faces, at random, nowhere nearer than this "
             "along the surface, over smooth seams."
