@@ -87,9 +87,12 @@ def seams(model: Model, every: bool = False) -> list[SeamMeasure]:
     return _measured(model, _pairs(model, every))
 
 
-def remeasured(model: Model, before: list[SeamMeasure], moved: Collection[int]) -> list[SeamMeasure]:
-    """The result of :func:`seams` after some surfaces ``moved``, given that of ``before``."""
-    pairs = _pairs(model)
+def remeasured(old: Model, model: Model, before: list[SeamMeasure], moved: Collection[int]) -> list[SeamMeasure]:
+    """The result of :func:`seams` after some surfaces of an ``old`` model ``moved``, given that of ``before``.
+
+    Free edges that coincided then are measured at the same places now.
+    """
+    pairs = _pairs(model, matched=old)
     touched = [any(model.faces[side.face].surface in moved for side in sides) for _, _, sides in pairs]
     fresh = iter(_measured(model, [pair for pair, new in zip(pairs, touched, strict=True) if new]))
     return [next(fresh) if new else old for old, new in zip(before, touched, strict=True)]
@@ -113,13 +116,15 @@ def key(measure: SeamMeasure) -> tuple[int, tuple[int, int]]:
     return measure.edge, measure.faces
 
 
-def _pairs(model: Model, every: bool = False) -> list[_Pair]:
-    """The edges of :func:`seams`, whether they are sewn, and the two faces' views of them."""
+def _pairs(model: Model, every: bool = False, matched: Model | None = None) -> list[_Pair]:
+    """The edges of :func:`seams`, whether they are sewn, and the two faces' views of them; free edges that coincide
+    may be those of another state of the model."""
     sewn: list[_Pair] = [
         (e, True, (e.sides[0], e.sides[1])) for e in model.edges if len(e.sides) == 2 and len(e.points)
     ]
-    matched: list[_Pair] = [(e, False, pair) for e, _, pair in coinciding(model, TORN if every else GAP)]
-    return [pair for pair in sewn + matched if every or any(side.uv is not None for side in pair[2])]
+    found = coinciding(model if matched is None else matched, TORN if every else GAP)
+    unsewn: list[_Pair] = [(e, False, pair) for e, _, pair in found]
+    return [pair for pair in sewn + unsewn if every or any(side.uv is not None for side in pair[2])]
 
 
 def _measured(model: Model, pairs: list[_Pair]) -> list[SeamMeasure]:

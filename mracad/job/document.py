@@ -199,7 +199,7 @@ def run(
             stage("measuring seams")
         valid_after = valid_before
         offsets = result.displacement.offsets
-        after = remeasured(result.displacement.applied(model), before, offsets) if offsets else before
+        after = remeasured(model, result.displacement.applied(model), before, offsets) if offsets else before
         found = torn(model, before, after, result, allowed, options.keep)
         if found and left.stopped(result.displacement.slid_at(model, found)):
             continue

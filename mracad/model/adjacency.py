@@ -15,6 +15,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from mracad.bspline.vectors import across, unit
 from mracad.model.brep import Edge, Model, Side
 from mracad.model.sampling import between, hermite, slopes
 from mracad.model.sampling import length as polygon
@@ -32,6 +33,13 @@ OF_MODEL, OF_EDGE, PRECISION = 1e-4, 2e-3, 1e-6
 
 BEYOND = 0.125
 """Share of the first and last steps by which an edge continues beyond its samples."""
+
+NEWTON = 4
+"""Newton steps to the nearest point of a curve."""
+
+COARSE = 0.1
+"""Distance from an edge, over the step between its samples, beyond which it is certainly not its seam: arcs between
+samples miss bumps that are narrower than a few steps."""
 
 
 def reach(model: Model, edge: Edge, other: Edge) -> float:
@@ -53,9 +61,8 @@ def coinciding(model: Model, gap: float = GAP) -> list[tuple[Edge, Edge, tuple[S
         edge, other = free[i], free[j]
         if (j, i) in found:
             continue
-        off, uv = _carried(edge.points, other)
-        if np.linalg.norm(off, axis=1).max() <= gap * reach(model, edge, other):
-            side = Side(other.sides[0].face, uv=uv) if uv is not None else _baked(edge.points - off, other)
+        side, off = _laid(model, edge, other)
+        if off <= gap * reach(model, edge, other):
             found[i, j] = (edge, other, (edge.sides[0], side))
     return list(found.values())
 
@@ -115,13 +122,24 @@ def length(edge: Edge) -> float:
     return polygon(edge.points)
 
 
-def apart(edge: Edge, other: Edge) -> float:
+def apart(model: Model, edge: Edge, other: Edge) -> float:
     """Largest distance of an edge's samples from another edge, mm."""
-    return float(np.linalg.norm(_carried(edge.points, other)[0], axis=1).max())
+    return _laid(model, edge, other)[1]
 
 
-def _carried(points: Array, edge: Edge) -> tuple[Array, Array | None]:
-    """Offsets of ``points`` (k, 3) from an edge, and the parameters there on its face (None for a fixed side)."""
+def _laid(model: Model, edge: Edge, other: Edge) -> tuple[Side, float]:
+    """The side of another edge at the samples of an edge, and their largest distance from it, mm."""
+    off, at = _carried(edge.points, other)
+    far = float(np.linalg.norm(off, axis=1).max())
+    if other.sides[0].uv is None:
+        return _baked(edge.points - off, other), far
+    if far > COARSE * np.linalg.norm(np.diff(other.points, axis=0), axis=1).max():
+        return other.sides[0], far
+    return _sided(model, _seen(model, edge), other, at)
+
+
+def _carried(points: Array, edge: Edge) -> tuple[Array, Array]:
+    """Offsets of ``points`` (k, 3) from an edge, and where they lie among its samples, as fractional indices."""
     start, chord = edge.points[:-1], np.diff(edge.points, axis=0)
     square = np.maximum((chord**2).sum(axis=1), np.finfo(float).tiny)
     low, high = np.zeros(len(chord)), np.ones(len(chord))
@@ -138,8 +156,35 @@ def _carried(points: Array, edge: Edge) -> tuple[Array, Array | None]:
     tangent = chord[segment] / np.sqrt(square[segment])[:, None]
     shift = (apart * tangent).sum(axis=1, keepdims=True)
     inner = ((s > low[segment][:, None]) & (s < high[segment][:, None])).astype(float)
-    uv = edge.sides[0].uv
-    return apart - inner * shift * tangent, None if uv is None else hermite(uv, np.gradient(uv, axis=0), segment, s)
+    return apart - inner * shift * tangent, segment + s[:, 0]
+
+
+def _seen(model: Model, edge: Edge) -> Array:
+    """The points of an edge's face at its samples; its own samples if the face has no surface of control points."""
+    side = edge.sides[0]
+    face = model.faces[side.face]
+    if side.uv is None or face.surface is None:
+        return edge.points
+    return face.placed(model.surfaces[face.surface].net.evaluate(side.uv))
+
+
+def _sided(model: Model, points: Array, edge: Edge, at: Array) -> tuple[Side, float]:
+    """The side of an edge at the points of its curve nearest to ``points``, which lie at fractional indices of its
+    samples, and their largest distance, mm.  Samples are too far apart to interpolate to the accuracy of a seam."""
+    face = model.faces[edge.sides[0].face]
+    assert face.surface is not None
+    curve, net = face.trim(edge.index).curve, model.surfaces[face.surface].net
+    start, stop = curve.knots.domain
+    share = 0.5 - 0.5 * np.cos(np.pi * np.clip((at + 0.5) / len(edge.points), 0.0, 1.0))
+    for _ in range(NEWTON):
+        uv, way = curve.evaluate(start + share * (stop - start), 1)
+        s, su, sv = net.evaluate(uv, 1)
+        along = face.turned((stop - start) * (su * way[:, :1] + sv * way[:, 1:]))
+        step = ((points - face.placed(s)) * along).sum(axis=1) / np.maximum((along**2).sum(axis=1), 1e-300)
+        share = np.clip(share + step, 0.0, 1.0)
+    uv = curve.evaluate(start + share * (stop - start))[0]
+    off = across(points - face.placed(net.evaluate(uv)), unit(along))
+    return Side(face.index, uv=uv), float(np.linalg.norm(off, axis=1).max())
 
 
 def _baked(points: Array, other: Edge) -> Side:

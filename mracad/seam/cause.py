@@ -30,7 +30,6 @@ class Still(Enum):
     STAYS = "one of its faces stays"
     UNSLID = "could not slide along its {} neighbour"
     BARE = "no copy on the other side"
-    UNSEWN = "trimmed and not sewn"
     OPEN = "trimmed: cannot be kept within the tolerance"
     BROKEN = "would open or lose its smoothness"
 

@@ -230,8 +230,8 @@ def _twin(model: Model, edge: Edge, face: int) -> Edge | None:
         for other in model.edges
         if other.free and other.sides[0].face == face and abs(length(other) - own) <= WHOLE * own
     ]
-    nearest = min(others, key=lambda other: apart(edge, other), default=None)
-    return nearest if nearest and apart(edge, nearest) <= reach(model, edge, nearest) else None
+    nearest = min(others, key=lambda other: apart(model, edge, other), default=None)
+    return nearest if nearest and apart(model, edge, nearest) <= reach(model, edge, nearest) else None
 
 
 def runs_back(one: Array, other: Array) -> bool:

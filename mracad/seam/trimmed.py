@@ -112,9 +112,15 @@ def trimmed(model: Model, edge: Edge, twin: Edge, wishes: Wishes) -> TrimmedSeam
 
 
 def _followed(model: Model, a: Trace, b: Trace, back: bool) -> Array:
-    """Fractions of the curve of b nearest to points at even fractions of a."""
+    """Fractions of the curve of b nearest to points at even fractions of a; its ends correspond to those of a."""
+    fractions = _nearest(model, a, b, EVENLY[::-1] if back else EVENLY)
+    ends = [1.0, 0.0] if back else [0.0, 1.0]
+    return np.concatenate([ends[:1], fractions[1:-1], ends[1:]])
+
+
+def _nearest(model: Model, a: Trace, b: Trace, fractions: Array) -> Array:
+    """Fractions of the curve of b nearest to points at even fractions of a, by Newton steps from given ones."""
     points = model.surfaces[a.surface].net.evaluate(a.places(EVENLY))
-    fractions = EVENLY[::-1] if back else EVENLY
     net = model.surfaces[b.surface].net
     for _ in range(NEWTON):
         s, su, sv = net.evaluate(b.places(fractions), 1)
@@ -122,8 +128,18 @@ def _followed(model: Model, a: Trace, b: Trace, back: bool) -> Array:
         along = su * way[:, :1] + sv * way[:, 1:]
         step = ((points - s) * along).sum(axis=1) / np.maximum((along**2).sum(axis=1), 1e-300)
         fractions = np.clip(fractions + step, 0.0, 1.0)
-    ends = [1.0, 0.0] if back else [0.0, 1.0]
-    return np.concatenate([ends[:1], fractions[1:-1], ends[1:]])
+    return np.asarray(fractions)
+
+
+def followed(model: Model, seam: TrimmedSeam) -> TrimmedSeam:
+    """The seam with its nearest points as corresponding ones, instead of those at equal fractions of both curves.
+
+    Where these lie apart along the seam, a displacement that tilts it, equal at both, would open it.
+    """
+    if seam.since or seam.edge != seam.twin:
+        return seam
+    fractions = _nearest(model, seam.a, seam.b, EVENLY)
+    return replace(seam, b=replace(seam.b, law=(EVENLY, fractions))) if (np.diff(fractions) >= 0).all() else seam
 
 
 def beside(model: Model, seam: Seam, wishes: Wishes) -> TrimmedSeam | Cause:

@@ -28,7 +28,7 @@ from mracad.seam.hold import separate
 from mracad.seam.interface import Joints, joints
 from mracad.seam.natural import Seam
 from mracad.seam.trace import Trace
-from mracad.seam.trimmed import TrimmedSeam
+from mracad.seam.trimmed import TrimmedSeam, followed
 from mracad.seam.wishes import Wishes
 from mracad.seam.zones import zoned
 
@@ -154,17 +154,9 @@ def _task(copies: Copies, shifts: Shifts, wishes: Wishes, removed: Mapping[int, 
                 nets[i], poles[i] = own.over(*knots), laid @ patch.turn
     under = {face.index for i in nets for face in ground.patches[i].faces}
     size = MISSED * copies.height, float(copies.reach.max())
-    joined = _explained(ground, under, _sewn(joints(ground.model, under, wishes)))
-    return _Task(rest, known, removed, nets, poles, joined, size)
-
-
-def _sewn(joined: Joints) -> Joints:
-    """Joints without the trimmed seams between edges that only coincide: their corresponding points are not known to
-    the tolerance of a copy."""
-    loose = tuple(seam for seam in joined.loose if seam.edge == seam.twin)
-    apart = {edge: Cause(Still.UNSEWN) for seam in joined.loose if seam not in loose for edge in (seam.edge, seam.twin)}
-    exact = tuple(seam for seam in joined.exact if seam.edge not in apart)
-    return replace(joined, exact=exact, loose=loose, frozen={**joined.frozen, **apart})
+    joined = joints(ground.model, under, wishes)
+    joined = replace(joined, loose=tuple(followed(ground.model, seam) for seam in joined.loose))
+    return _Task(rest, known, removed, nets, poles, _explained(ground, under, joined), size)
 
 
 def _explained(ground: Ground, under: Collection[int], joined: Joints) -> Joints:
