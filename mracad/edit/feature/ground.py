@@ -5,13 +5,17 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mracad.bspline.closest import feet as closest
 from mracad.edit.feature.chart import Charts, charts
-from mracad.edit.feature.patch import Patch
+from mracad.edit.feature.patch import Patch, from_boxes
 from mracad.model.brep import Model
+
+if TYPE_CHECKING:
+    from scipy.spatial import cKDTree
 
 Array = np.ndarray
 
@@ -20,6 +24,9 @@ GRID = 11
 
 STEEP = 0.2
 """Least cosine between normals at one place: beyond it is the other side of a wall."""
+
+SAME = 1e-12
+"""Distances that differ by less, mm, are equal: of two surfaces the first then counts."""
 
 SIDEWAYS = 1e-3
 """Share of its distance by which a point may lie beside the normal at its foot; beyond that the ground has ended."""
@@ -54,6 +61,28 @@ class Feet:
         """Distance of points from the normals at their feet, mm."""
         way = points - self.points
         return np.asarray(np.linalg.norm(way - (way * self.normals).sum(axis=1, keepdims=True) * self.normals, axis=1))
+
+
+@dataclass(frozen=True, eq=False)
+class _Nearest:
+    """The nearest feet found so far: like :class:`Feet`, and how far the faces themselves are, mm."""
+
+    surface: Array
+    uv: Array
+    apart: Array
+    reached: Array
+
+    @classmethod
+    def none(cls, count: int) -> _Nearest:
+        return cls(np.zeros(count, int), np.zeros((count, 2)), np.full(count, np.inf), np.full(count, np.inf))
+
+    def take(self, index: int, which: Array, uv: Array, apart: Array, reached: Array) -> None:
+        """Take feet on a surface where they are nearer, ``which`` being different points."""
+        best = self.reached[which]
+        better = (reached < best - SAME) | ((reached <= best + SAME) & (index < self.surface[which]))
+        some = which[better]
+        self.surface[some], self.uv[some] = index, uv[better]
+        self.apart[some], self.reached[some] = apart[better], reached[better]
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,24 +145,52 @@ class Ground:
         The surface whose faces come nearest within their trims counts; where that is at a rim, the foot lies on the
         surface beyond it.
         """
-        best, apart = (np.full(len(points), np.inf) for _ in range(2))
-        surface, uv = np.zeros(len(points), int), np.zeros((len(points), 2))
-        trees = {i: patch.spots for i, patch in self.patches.items() if len(patch.seeds[0])}
-        far = {i: tree.query(points)[0] for i, tree in trees.items()}
-        most = np.min([self.patches[i].marks.query(points)[0] for i in trees], axis=0) if trees else best
-        for index, tree in trees.items():
-            patch = self.patches[index]
-            near = np.flatnonzero(far[index] - patch.apart <= most)
-            count = min(3, tree.n)
-            which = tree.query(points[near], k=count)[1].reshape(len(near), count)
-            for k in range(count if len(near) else 0):
-                at, off = closest(patch.net, points[near], patch.seeds[0][which[:, k]])
-                some = np.flatnonzero((off < best[near] - 1e-12) & patch.covers(at))
-                reached = np.maximum(off[some], patch.beyond(points[near[some]], at[some]))
-                better = reached < best[near[some]] - 1e-12
-                here, some = near[some[better]], some[better]
-                best[here], apart[here], surface[here], uv[here] = reached[better], off[some], index, at[some]
-        return self.standing(surface, uv, apart)
+        nearest, (tree, owners) = _Nearest.none(len(points)), self._spots
+        if len(owners) and len(points):
+            first = owners[tree.query(points)[1]]
+            for index in self.patches:  # what is found there leaves few others to be looked at
+                self._look(nearest, index, points, np.flatnonzero(first == index))
+            far = np.flatnonzero(np.isinf(nearest.reached))
+            most = nearest.reached.copy()
+            if len(far):
+                most[far] = self._marks.query(points[far])[0]
+            for index, patch in self.patches.items():
+                most = np.minimum(most, nearest.reached)
+                some = np.flatnonzero((first != index) & (from_boxes(points, patch.whole) <= most + SAME))
+                some = some[from_boxes(points[some], patch.boxes) <= most[some] + SAME]
+                self._look(nearest, index, points, some)
+        return self.standing(nearest.surface, nearest.uv, nearest.apart)
+
+    @cached_property
+    def _spots(self) -> tuple[cKDTree, Array]:
+        """The seeds of all surfaces, and the surface of each."""
+        from scipy.spatial import cKDTree
+
+        seeds = [patch.seeds[1] for patch in self.patches.values()]
+        owners = np.repeat(list(self.patches), list(map(len, seeds)))
+        return cKDTree(np.concatenate([*seeds, np.empty((0, 3))])), owners
+
+    @cached_property
+    def _marks(self) -> cKDTree:
+        """Points within the faces and on their boundaries."""
+        from scipy.spatial import cKDTree
+
+        return cKDTree(np.concatenate([patch.marks for patch in self.patches.values()]))
+
+    def _look(self, nearest: _Nearest, index: int, points: Array, some: Array) -> None:
+        """Look for nearer feet of some points on one surface, from its three nearest seeds."""
+        patch = self.patches[index]
+        count = min(3, len(patch.seeds[0]))
+        if not len(some) or not count:
+            return
+        seeds = patch.spots.query(points[some], k=count)[1].reshape(len(some), count)
+        at, off = closest(patch.net, np.repeat(points[some], count, axis=0), patch.seeds[0][seeds.ravel()])
+        at, off = at.reshape(len(some), count, 2), off.reshape(len(some), count)
+        for k in range(count):
+            new = (off[:, k] <= nearest.reached[some] + SAME) & patch.covers(at[:, k])
+            new &= (np.abs(off[:, :k] - off[:, k : k + 1]) > SAME).all(axis=1)
+            which, uv, apart = some[new], at[new, k], off[new, k]
+            nearest.take(index, which, uv, apart, np.maximum(apart, patch.beyond(points[which], uv)))
 
     def standing(self, surface: Array, uv: Array, apart: Array) -> Feet:
         """Feet given by parameters."""

@@ -25,6 +25,9 @@ Array = np.ndarray
 RIM = 200
 """Points of a rim across a surface, at least."""
 
+PARTS = 8
+"""Parts of a surface in each direction with boxes of their own."""
+
 SEEDS = 90
 """Number of parameters in each direction, at most, by spans and again by length, from which a point is projected."""
 
@@ -127,10 +130,9 @@ class Patch:
         return u, v
 
     @cached_property
-    def apart(self) -> float:
-        """Largest distance of a point of the faces from the nearest seed, mm, estimated from above."""
-        points = np.asarray(self.net.grid(*self._lines))
-        return 2.0 * sum(float(np.linalg.norm(np.diff(points, axis=k), axis=2).max()) for k in (0, 1))
+    def whole(self) -> Array:
+        """The box of all these boxes, ``(1, 2, 3)``."""
+        return np.array([[self.boxes[:, 0].min(axis=0), self.boxes[:, 1].max(axis=0)]])
 
     @cached_property
     def seeds(self) -> tuple[Array, Array]:
@@ -145,6 +147,19 @@ class Patch:
         from scipy.spatial import cKDTree
 
         return cKDTree(self.seeds[1])
+
+    @cached_property
+    def boxes(self) -> Array:
+        """Boxes ``(m, 2, 3)`` around parts of the surface that contain the faces: those of control points."""
+        fine = self.net.over(*(_many(kv) for kv in self.knots))
+        cells, (u, v) = touched(fine, self.faces), (_parts(kv) for kv in (fine.u, fine.v))
+        found = []
+        for i, rows in u:
+            for j, columns in v:
+                if cells[np.ix_(i, j)].any():
+                    points = fine.poles[np.ix_(rows, columns)].reshape(-1, 3)
+                    found.append([points.min(axis=0), points.max(axis=0)])
+        return np.array(found).reshape(-1, 2, 3)
 
     def beyond(self, points: Array, uv: Array) -> Array:
         """Distance (mm) of points ``(q, 3)`` from the boundaries of the faces where their feet ``uv`` lie outside all
@@ -181,13 +196,11 @@ class Patch:
         return cKDTree(np.asarray(self.net.evaluate(p[which] + share * (q - p)[which])))
 
     @cached_property
-    def marks(self) -> cKDTree:
-        """Points within the faces and on their boundaries."""
-        from scipy.spatial import cKDTree
-
+    def marks(self) -> Array:
+        """Points within the faces and on their boundaries, ``(n, 3)``."""
         uv, points = self.seeds
         inside = points[self.beyond(points, uv) == 0]
-        return cKDTree(np.concatenate([inside, self._rims.data]) if len(self._chords) else inside)
+        return np.concatenate([inside, self._rims.data]) if len(self._chords) else inside
 
     def around(self, uv: Array, centre: Array, reach: Array, count: int) -> tuple[Array, Array, Array]:
         """Samples around places, ``count`` in each direction.
@@ -264,3 +277,23 @@ class Patch:
 def touched(net: Net, faces: Iterable[Face]) -> Array:
     """Knot cells of a net that faces touch, a mask."""
     return np.asarray(np.logical_or.reduce([face_region(net, face).inside for face in faces]))
+
+
+def _many(kv: KnotVector) -> KnotVector:
+    """A knot vector with at least :data:`PARTS` spans."""
+    pieces = -(-PARTS // kv.spans)
+    share = np.arange(1, pieces) / pieces
+    return kv.refined((kv.breaks[:-1, None] + np.diff(kv.breaks)[:, None] * share).ravel())
+
+
+def _parts(kv: KnotVector) -> list[tuple[Array, Array]]:
+    """Groups of neighbouring knot spans, and the control points on which they depend."""
+    groups = np.array_split(np.arange(kv.spans), PARTS)
+    first = kv.span_index - kv.degree
+    return [(own, np.arange(first[own[0]], first[own[-1]] + kv.degree + 1) % kv.count) for own in groups]
+
+
+def from_boxes(points: Array, boxes: Array) -> Array:
+    """Distance of points ``(n, 3)`` from the nearest of some boxes ``(m, 2, 3)``, mm, 0 within."""
+    off = np.maximum(np.maximum(boxes[:, 0] - points[:, None], points[:, None] - boxes[:, 1]), 0.0)
+    return np.asarray(np.sqrt(np.square(off).sum(axis=2).min(axis=1, initial=np.inf)))
