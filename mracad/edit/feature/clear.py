@@ -20,6 +20,7 @@ from mracad.seam.interface import Joints
 from mracad.seam.trace import EVENLY, trace_of
 from mracad.seam.zones import Zoned
 from mracad.spec.places import Zone
+from mracad.wavelet.ladder import arc_lengths
 
 Array = np.ndarray
 
@@ -99,7 +100,10 @@ def _held(ground: Ground, patch: Patch, zones: tuple[Zone, ...], step: float) ->
     if not zones:
         return np.empty((0, 2))
     surface = ground.model.surfaces[patch.index]
-    middles = (np.interp(_shares(k, patch.apart / step), np.arange(k.spans + 1), k.breaks) for k in patch.knots)
+    middles = (
+        np.interp(_shares(k, arc_lengths(patch.net, axis).max() / step), np.arange(k.spans + 1), k.breaks)
+        for axis, k in enumerate(patch.knots)
+    )
     fine = surface.net.refined(*(np.setdiff1d(x, k.breaks) for x, k in zip(middles, patch.knots, strict=True)))
     return Zoned.of(fine, [ground.model.faces[i] for i in surface.faces], zones).within
 
