@@ -37,19 +37,23 @@ if TYPE_CHECKING:
     from mracad.occ.apply import apply
     from mracad.occ.check import check
     from mracad.occ.files import read, write
+    from mracad.spec.pictures import Picture
     from mracad.spec.steps import Compose, Level, Move, Repeat, Smooth, Transfer
+    from mracad.view.picture import render
 
 _HOMES = {
     "Details": "edit.details",
     "Displacement": "model.displacement",
     "Model": "model.brep",
     "MracadError": "errors",
+    "Picture": "spec.pictures",
     "apply": "occ.apply",
     "check": "occ.check",
     "deviations": "inspect.deviation",
     "load_details": "edit.mra:load",
     "read": "occ.files",
     "read_back": "job.produce",
+    "render": "view.picture",
     "run": "job.document",
     "save_details": "edit.mra:save",
     "seams": "inspect.seams",
@@ -66,6 +70,7 @@ __all__ = [
     "Model",
     "Move",
     "MracadError",
+    "Picture",
     "Repeat",
     "Smooth",
     "Transfer",
@@ -79,6 +84,7 @@ __all__ = [
     "move",
     "read",
     "read_back",
+    "render",
     "repeat",
     "run",
     "save_details",

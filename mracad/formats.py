@@ -1,4 +1,5 @@
-"""File formats by name, file extension and first bytes; ``mracad.occ`` and ``mracad.mesh`` read and write them."""
+"""File formats by name, file extension and first bytes; ``mracad.occ`` and ``mracad.mesh`` read and write them,
+``mracad.view`` makes pictures."""
 
 from __future__ import annotations
 
@@ -9,7 +10,7 @@ from typing import Literal
 
 from mracad.errors import FileError
 
-Kind = Literal["exact", "mesh"]
+Kind = Literal["exact", "mesh", "picture"]
 
 
 @dataclass(frozen=True)
@@ -22,8 +23,8 @@ class Format:
         As ``--format`` takes it.
     extensions : tuple of str
         In lower case, with the dot; the first is the usual one.
-    kind : {"exact", "mesh"}
-        Exact formats are read and written, meshes only written.
+    kind : {"exact", "mesh", "picture"}
+        Exact formats are read and written, meshes and pictures only written.
     """
 
     name: str
@@ -44,6 +45,7 @@ FORMATS = {
         Format("ply", (".ply",), "mesh"),
         Format("gltf", (".gltf",), "mesh"),
         Format("glb", (".glb",), "mesh"),
+        Format("png", (".png",), "picture"),
     )
 }
 

@@ -15,6 +15,7 @@ from msgspec import Struct, structs
 
 from mracad.formats import FORMATS
 from mracad.spec.fields import Field, dashed, fields
+from mracad.spec.pictures import Picture
 from mracad.spec.quantity import ANGLE, LENGTH, MEMORY, TIME, Kind
 
 Command = Callable[..., Any]
@@ -145,8 +146,15 @@ class Writing:
     angle: float
     ascii_stl: bool
     verify: bool
+    show: str
+    view: tuple[str, ...]
     overwrite: bool
     if_changed: bool
+
+    @property
+    def picture(self) -> Picture:
+        """What pictures show."""
+        return Picture(show=self.show, view=self.view)
 
 
 @dataclass(frozen=True)
@@ -256,6 +264,21 @@ writing = gathered(
         help="Meshes: largest turn of the normal along a triangle's edge (degrees).",
     ),
     click.option("--ascii", "ascii_stl", is_flag=True, help="STL: write text instead of binary."),
+    click.option(
+        "--show",
+        metavar="TEXT",
+        default="shaded",
+        show_default=True,
+        help="Pictures: what they show, as in mracad render; deviation alone is from the input.",
+    ),
+    click.option(
+        "--view",
+        metavar="TEXT",
+        multiple=True,
+        default=("iso",),
+        show_default=True,
+        help="Pictures: where to look from, as in mracad render; repeatable.",
+    ),
     verify,
     overwrite,
     if_changed,

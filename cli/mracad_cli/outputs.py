@@ -60,7 +60,7 @@ def check_outputs(writing: Writing, beside: Iterable[str | None] = (), *, needed
     formats = {path: FORMATS[writing.format] if path == "-" else by_extension(path) for path in paths}
     files = [path for path in paths if path != "-"]
     check_reports(*files, *beside, overwrite=writing.overwrite or writing.if_changed)
-    how = (writing.schema or "").upper(), writing.chord, writing.angle, writing.ascii_stl
+    how = (writing.schema or "").upper(), writing.chord, writing.angle, writing.ascii_stl, writing.picture
     return [
         Target("standard output" if path == "-" else Path(path).name, format.name, *how)
         for path, format in formats.items()

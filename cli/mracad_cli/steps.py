@@ -85,7 +85,7 @@ def run_steps(
     if done.made:
         files |= records
         files |= {path: make(done.results[0]) for path, make in beside.items()}  # type: ignore[arg-type]  # it is an edit
-        needs = [reading.file, *needed(steps, recipe)]
+        needs = [reading.file, *needed(steps, recipe), *writing.picture.files()]
         files |= {editing.depfile: depfile_text(writing.outputs, needs)} if editing.depfile else {}
     seconds = None if editing.dry_run else time.perf_counter() - start
     lines = [json_text(body)] if editing.as_json else _lines(steps, done, recipe, seconds)

@@ -10,7 +10,7 @@ from functools import cached_property, partial
 from typing import TYPE_CHECKING, BinaryIO
 
 from mracad.errors import EditError, FileError
-from mracad.formats import FORMATS, by_content
+from mracad.formats import FORMATS, Kind, by_content
 from mracad.inspect import accept
 from mracad.inspect.accept import Slack
 from mracad.inspect.faults import Fault, FaultKind, ReadBack
@@ -19,6 +19,7 @@ from mracad.job.judge import Judged, Original
 from mracad.job.left import Excluded
 from mracad.job.words import of_fault
 from mracad.model.facts import Facts
+from mracad.spec.pictures import Picture
 from mracad.spec.quantity import length
 
 if TYPE_CHECKING:
@@ -38,6 +39,8 @@ class Target:
     ----------
     chord : str
         Meshes: largest distance of triangles from the surface, a length or a share of the diagonal.
+    picture : Picture
+        Pictures: what they show.
     """
 
     name: str
@@ -46,6 +49,7 @@ class Target:
     chord: str = "0.02%"
     angle: float | None = None
     ascii: bool = False
+    picture: Picture = field(default_factory=Picture)
 
 
 @dataclass(frozen=True)
@@ -126,11 +130,14 @@ def produce(
         if not (targets and done.passed):
             return done
         tell(progress, "writing")
-        made = tuple(_made(document, target, title) for target in targets)
+        made = tuple(
+            _pictured(document, target, original) if _is(target, "picture") else _made(document, target, title)
+            for target in targets
+        )
         if verify:
             tell(progress, "reading back")
             memory = _Memory(document, results)
-            made = tuple(_judged(each, memory, copies) for each in made)
+            made = tuple(each if _is(each.target, "picture") else _judged(each, memory, copies) for each in made)
         faults = tuple((each.target, fault) for each in made if each.read_back for fault in each.read_back.faults)
         if not faults:
             return replace(done, made=made)
@@ -243,7 +250,7 @@ def _made(document: Document, target: Target, title: str) -> Made:
     """A document written to a file, not yet judged."""
     from mracad.occ.files import write
 
-    meshed = FORMATS[target.format].kind == "mesh"
+    meshed = _is(target, "mesh")
     stream = io.BytesIO()
     written = write(
         document,
@@ -256,6 +263,21 @@ def _made(document: Document, target: Target, title: str) -> Made:
         options_text=title,
     )
     return Made(target, stream.getvalue(), written)
+
+
+def _pictured(document: Document, target: Target, original: Original) -> Made:
+    """A picture of a document; deviation is measured from the document as it was, if from nothing else."""
+    from mracad.occ.files import Written, read
+    from mracad.spec.pictures import show_of
+    from mracad.view.picture import render
+
+    show = show_of(target.picture.show)
+    reference = (read(show.of) if show.of else original()) if show.kind == "deviation" else None
+    return Made(target, render(document, target.picture, reference=reference).data, Written())
+
+
+def _is(target: Target, kind: Kind) -> bool:
+    return FORMATS[target.format].kind == kind
 
 
 def _diagonal(document: Document) -> float:
@@ -281,7 +303,7 @@ def _unreadable(error: Exception) -> bool:
 
 def _judged(made: Made, memory: _Memory, copies: _Copies) -> Made:
     """An output, read back and judged."""
-    if FORMATS[made.target.format].kind == "mesh":
+    if _is(made.target, "mesh"):
         torn = made.written.open
         before = copies.mesh(made.target).open if torn and memory.edited else torn
         return replace(made, read_back=accept.meshed(torn, before))

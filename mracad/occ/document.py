@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -258,6 +258,24 @@ def nested_colours(document: Document) -> Iterator[tuple[tuple[str, ...], str]]:
                     path.append(label_key(node.Label().Father()))
                 if colour:
                     yield tuple(path), colour
+
+
+def tint(nested: Mapping[tuple[str, ...], str], above: tuple[str, ...], label: TDF_Label, so_far: str) -> str:
+    """The colour that an instance gives what is in it.
+
+    Parameters
+    ----------
+    nested : mapping
+        :func:`nested_colours`.
+    above : tuple of str
+        The keys of the instances from the top down to this one.
+    label : TDF_Label
+        The instance.
+    so_far : str
+        The colour given by the instances that contain it.
+    """
+    given = next((nested[above[k:]] for k in range(len(above)) if above[k:] in nested), "")
+    return given or so_far or label_colour(label)
 
 
 def _described(

@@ -164,6 +164,8 @@ def write(document: Document, target: str | os.PathLike | BinaryIO, format: str 
     format = format or "step"
     if format not in FORMATS:
         raise UsageError(f"unknown format '{format}'", "use one of " + ", ".join(FORMATS))
+    if FORMATS[format].kind == "picture":
+        raise UsageError(f"{format} is a picture, not a model", "make it with mracad.render(document)")
     data, written = _MAKERS.get(format, _mesh)(document, name, format, wanted)
     if FORMATS[format].kind == "exact" and document.annotations:
         from mracad.occ.part21 import pmi

@@ -14,7 +14,8 @@ from mracad.errors import FileError, UsageError
 from mracad.mesh.scene import Body, Node, Scene
 from mracad.model.facts import Triangles
 from mracad.occ.document import Document, nested_colours
-from mracad.occ.labels import components, label_colour, label_key, label_name, labels, referred
+from mracad.occ.document import tint as instance_tint
+from mracad.occ.labels import components, label_key, label_name, labels, referred
 from mracad.occ.topology import inside, matrix
 from mracad.occ.triangles import triangles
 
@@ -77,8 +78,7 @@ class _Bodies:
         product = referred(label)
         if not product.IsEqual(label):
             above = (*above, label_key(label))
-            given = next((self.nested[above[k:]] for k in range(len(above)) if above[k:] in self.nested), "")
-            tint = given or tint or label_colour(label)
+            tint = instance_tint(self.nested, above, label, tint)
         children = tuple(node for node in (self.node(part, above, tint) for part in components(product)) if node)
         body = self.body(label_key(product), tint)
         return Node(name, frame, body, children) if children or body is not None else None

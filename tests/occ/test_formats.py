@@ -112,7 +112,8 @@ SCRIPT = """
 import sys; from mracad.occ.files import read, write
 from mracad.formats import FORMATS
 document = read(sys.argv[1])
-for format in FORMATS: write(document, sys.stdout.buffer, format)
+for format in FORMATS.values():
+    if format.kind != "picture": write(document, sys.stdout.buffer, format.name)
 """
 
 

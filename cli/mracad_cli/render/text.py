@@ -242,8 +242,9 @@ def batch_lines(outcomes: Sequence[Outcome], seconds: float) -> list[str]:
 
 def sizes(made: Sequence[Made]) -> str:
     """The outputs: names, sizes, and the faces that are in parts."""
-    return ", ".join(", ".join([m.target.name, _size(len(m.data)), *map(str, m.written.cut)]) for m in made)
+    return ", ".join(", ".join([m.target.name, size(len(m.data)), *map(str, m.written.cut)]) for m in made)
 
 
-def _size(count: int) -> str:
+def size(count: int) -> str:
+    """A number of bytes."""
     return f"{count / 1e6:.1f} MB" if count >= 1e5 else f"{count / 1e3:.1f} kB"

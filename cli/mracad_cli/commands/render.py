@@ -1,0 +1,64 @@
+"""Draw a model: shaded, or with zebra stripes, isophotes, curvature, deviation or the numbers of its faces.
+
+Every pixel is evaluated on the surface itself. No display is needed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import click
+
+from mracad.errors import UsageError
+from mracad.formats import FORMATS
+from mracad.spec.pictures import Picture, show_of
+from mracad_cli import options
+from mracad_cli.command import Command
+from mracad_cli.options import Reading
+from mracad_cli.outputs import check_reports, deliver, read
+from mracad_cli.progress import Progress
+from mracad_cli.say import json_text
+
+
+@click.command(cls=Command, help=__doc__)
+@options.apply(
+    options.reading(),
+    click.option(
+        "-o",
+        "--output",
+        metavar="OUT.png",
+        required=True,
+        type=click.Path(allow_dash=True),
+        help="Picture to write (PNG); - for standard output.",
+    ),
+    options.of(Picture, "picture"),
+    options.overwrite,
+    options.printing,
+)
+def command(reading: Reading, output: str, picture: Picture, overwrite: bool, as_json: bool) -> None:
+    import time
+
+    from mracad_cli.render import picture as words
+
+    start = time.perf_counter()
+    show = show_of(picture.show)
+    if show.kind == "deviation" and not show.of:
+        raise UsageError("show: deviation needs a file from which it is measured", "write deviation:REF.step")
+    if output != "-" and not output.lower().endswith(FORMATS["png"].extensions):
+        raise UsageError(f"cannot draw {output}: pictures are PNG", "name a file that ends in .png")
+    check_reports(None if output == "-" else output, overwrite=overwrite)
+    with Progress() as progress:
+        progress("reading", 0, 1)
+        document = read(reading)
+        before = read(replace(reading, file=picture.before)) if picture.before else None
+        reference = read(replace(reading, file=show.of)) if show.kind == "deviation" else None
+        progress("drawing", 0, 1)
+        from mracad.view.picture import render
+
+        drawn = render(document, picture, before=before, reference=reference)
+    if as_json:
+        line = json_text(words.body(document.name, document.warnings, picture, drawn, output))
+    else:
+        line = words.line(document.name, picture, drawn, output, time.perf_counter() - start)
+    files = {} if output == "-" else {output: drawn.data}
+    deliver(files, [line], stream=drawn.data if output == "-" else None)

@@ -1,0 +1,166 @@
+"""Options of pictures, and how they are written."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import Annotated, ClassVar
+
+from msgspec import Meta
+
+from mracad.errors import UsageError
+from mracad.spec.fields import nearest
+from mracad.spec.files import File, Naming
+from mracad.spec.quantity import NUMBER
+from mracad.spec.steps.base import Options
+
+Direction = tuple[float, float, float]
+
+VIEWS: dict[str, Direction] = {
+    "iso": (1.0, -1.0, 1.0),
+    "front": (0.0, -1.0, 0.0),
+    "back": (0.0, 1.0, 0.0),
+    "left": (-1.0, 0.0, 0.0),
+    "right": (1.0, 0.0, 0.0),
+    "top": (0.0, 0.0, 1.0),
+    "bottom": (0.0, 0.0, -1.0),
+}
+"""Where the viewer is, from the model."""
+
+SHOWS = "shaded", "zebra", "isophotes", "curvature", "deviation", "faces"
+"""What pictures show."""
+
+CURVATURES = "max", "mean", "gauss"
+"""What maps of curvature show; the first by default."""
+
+LEAST, MOST = 16, 8192
+"""Least and largest width and height, pixels."""
+
+AREA = 16_000_000
+"""Largest number of pixels."""
+
+PANELS = 16
+"""Largest number of views on a sheet."""
+
+_NAME = re.compile(r"\s*([a-z]+)\s*(?:,|$)")
+_VECTOR = re.compile(rf"\s*({NUMBER})\s*,\s*({NUMBER})\s*,\s*({NUMBER})\s*(?:,|$)")
+
+
+@dataclass(frozen=True)
+class Show:
+    """What a picture shows.
+
+    Attributes
+    ----------
+    kind : str
+        One of ``SHOWS``.
+    of : str
+        Of curvature, one of ``CURVATURES``; of deviation, the file from which it is measured (``""`` for the input of
+        an edit).
+    """
+
+    kind: str
+    of: str = ""
+
+
+def show_of(text: str, name: str = "show") -> Show:
+    """What a text such as ``"zebra"`` or ``"deviation:ref.step"`` asks for; raises UsageError."""
+    kind, colon, rest = text.partition(":")
+    if kind not in SHOWS:
+        raise UsageError(f"{name}: {text!r} is not known", nearest(kind, SHOWS))
+    if kind == "curvature":
+        if rest not in CURVATURES and colon:
+            raise UsageError(f"{name}: there is no curvature {rest!r}", "use curvature:" + ", ".join(CURVATURES))
+        return Show(kind, rest or CURVATURES[0])
+    if colon and kind != "deviation":
+        raise UsageError(f"{name}: {text!r}: {kind} takes nothing after a colon", f"write {kind}")
+    if colon and not rest:
+        raise UsageError(f"{name}: {text!r} names no file", "write deviation:REF.step")
+    return Show(kind, rest)
+
+
+def views_of(text: str, name: str = "view") -> tuple[str, ...]:
+    """The views in a text such as ``"iso,top"`` or ``"1,-2,1"``; raises UsageError."""
+    found: list[str] = []
+    at = 0
+    hint = "use " + ", ".join(VIEWS) + ", or X,Y,Z, which points to the viewer"
+    while at < len(text) or not found:
+        match = _NAME.match(text, at) or _VECTOR.match(text, at)
+        if match is None or (match.re is _NAME and match[1] not in VIEWS):
+            raise UsageError(f"{name}: {text!r} is not a view", hint)
+        found.append(match[0].strip().rstrip(","))
+        if not any(direction_of(found[-1])):
+            raise UsageError(f"{name}: {found[-1]!r} has no direction", hint)
+        at = match.end()
+    return tuple(found)
+
+
+def direction_of(view: str) -> Direction:
+    """The direction to the viewer of one of :func:`views_of`."""
+    if view in VIEWS:
+        return VIEWS[view]
+    x, y, z = map(float, view.split(","))
+    return x, y, z
+
+
+def size_of(text: str, name: str = "size") -> tuple[int, int]:
+    """Width and height from ``"1200x800"``; raises UsageError."""
+    match = re.fullmatch(r"\s*(\d{1,6})\s*[x×]\s*(\d{1,6})\s*", text)
+    if match is None:
+        raise UsageError(f"{name}: {text!r} is not a size", "write width and height in pixels, 1200x800")
+    width, height = int(match[1]), int(match[2])
+    if min(width, height) < LEAST or max(width, height) > MOST or width * height > AREA:
+        limits = f"give {LEAST} to {MOST} pixels each way, {AREA // 1_000_000} million in all"
+        raise UsageError(f"{name}: a picture of {width} × {height} pixels is out of bounds", limits)
+    return width, height
+
+
+ShowText = Annotated[str, Naming(prefix="deviation:"), show_of]
+"""The type of a field that tells what a picture shows."""
+
+ViewText = Annotated[str, views_of]
+"""The type of a field that holds views."""
+
+SizeText = Annotated[str, size_of]
+"""The type of a field that is the size of a picture."""
+
+
+class Picture(Options, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What a picture shows, from where."""
+
+    command: ClassVar[str] = "render"
+
+    show: Annotated[
+        ShowText,
+        Meta(
+            description="What to show: shaded, zebra, isophotes, curvature:max (or :mean, :gauss), deviation:REF (from "
+            "another file), faces (their numbers)."
+        ),
+    ] = "shaded"
+    view: Annotated[
+        tuple[ViewText, ...],
+        Meta(
+            description="Where to look from: iso, front, back, left, right, top, bottom or X,Y,Z, a vector to the "
+            "viewer; several (iso,top or repeated) make a sheet."
+        ),
+    ] = ("iso",)
+    fit: Annotated[
+        tuple[str, ...],
+        Meta(description="Faces that fill the picture, by the selectors of --faces in edits. Default: all faces."),
+    ] = ()
+    size: Annotated[SizeText, Meta(description="Width and height, pixels.")] = "1200x800"
+    stripes: Annotated[
+        int,
+        Meta(description="Zebra and isophotes: number of dark stripes in half a turn of the normal.", ge=1, le=2000),
+    ] = 36
+    before: Annotated[File | None, Meta(description="Another file to show on the left, from the same place.")] = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not 1 <= len(self.views) <= PANELS:
+            raise UsageError(f"view: {len(self.views)} views", f"give 1 to {PANELS}")
+
+    @property
+    def views(self) -> tuple[str, ...]:
+        """All views, one by one."""
+        return tuple(view for text in self.view for view in views_of(text))

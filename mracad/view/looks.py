@@ -1,0 +1,193 @@
+"""What pictures show of places that are seen: colours, or numbers for a map."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from mracad.bspline.vectors import unit
+from mracad.model.facets import Body
+from mracad.spec.pictures import Show
+from mracad.view.colours import CLAY, INK, diverging, rgb, sequential, several
+from mracad.view.seen import Seen, Stage
+
+Array = np.ndarray
+
+SHARE = 0.98
+"""Share of a picture whose curvature lies within the range of the colours."""
+
+_WHITE = np.array([0.97, 0.97, 0.965])
+_KEY = np.array([-0.42, 0.58, 0.70])  # directions to the lights: right, up, to the viewer
+_STEPS = 1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0
+
+
+@dataclass(frozen=True)
+class Scale:
+    """The range of a map's colours.
+
+    Attributes
+    ----------
+    low, high : float
+    below, above : bool
+        Whether the picture has values beyond.
+    """
+
+    low: float
+    high: float
+    below: bool = False
+    above: bool = False
+
+    def colours(self, values: Array) -> Array:
+        """Colours ``(q, 3)`` of values."""
+        if self.low < 0.0:
+            return diverging(values / self.high)
+        return sequential(values / self.high)
+
+
+def shaded(stage: Stage, seen: Seen) -> Array:
+    """The document's colours in soft light."""
+    table = np.array([rgb(place.colours[k] or CLAY) for place, k, _ in stage.entries])
+    return _lit(stage, seen, table[seen.entry])
+
+
+def faces(stage: Stage, seen: Seen) -> Array:
+    """Every face in a colour of its own."""
+    table = several(max(facets.face for _, _, facets in stage.entries) + 1)
+    own = np.array([facets.face for _, _, facets in stage.entries])
+    facing = np.clip(stage.camera.toward @ seen.facing, 0.0, 1.0)
+    return np.asarray(table[own[seen.entry]] * (0.74 + 0.26 * facing)[:, None])
+
+
+def _lit(stage: Stage, seen: Seen, colours: Array) -> Array:
+    n = stage.camera.axes @ seen.facing
+    key = unit(_KEY)
+    half = unit(np.add(key, [0.0, 0.0, 1.0]))
+    soft = 0.46 + 0.14 * n[1] + 0.34 * np.maximum(key @ n, 0.0) + 0.16 * np.maximum(n[2], 0.0)
+    gloss = 0.10 * np.maximum(half @ n, 0.0) ** 24
+    side = np.where(seen.front, 1.0, 0.86)
+    return np.asarray(np.clip(colours * (soft * side)[:, None] + gloss[:, None], 0.0, 1.0))
+
+
+def zebra(stage: Stage, seen: Seen, stripes: int) -> Array:
+    """Reflected stripes: dark and light in turn with the angle of the normal above the horizontal of the picture."""
+    return _striped(stage, seen, stage.camera.axes[1], stripes)
+
+
+def isophotes(stage: Stage, seen: Seen, stripes: int) -> Array:
+    """Lines of equal brightness under a light at the viewer: stripes in turn with the angle of the normal to it."""
+    return _striped(stage, seen, stage.camera.toward, stripes)
+
+
+def _striped(stage: Stage, seen: Seen, pole: Array, stripes: int) -> Array:
+    """Stripes by the angle between normal and equator, filtered to the width of a pixel."""
+    height = np.clip(pole @ seen.facing, -1.0, 1.0)
+    phase = np.arcsin(height) * (stripes / np.pi)
+    slope = np.hypot(*(pole @ seen.turning)) / np.sqrt(np.maximum(1.0 - height * height, 1e-12))
+    wide = np.clip(slope * (stripes / np.pi), 1e-6, 1e6)
+    light = (_under(phase + 0.5 * wide) - _under(phase - 0.5 * wide)) / wide
+    facing = np.clip(stage.camera.toward @ seen.facing, 0.0, 1.0)
+    colours = INK + light[:, None] * (_WHITE - INK)
+    return np.asarray(colours * (0.80 + 0.20 * facing)[:, None])
+
+
+def _under(phase: Array) -> Array:
+    """The integral of a wave that is 1 in the first half of each period and 0 in the second."""
+    whole = np.floor(phase)
+    return np.asarray(0.5 * whole + np.minimum(phase - whole, 0.5))
+
+
+def mean(stage: Stage, seen: Seen) -> Array:
+    """Mean curvature, 1/mm, positive where convex."""
+    return np.asarray(seen.bends[0])
+
+
+def gauss(stage: Stage, seen: Seen) -> Array:
+    """Gaussian curvature, 1/mm²."""
+    return np.asarray(seen.bends[1])
+
+
+def largest(stage: Stage, seen: Seen) -> Array:
+    """The larger principal curvature without its sign, 1/mm."""
+    half, product = seen.bends
+    return np.asarray(np.abs(half) + np.sqrt(np.maximum(half * half - product, 0.0)))
+
+
+def scale(values: Array, share: float, signed: bool) -> Scale:
+    """A range with round ends for a share of the values, from 0, or the same to both sides of it."""
+    size = np.sort(np.abs(values))
+    most = float(size[-1]) if len(size) else 0.0
+    bound = float(size[min(int(share * len(size)), len(size) - 1)]) if len(size) else 0.0
+    high = rounded(bound) if bound > 0.0 else (rounded(most) if most > 0.0 else 1.0)
+    return Scale(-high if signed else 0.0, high, signed and bool((values < -high).any()), bool((values > high).any()))
+
+
+def rounded(value: float) -> float:
+    """The next round number from a positive one up."""
+    power = float(10.0 ** np.floor(np.log10(value)))
+    return next(step for step in _STEPS if step * power >= value * (1 - 1e-9)) * power
+
+
+@dataclass(frozen=True)
+class Look:
+    """A way to look at a stage.
+
+    Attributes
+    ----------
+    at : callable
+        ``at(stage, seen)`` gives colours ``(q, 3)``, or numbers ``(q,)``, of places.
+    order : {1, 2}
+        The derivatives of surfaces that it needs.
+    coloured : bool
+        Whether it shows the document's colours, and through transparent ones.
+    """
+
+    at: Callable[[Stage, Seen], Array]
+    order: int = 2
+    coloured: bool = False
+
+
+@dataclass(frozen=True)
+class Map:
+    """A map of numbers: its title, and the share of them within the range of colours.
+
+    Attributes
+    ----------
+    title, unit : str
+    share : float
+    signed : bool
+    """
+
+    title: str
+    unit: str
+    share: float
+    signed: bool
+
+
+MAPS = {
+    ("curvature", "max"): Map("largest curvature", "1/mm", SHARE, False),
+    ("curvature", "mean"): Map("mean curvature", "1/mm", SHARE, True),
+    ("curvature", "gauss"): Map("Gaussian curvature", "1/mm²", SHARE, True),
+    ("deviation", ""): Map("deviation", "mm", 1.0, True),
+}
+
+
+def map_of(show: Show) -> Map | None:
+    """How numbers are mapped to colours; None for pictures that show no numbers."""
+    return MAPS.get((show.kind, "" if show.kind == "deviation" else show.of))
+
+
+def look(show: Show, stripes: int, reference: Body | None) -> Look:
+    """How to look for what ``--show`` asks for; ``reference`` is what deviation is measured from."""
+    if show.kind == "deviation":
+        from mracad.view.deviation import Reference
+
+        assert reference is not None
+        return Look(Reference.of(reference).deviation)
+    if show.kind == "curvature":
+        return Look({"max": largest, "mean": mean, "gauss": gauss}[show.of])
+    if show.kind in ("zebra", "isophotes"):
+        drawn = {"zebra": zebra, "isophotes": isophotes}[show.kind]
+        return Look(lambda stage, seen: drawn(stage, seen, stripes))
+    return Look(shaded, 1, coloured=True) if show.kind == "shaded" else Look(faces, 1)

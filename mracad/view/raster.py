@@ -1,0 +1,139 @@
+"""Triangles onto a grid of samples with a depth buffer: spans of rows, all at once, with numpy."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from mracad.view.runs import groups, runs
+
+Array = np.ndarray
+
+AT_ONCE = 1 << 19
+"""Number of samples that are processed together."""
+
+_FLAT = 1e-9  # area of a triangle, in samples, below which it is seen edge-on
+
+
+@dataclass(frozen=True, eq=False)
+class Triangles:
+    """Triangles in the plane of a picture, x to the right and y down, in samples.
+
+    Attributes
+    ----------
+    corners : ndarray (m, 3, 2)
+    depth : ndarray (3, m)
+        Depth at the first corner, and its slopes along x and y.
+    weights : ndarray (m, 2, 2)
+        How the weights of the second and third corner grow along x and y.
+    front : ndarray of bool (m,)
+        Whether their outer side is seen.
+    """
+
+    corners: Array
+    depth: Array
+    weights: Array
+    front: Array
+
+    @classmethod
+    def of(cls, corners: Array, depth: Array) -> Triangles:
+        """From corners ``(m, 3, 2)`` and their depths ``(m, 3)``."""
+        (bx, by), (cx, cy) = (corners[:, 1] - corners[:, 0]).T, (corners[:, 2] - corners[:, 0]).T
+        area = bx * cy - by * cx
+        share = 1.0 / np.where(np.abs(area) > _FLAT, area, np.inf)
+        weights = np.stack([np.stack([cy, -cx], axis=1), np.stack([-by, bx], axis=1)], axis=1) * share[:, None, None]
+        slopes = (weights * (depth[:, 1:] - depth[:, :1])[:, :, None]).sum(axis=1)
+        return cls(corners, np.stack([depth[:, 0], *slopes.T]), weights, area < 0)
+
+    def some(self, which: Array) -> Triangles:
+        """Some of the triangles."""
+        return Triangles(self.corners[which], self.depth[:, which], self.weights[which], self.front[which])
+
+    def deep(self, which: Array, x: Array, y: Array) -> Array:
+        """Depth of the planes of triangles at places."""
+        base, along, down = (each[which] for each in self.depth)
+        left, top = self.corners[:, 0].T
+        return np.asarray(base + along * (x - left[which]) + down * (y - top[which]))
+
+    def shares(self, which: Array, x: Array, y: Array) -> Array:
+        """Weights of the three corners at places, ``(3, q)``."""
+        left, top = self.corners[:, 0].T
+        dx, dy = x - left[which], y - top[which]
+        second, third = (self.weights[which, k, 0] * dx + self.weights[which, k, 1] * dy for k in (0, 1))
+        return np.stack([1.0 - second - third, second, third])
+
+
+def rasterised(
+    triangles: Triangles, rows: tuple[int, int], width: int, behind: Array | None = None
+) -> tuple[Array, Array]:
+    """The nearest triangle at every sample of some rows, and its depth.
+
+    Parameters
+    ----------
+    triangles : Triangles
+    rows : (int, int)
+        The first row, and the one after the last.
+    width : int
+    behind : ndarray (rows, width), optional
+        Depth of what hides triangles.
+
+    Returns
+    -------
+    nearest : ndarray of int (rows, width)
+        -1 where there is none.
+    depth : ndarray (rows, width)
+        Infinite there.
+    """
+    count = (rows[1] - rows[0]) * width
+    depth = np.full(count, np.inf, np.float32) if behind is None else behind.ravel().copy()
+    nearest = np.full(count, -1, np.int32)
+    for which, place, z in _samples(triangles, rows, width):
+        np.minimum.at(depth, place, z)
+        won = z == depth[place]
+        nearest[place[won]] = which[won]
+    shape = rows[1] - rows[0], width
+    return nearest.reshape(shape), depth.reshape(shape)
+
+
+def _samples(triangles: Triangles, rows: tuple[int, int], width: int) -> Iterator[tuple[Array, Array, Array]]:
+    """The samples inside triangles, many at a time: triangle, place in the grid, and depth."""
+    low, high = triangles.corners[..., 1].min(axis=1), triangles.corners[..., 1].max(axis=1)
+    first = np.clip(np.ceil(low - 0.5), *rows).astype(np.int32)
+    last = np.clip(np.ceil(high - 0.5), *rows).astype(np.int32)
+    last[~triangles.weights.any(axis=(1, 2))] = 0
+    seen = np.flatnonzero(last > first)
+    along = triangles.depth[1].astype(np.float32)
+    for part in _parts((last - first)[seen]):
+        which, row = runs(seen[part], first[seen[part]], last[seen[part]])
+        left, right = _span(triangles.corners[which], row + 0.5)
+        start = np.clip(np.ceil(left - 0.5), 0, width).astype(np.int32)
+        end = np.clip(np.ceil(right - 0.5), 0, width).astype(np.int32)
+        keep = np.flatnonzero(end > start)
+        which, row, start, end = which[keep], row[keep], start[keep], end[keep]
+        deep = triangles.deep(which, start + 0.5, row + 0.5).astype(np.float32)
+        begin = (row - rows[0]).astype(np.intp) * width + start
+        for spans in _parts(end - start):
+            some = np.arange(spans.start, spans.stop)
+            span, step = runs(some, np.zeros(len(some), np.int32), (end - start)[spans])
+            owner = which[span]
+            yield owner, begin[span] + step, deep[span] + along[owner] * step.astype(np.float32)
+
+
+def _parts(counts: Array) -> Iterator[slice]:
+    """Slices of a list whose counts add up to about ``AT_ONCE``."""
+    return groups(np.cumsum(counts) // AT_ONCE)
+
+
+def _span(corners: Array, y: Array) -> tuple[Array, Array]:
+    """Where rows enter and leave their triangles; the same for both triangles at a side, so that none is missed."""
+    left, right = np.full(len(y), np.inf), np.full(len(y), -np.inf)
+    for k in range(3):
+        a, b = corners[:, k], corners[:, (k + 1) % 3]
+        down = (a[:, 1] < b[:, 1])[:, None]
+        (ax, ay), (bx, by) = np.where(down, a, b).T, np.where(down, b, a).T
+        meets = (ay <= y) & (y < by)
+        x = ax + (y - ay) * ((bx - ax) / np.where(meets, by - ay, 1.0))
+        left, right = np.where(meets, np.minimum(left, x), left), np.where(meets, np.maximum(right, x), right)
+    return left, right

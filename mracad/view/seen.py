@@ -1,0 +1,261 @@
+"""What is seen through every pixel: the surface itself, evaluated there, not the triangles that led to it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from mracad.model.facets import Body, Facets, Placed
+from mracad.view.camera import Camera
+from mracad.view.raster import Triangles, rasterised
+from mracad.view.runs import groups
+
+Array = np.ndarray
+
+FINE = 2
+"""Samples per pixel along each axis."""
+
+_OFF = 2.0  # pixels: depths that differ by more within a pixel are two places of a face
+_NUDGE = 1e-4  # share of the way to the middle of the triangles, away from where a surface is degenerate
+_THIN = 1e-8  # sine of the angle between S_u and S_v at which it is
+_TURN = 0.9  # cosine of the angle of a normal by which it turns when moved, beyond which the place is not moved
+_STEP = 2.0  # pixels: a place is moved by at most this much to lie in its pixel
+
+
+@dataclass(frozen=True, eq=False)
+class Stage:
+    """All faces of a body as a camera sees them.
+
+    Attributes
+    ----------
+    body : Body
+    camera : Camera
+    entries : sequence of (Placed, int, Facets)
+        Each face of each instance: the instance, the position of the face in it, and its triangles.
+    triangles : Triangles
+        In samples, of all entries.
+    entry : ndarray of int (m,)
+        The entry of each triangle.
+    corners : ndarray of int (m, 3)
+    points : ndarray (n, 3)
+        All points projected to samples and depth.
+    uv : ndarray (n, 2)
+    first : ndarray of int
+        The first point of each entry.
+    """
+
+    body: Body
+    camera: Camera
+    entries: Sequence[tuple[Placed, int, Facets]]
+    triangles: Triangles
+    entry: Array
+    corners: Array
+    points: Array
+    uv: Array
+    first: Array
+
+    @classmethod
+    def of(cls, body: Body, camera: Camera) -> Stage:
+        """Project a body."""
+        entries = [
+            (place, k, body.facets[face])
+            for place in body.placed
+            for k, face in enumerate(place.faces)
+            if face in body.facets
+        ]
+        points = [
+            camera.project(facets.points @ place.frame[:3, :3].T + place.frame[:3, 3]) for place, _, facets in entries
+        ]
+        first = np.cumsum([0, *map(len, points)])
+        mirrored = [np.linalg.det(place.frame[:3, :3]) < 0 for place, _, _ in entries]
+        corners = np.concatenate(
+            [
+                (facets.corners[:, ::-1] if turned else facets.corners) + begin
+                for (_, _, facets), turned, begin in zip(entries, mirrored, first, strict=False)
+            ]
+        )
+        every = np.concatenate(points)
+        every[:, :2] *= FINE
+        entry = np.repeat(np.arange(len(entries)), [len(facets.corners) for _, _, facets in entries])
+        triangles = Triangles.of(every[corners, :2], every[corners, 2])
+        uv = np.concatenate([facets.uv for _, _, facets in entries])
+        return cls(body, camera, entries, triangles, entry, corners, every, uv, first)
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """Places that are seen, each in one pixel.
+
+    Attributes
+    ----------
+    pixel : ndarray of int (q,)
+        Number of the pixel, row by row.
+    weight : ndarray (q,)
+        Share of the pixel.
+    entry : ndarray of int (q,)
+    point, normal : ndarray (3, q)
+        Normals are outward.
+    turning : ndarray (2, 3, q)
+        How the normal turns from a pixel to the next, to the right and up.
+    bends : ndarray (2, q)
+        Mean and Gaussian curvature, 1/mm and 1/mm²; mean curvature is positive where the face is convex.
+    front : ndarray of bool (q,)
+        Whether the outer side is seen.
+    """
+
+    pixel: Array
+    weight: Array
+    entry: Array
+    point: Array
+    normal: Array
+    turning: Array
+    bends: Array
+    front: Array
+
+    @cached_property
+    def facing(self) -> Array:
+        """Normals of the side that is seen."""
+        return np.asarray(np.where(self.front, 1.0, -1.0) * self.normal)
+
+
+def layers(
+    stage: Stage, rows: tuple[int, int], clear: Callable[[Placed, int], bool]
+) -> tuple[Array, Array, Array, Array]:
+    """The nearest opaque triangles in some rows of pixels, the nearest transparent ones before them, and depths."""
+    width, lines = stage.camera.size[0] * FINE, (rows[0] * FINE, rows[1] * FINE)
+    see_through = np.array([clear(place, k) for place, k, _ in stage.entries])
+    if not see_through.any():
+        solid, depth = rasterised(stage.triangles, lines, width)
+        return solid, depth, np.full_like(solid, -1), depth
+    opaque, glass = (np.flatnonzero(see_through[stage.entry] == which) for which in (False, True))
+    solid, depth = rasterised(stage.triangles.some(opaque), lines, width)
+    before, near = rasterised(stage.triangles.some(glass), lines, width, depth)
+    return named(solid, opaque), depth, named(before, glass), near
+
+
+def named(nearest: Array, names: Array) -> Array:
+    """Numbers of chosen triangles as numbers of all."""
+    return np.where(nearest < 0, -1, names[nearest] if len(names) else -1)
+
+
+def seen(stage: Stage, nearest: Array, depth: Array, rows: tuple[int, int], order: int) -> Seen:
+    """What is seen in some rows of pixels.
+
+    Where all samples of a pixel show one place of a face, that is evaluated in the middle of the pixel; elsewhere every
+    sample is.  ``order`` is the highest order of derivatives: with 2 curvatures are known, and places are moved into
+    the middle of their pixels.
+    """
+    width = stage.camera.size[0]
+    four = _grouped(nearest, width)
+    entry = np.where(four < 0, -1, stage.entry[four])
+    x, y = _centres(rows, width)
+    whole = (entry[:, 0] >= 0) & (entry == entry[:, :1]).all(axis=1)
+    lead = np.flatnonzero(whole)
+    plane = np.stack([stage.triangles.deep(four[lead, 0], x[lead] + dx, y[lead] + dy) for dx, dy in _OFFSETS], axis=1)
+    apart = np.abs(_grouped(depth, width)[lead] - plane).max(axis=1, initial=0.0) > _OFF * stage.camera.pixel
+    whole[lead[apart]] = False
+    lead = np.flatnonzero(whole)
+    mixed, which = np.nonzero((four >= 0) & ~whole[:, None])
+    shift = np.array(_OFFSETS)[which]
+    pixel = np.concatenate([lead, mixed])
+    at = np.column_stack([x[pixel], y[pixel]])
+    at[len(lead) :] += shift
+    weight = np.repeat([1.0, 1.0 / FINE**2], [len(lead), len(mixed)])
+    chosen = np.concatenate([four[lead, 0], four[mixed, which]])
+    return _evaluated(stage, chosen, at, pixel + rows[0] * width, weight, order)
+
+
+_OFFSETS = tuple((dx, dy) for dy in (-0.5, 0.5) for dx in (-0.5, 0.5))  # of samples from the middle of their pixel
+
+
+def _grouped(samples: Array, width: int) -> Array:
+    """Samples by pixel, ``(pixels, 4)``."""
+    return samples.reshape(-1, FINE, width, FINE).swapaxes(1, 2).reshape(-1, FINE**2)
+
+
+def _centres(rows: tuple[int, int], width: int) -> tuple[Array, Array]:
+    """Middles of pixels, in samples."""
+    y, x = np.mgrid[rows[0] : rows[1], 0:width]
+    return FINE * (x.ravel() + 0.5), FINE * (y.ravel() + 0.5)
+
+
+def _evaluated(stage: Stage, which: Array, at: Array, pixel: Array, weight: Array, order: int) -> Seen:
+    """The surface at places of triangles."""
+    sorting = np.argsort(stage.entry[which], kind="stable")
+    which, at, pixel, weight = which[sorting], at[sorting], pixel[sorting], weight[sorting]
+    entry, corners = stage.entry[which], stage.corners[which]
+    shares = stage.triangles.shares(which, *at.T)
+    uv = sum(share[:, None] * stage.uv[corner] for share, corner in zip(shares, corners.T, strict=True))
+    jets = np.empty((1 + order * (order + 3) // 2, 3, len(which)))
+    for own in groups(entry):
+        place, _, facets = stage.entries[entry[own.start]]
+        jets[..., own] = _jet(facets, place, uv[own], stage.uv[corners[own, 0]], order)
+    outward = np.array([facets.outward for _, _, facets in stage.entries])[entry]
+    shown = _flat(jets, outward) if order == 1 else _bent(stage.camera, jets, outward, at.T / FINE)
+    return Seen(pixel, weight, entry, *shown, stage.triangles.front[which])
+
+
+def _jet(facets: Facets, place: Placed, uv: Array, inner: Array, order: int) -> Array:
+    """The jet of a face as placed, ``(orders, 3, q)``, a little inside where it is degenerate."""
+    jet = np.array(facets.ground.jets(uv, order))
+    for nudge in (_NUDGE, 100 * _NUDGE):
+        su, sv = jet[1].T, jet[2].T
+        size, most = _dot(*2 * (_cross(su, sv),)), _dot(su, su) * _dot(sv, sv)
+        flat = np.flatnonzero(~(size > _THIN**2 * most))
+        if not len(flat):
+            break
+        jet[:, flat] = facets.ground.jets(uv[flat] + nudge * (inner[flat] - uv[flat]), order)
+    turned = jet @ place.frame[:3, :3].T
+    turned[0] += place.frame[:3, 3]
+    return np.asarray(turned.swapaxes(1, 2))
+
+
+def _flat(jets: Array, outward: Array) -> tuple[Array, Array, Array, Array]:
+    """Points and outward normals; no curvatures are known."""
+    s, su, sv = jets
+    nothing = np.zeros((2, 3, 0))
+    return s, outward * _unit(_cross(su, sv)), nothing, nothing[:, 0]
+
+
+def _bent(camera: Camera, jets: Array, outward: Array, at: Array) -> tuple[Array, Array, Array, Array]:
+    """Points, outward normals, their turning from pixel to pixel, and curvatures, moved into their pixels."""
+    s, su, sv, suu, suv, svv = jets
+    ee, ff, gg = _dot(su, su), _dot(su, sv), _dot(sv, sv)
+    cut = _cross(su, sv)
+    area2, normal = np.maximum(_dot(cut, cut), 1e-300), _unit(cut)
+    e, f, g = _dot(normal, suu), _dot(normal, suv), _dot(normal, svv)
+    mean, gauss = 0.5 * (e * gg - 2.0 * f * ff + g * ee) / area2, (e * g - f * f) / area2
+    nu = (f * ff - e * gg) / area2 * su + (e * ff - f * ee) / area2 * sv  # Weingarten
+    nv = (g * ff - f * gg) / area2 * su + (f * ff - g * ee) / area2 * sv
+    a, b = (camera.axes[:2] @ each / camera.pixel for each in (su, sv))  # steps on the picture
+    determinant = a[0] * b[1] - a[1] * b[0]
+    least = 1e-9 * np.sqrt(_dot(a, a) * _dot(b, b))
+    inverse = 1.0 / np.where(np.abs(determinant) > least, determinant, np.inf)
+    right, up = (b[1] * inverse, -a[1] * inverse), (-b[0] * inverse, a[0] * inverse)  # steps of u and v for a pixel
+    turning = np.stack([each[0] * nu + each[1] * nv for each in (right, up)])
+    off = (at - camera.project(s.T).T[:2]) * [[1.0], [-1.0]]
+    off *= np.minimum(1.0, _STEP / np.maximum(np.hypot(*off), 1e-300))
+    du, dv = (right[k] * off[0] + up[k] * off[1] for k in (0, 1))
+    near = _unit(normal + du * nu + dv * nv)
+    moved = s + du * su + dv * sv + 0.5 * du * du * suu + du * dv * suv + 0.5 * dv * dv * svv
+    sane = _dot(near, normal) > _TURN
+    return (
+        np.where(sane, moved, s), outward * np.where(sane, near, normal), outward * turning,
+        np.stack([-outward * mean, gauss]),
+    )  # fmt: skip
+
+
+def _dot(a: Array, b: Array) -> Array:
+    """Scalar products of vectors ``(2 or 3, q)``."""
+    return np.asarray(sum(x * y for x, y in zip(a, b, strict=True)))
+
+
+def _cross(a: Array, b: Array) -> Array:
+    return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+
+
+def _unit(a: Array) -> Array:
+    return np.asarray(a / np.maximum(np.sqrt(_dot(a, a)), 1e-300))
