@@ -17,7 +17,9 @@ Array = np.ndarray
 CELLS = 250
 """Largest distance between the samples from which nearest points are sought, as a part of the diagonal."""
 
+_NEIGHBOURS = 64  # samples among which another face is sought
 _STEPS = 8  # of Newton's method
+_BEYOND = 0.01  # of a face: how far its surface goes on
 _DONE = 1e-10  # of the diagonal: a step that ends it
 
 
@@ -59,16 +61,32 @@ class Reference:
 
     def deviation(self, stage: Stage, seen: Seen) -> Array:
         """Distances of places from the nearest point, mm, positive on the outer side of its face."""
-        near = self.tree.query(seen.point.T)[1]
-        found = np.zeros(len(near))
+        points = seen.point.T
+        near = self.tree.query(points)[1]
+        found, ended = self._off(points, near)
+        if not ended.any():
+            return found
+        rim = np.flatnonzero(ended)  # the nearest point may lie on a face beside it
+        around = self.tree.query(points[rim], min(_NEIGHBOURS, len(self.entry)))[1]
+        owners = self.entry[around]
+        for entry in np.unique(owners):
+            beside = np.flatnonzero((owners == entry).any(axis=1) & (self.entry[near[rim]] != entry))
+            own = rim[beside]
+            other, _ = self._off(points[own], around[beside, (owners[beside] == entry).argmax(axis=1)])
+            found[own] = np.where(np.abs(other) < np.abs(found[own]), other, found[own])
+        return found
+
+    def _off(self, points: Array, near: Array) -> tuple[Array, Array]:
+        """Signed distances of points from the faces of samples, and whether their feet lie at the end of them."""
+        found, ended = np.zeros(len(near)), np.zeros(len(near), bool)
         owner = self.entry[near]
         order = np.argsort(owner, kind="stable")
         for stretch in groups(owner[order]):
             own = order[stretch]
             place, facets = self.entries[owner[own[0]]]
-            local = (seen.point.T[own] - place.frame[:3, 3]) @ np.linalg.inv(place.frame[:3, :3]).T
-            found[own] = _off(facets, local, self.uv[near[own]], _DONE * self.diagonal)
-        return found
+            local = (points[own] - place.frame[:3, 3]) @ np.linalg.inv(place.frame[:3, :3]).T
+            found[own], ended[own] = _off(facets, local, self.uv[near[own]], _DONE * self.diagonal)
+        return found, ended
 
 
 def _spread(facets: Facets, most: float) -> tuple[Array, Array]:
@@ -83,9 +101,10 @@ def _spread(facets: Facets, most: float) -> tuple[Array, Array]:
     return np.stack([1.0 - a - b, a, b], axis=1), facets.corners[own]
 
 
-def _off(facets: Facets, points: Array, uv: Array, done: float) -> Array:
-    """Signed distances of points from a face's surface, from starting parameters on."""
+def _off(facets: Facets, points: Array, uv: Array, done: float) -> tuple[Array, Array]:
+    """Signed distances of points from a face's surface, from starting parameters on, and whether it ends there."""
     low, high = facets.uv.min(axis=0), facets.uv.max(axis=0)
+    beyond = _BEYOND * (high - low)
     uv = np.array(uv)
     left = np.arange(len(uv))
     for _ in range(_STEPS):
@@ -98,7 +117,7 @@ def _off(facets: Facets, points: Array, uv: Array, done: float) -> Array:
         a, b, c = np.where(bad, ee, a), np.where(bad, ff, b), np.where(bad, gg, c)
         determinant = np.maximum(a * c - b * b, 1e-300)
         step = -np.stack([c * gu - b * gv, a * gv - b * gu], axis=1) / determinant[:, None]
-        new = np.clip(uv[left] + step, low, high)
+        new = np.clip(uv[left] + step, low - beyond, high + beyond)
         moved = np.linalg.norm((new - uv[left])[:, :1] * su + (new - uv[left])[:, 1:] * sv, axis=1)
         uv[left] = new
         left = left[moved > done]
@@ -107,4 +126,5 @@ def _off(facets: Facets, points: Array, uv: Array, done: float) -> Array:
     s, su, sv = facets.ground.jets(uv, 1)
     r = points - s
     side = (r * (facets.outward * unit(cross(su, sv)))).sum(axis=1)
-    return np.asarray(np.where(side < 0.0, -1.0, 1.0) * np.linalg.norm(r, axis=1))
+    ended = ((uv <= low) | (uv >= high)).any(axis=1)
+    return np.where(side < 0.0, -1.0, 1.0) * np.linalg.norm(r, axis=1), ended

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 Array = np.ndarray
 
 
-CHORD = 0.35
+CHORD = 0.25
 """Largest distance of triangles from the surface, pixels of the larger side when the whole model is shown."""
 
 ZOOM = 20.0

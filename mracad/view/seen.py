@@ -22,7 +22,8 @@ _OFF = 2.0  # pixels: depths that differ by more within a pixel are two places o
 _NUDGE = 1e-4  # share of the way to the middle of the triangles, away from where a surface is degenerate
 _THIN = 1e-8  # sine of the angle between S_u and S_v at which it is
 _TURN = 0.9  # cosine of the angle of a normal by which it turns when moved, beyond which the place is not moved
-_STEP = 2.0  # pixels: a place is moved by at most this much to lie in its pixel
+_CLOSE, _STEP, _NEAR = 0.1, 8.0, 2.0  # pixels: nearer and farther places are not sought again; length of a step
+_ROUNDS = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +46,8 @@ class Stage:
     uv : ndarray (n, 2)
     first : ndarray of int
         The first point of each entry.
+    bounds : ndarray (2, entries, 2)
+        Least and largest parameters of each entry.
     """
 
     body: Body
@@ -56,6 +59,7 @@ class Stage:
     points: Array
     uv: Array
     first: Array
+    bounds: Array
 
     @classmethod
     def of(cls, body: Body, camera: Camera) -> Stage:
@@ -82,7 +86,8 @@ class Stage:
         entry = np.repeat(np.arange(len(entries)), [len(facets.corners) for _, _, facets in entries])
         triangles = Triangles.of(every[corners, :2], every[corners, 2])
         uv = np.concatenate([facets.uv for _, _, facets in entries])
-        return cls(body, camera, entries, triangles, entry, corners, every, uv, first)
+        bounds = np.stack([[f(facets.uv, axis=0) for _, _, facets in entries] for f in (np.min, np.max)])
+        return cls(body, camera, entries, triangles, entry, corners, every, uv, first, bounds)
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,13 +194,32 @@ def _evaluated(stage: Stage, which: Array, at: Array, pixel: Array, weight: Arra
     entry, corners = stage.entry[which], stage.corners[which]
     shares = stage.triangles.shares(which, *at.T)
     uv = sum(share[:, None] * stage.uv[corner] for share, corner in zip(shares, corners.T, strict=True))
-    jets = np.empty((1 + order * (order + 3) // 2, 3, len(which)))
+    uv = np.clip(uv, *stage.bounds[:, entry])
+    inner = stage.uv[corners[:, 0]]
+    outward = np.array([facets.outward for _, _, facets in stage.entries])[entry]
+    jets = _jets(stage, entry, uv, inner, order)
+    if order == 1:
+        return Seen(pixel, weight, entry, *_flat(jets, outward), stage.triangles.front[which])
+    at = at.T / FINE
+    far = np.arange(len(entry))
+    for _ in range(_ROUNDS):
+        step, off = _aim(stage.camera, jets[:3, :, far], at[:, far])[:2]
+        wrong = (off > _CLOSE) & (off < _STEP)
+        far = far[wrong]
+        if not len(far):
+            break
+        uv[far] = np.clip(uv[far] + step.T[wrong], *stage.bounds[:, entry[far]])
+        jets[..., far] = _jets(stage, entry[far], uv[far], inner[far], order)
+    return Seen(pixel, weight, entry, *_bent(stage.camera, jets, outward, at), stage.triangles.front[which])
+
+
+def _jets(stage: Stage, entry: Array, uv: Array, inner: Array, order: int) -> Array:
+    """The jets of sorted entries as placed, ``(orders, 3, q)``."""
+    jets = np.empty((1 + order * (order + 3) // 2, 3, len(entry)))
     for own in groups(entry):
         place, _, facets = stage.entries[entry[own.start]]
-        jets[..., own] = _jet(facets, place, uv[own], stage.uv[corners[own, 0]], order)
-    outward = np.array([facets.outward for _, _, facets in stage.entries])[entry]
-    shown = _flat(jets, outward) if order == 1 else _bent(stage.camera, jets, outward, at.T / FINE)
-    return Seen(pixel, weight, entry, *shown, stage.triangles.front[which])
+        jets[..., own] = _jet(facets, place, uv[own], inner[own], order)
+    return jets
 
 
 def _jet(facets: Facets, place: Placed, uv: Array, inner: Array, order: int) -> Array:
@@ -230,15 +254,8 @@ def _bent(camera: Camera, jets: Array, outward: Array, at: Array) -> tuple[Array
     mean, gauss = 0.5 * (e * gg - 2.0 * f * ff + g * ee) / area2, (e * g - f * f) / area2
     nu = (f * ff - e * gg) / area2 * su + (e * ff - f * ee) / area2 * sv  # Weingarten
     nv = (g * ff - f * gg) / area2 * su + (f * ff - g * ee) / area2 * sv
-    a, b = (camera.axes[:2] @ each / camera.pixel for each in (su, sv))  # steps on the picture
-    determinant = a[0] * b[1] - a[1] * b[0]
-    least = 1e-9 * np.sqrt(_dot(a, a) * _dot(b, b))
-    inverse = 1.0 / np.where(np.abs(determinant) > least, determinant, np.inf)
-    right, up = (b[1] * inverse, -a[1] * inverse), (-b[0] * inverse, a[0] * inverse)  # steps of u and v for a pixel
+    (du, dv), _, (right, up) = _aim(camera, jets[:3], at)
     turning = np.stack([each[0] * nu + each[1] * nv for each in (right, up)])
-    off = (at - camera.project(s.T).T[:2]) * [[1.0], [-1.0]]
-    off *= np.minimum(1.0, _STEP / np.maximum(np.hypot(*off), 1e-300))
-    du, dv = (right[k] * off[0] + up[k] * off[1] for k in (0, 1))
     near = _unit(normal + du * nu + dv * nv)
     moved = s + du * su + dv * sv + 0.5 * du * du * suu + du * dv * suv + 0.5 * dv * dv * svv
     sane = _dot(near, normal) > _TURN
@@ -246,6 +263,21 @@ def _bent(camera: Camera, jets: Array, outward: Array, at: Array) -> tuple[Array
         np.where(sane, moved, s), outward * np.where(sane, near, normal), outward * turning,
         np.stack([-outward * mean, gauss]),
     )  # fmt: skip
+
+
+def _aim(camera: Camera, jets: Array, at: Array) -> tuple[Array, Array, tuple[Array, Array]]:
+    """Steps of u and v that bring places into the middle of their pixels, how many pixels they are off, and the steps
+    for a pixel to the right and up."""
+    s, su, sv = jets
+    a, b = (camera.axes[:2] @ each / camera.pixel for each in (su, sv))  # steps on the picture
+    determinant = a[0] * b[1] - a[1] * b[0]
+    least = 1e-9 * np.sqrt(_dot(a, a) * _dot(b, b))
+    inverse = 1.0 / np.where(np.abs(determinant) > least, determinant, np.inf)
+    right, up = np.stack([b[1], -a[1]]) * inverse, np.stack([-b[0], a[0]]) * inverse
+    off = (at - camera.project(s.T).T[:2]) * [[1.0], [-1.0]]
+    length = np.hypot(*off)
+    off *= np.minimum(1.0, _NEAR / np.maximum(length, 1e-300))
+    return right * off[0] + up * off[1], length, (right, up)
 
 
 def _dot(a: Array, b: Array) -> Array:
