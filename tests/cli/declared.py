@@ -131,6 +131,14 @@ TOGETHER: Mapping[str, Sequence[tuple[str, Sequence[Words]]]] = {
     ],
     "convert": [("outputs", _DONE[:-1])],
     "feature extract": [("base band", _LEVEL)],
+    "render": [
+        ("output size", [("-o", "out.png", "--size", "120x80"), ("-o", "-", "--size", "64x64")]),
+        (
+            "show stripes",
+            [(), ("--show", "zebra", "--stripes", "10"), ("--show", "isophotes"), ("--show", "curvature:gauss")],
+        ),
+        ("before", [()]),
+    ],
 }
 """By command, options that need or exclude each other, and ways to give them."""
 
@@ -146,6 +154,7 @@ VALUES: Mapping[str, Sequence[Any]] = {
     "expect": ["1", "report.json"],
     "faces": ["#1", "type:bspline", "!#2"],
     "feature": ["near:5,5,0,radius:1.5"],
+    "fit": ["#1", "type:bspline"],
     "fit_g1": ["10"],
     "folder": ["out"],
     "gap_tolerance": ["0.01mm"],
@@ -178,11 +187,13 @@ VALUES: Mapping[str, Sequence[Any]] = {
     "sarif": ["out.sarif"],
     "scale": ["4mm", "20%"],
     "seed": ["3"],
+    "show": ["zebra"],
     "size": ["0.8"],
     "spin": ["20"],
     "strength": ["2"],
     "taper": ["0.5mm"],
     "time_limit": ["10min"],
+    "view": ["top", "iso,1,2,3"],
 }
 """Values to try for options that are no flags and no choices, by name."""
 

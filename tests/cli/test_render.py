@@ -1,0 +1,87 @@
+"""Pictures on the command line: what is said and written, next to models too, and what is refused."""
+
+import io
+import json
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from tests.cli.test_errors import one_line
+
+
+def test_a_picture_of_a_model(mracad, samples, tmp_path):
+    out = tmp_path / "a.png"
+    result = mracad("render", samples / "trimmed.step", "-o", out, "--size", "200x100", "--show", "curvature")
+    assert result.code == 0 and "largest curvature 0 to " in result.out and "200 × 100" in result.out
+    assert Image.open(out).size == (200, 100)
+
+
+def test_deviation_from_another_file_is_told_with_its_range(mracad, samples, tmp_path):
+    show = f"deviation:{samples / 'panel_clean.step'}"
+    words = ("-o", tmp_path / "a.png", "--size", "100x60", "--show", show, "--json")
+    told = json.loads(mracad("render", samples / "panel.step", *words).out)
+    assert -0.1 < told["map"]["lowest"] < 0 < told["map"]["highest"] < 0.1
+    assert told["map"]["unit"] == "mm" and told["size"] == [100, 60]
+
+
+def test_an_edit_writes_pictures_as_it_writes_models(mracad, samples, tmp_path):
+    out = tmp_path / "after.png", tmp_path / "after.step"
+    words = ("--scale", "25mm", "-o", out[0], "-o", out[1], "--show", "deviation", "--view", "top,front")
+    result = mracad("smooth", samples / "panel.step", *words)
+    assert result.code == 0 and "valid: yes, as read back" in result.out and "after.png" in result.out
+    show = f"deviation:{samples / 'panel.step'}"
+    direct = mracad("render", out[1], "-o", tmp_path / "b.png", "--show", show, "--view", "top", "--view", "front")
+    assert direct.code == 0
+    one, two = (np.asarray(Image.open(path)).astype(int) for path in (out[0], tmp_path / "b.png"))
+    assert (np.abs(one - two).max(axis=2) > 8).mean() < 2e-3, "the picture is of the result"
+
+
+def test_what_a_picture_is_measured_from_is_a_need_of_it(mracad, samples, tmp_path):
+    show = f"deviation:{samples / 'panel_clean.step'}"
+    words = ("-o", tmp_path / "a.png", "--show", show, "--depfile", tmp_path / "a.d")
+    assert mracad("offset", samples / "panel.step", "--distance", "1mm", *words).code == 0
+    assert "panel_clean.step" in (tmp_path / "a.d").read_text()
+
+
+def test_convert_draws_too(mracad, samples, tmp_path):
+    assert mracad("convert", samples / "blade.step", "-o", tmp_path / "a.png", "--show", "faces").code == 0
+    assert Image.open(io.BytesIO((tmp_path / "a.png").read_bytes())).size == (1200, 800)
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "says"),
+    [
+        (["--show", "zebras"], 2, "did you mean 'zebra'"),
+        (["--show", "curvature:least"], 2, "curvature:max"),
+        (["--show", "zebra:3"], 2, "after a colon"),
+        (["--show", "deviation"], 2, "deviation:REF.step"),
+        (["--show", "deviation:"], 2, "names no file"),
+        (["--show", "deviation:none.step"], 3, "none.step"),
+        (["--before", "none.step"], 3, "none.step"),
+        (["--view", "aside"], 2, "not a view"),
+        (["--view", "1,2"], 2, "not a view"),
+        (["--view", "0,0,0"], 2, "no direction"),
+        (["--view", ",".join(["iso"] * 17)], 2, "17 views"),
+        (["--size", "12"], 2, "1200x800"),
+        (["--size", "8x8"], 2, "out of bounds"),
+        (["--size", "9000x9000"], 2, "out of bounds"),
+        (["--size", "8000x8000"], 2, "out of bounds"),
+        (["--stripes", "0"], 2, "between 1 and 2000"),
+        (["--fit", "#99"], 2, "#1 to #"),
+        (["--fit", "edge#1"], 2, "no face is selected"),
+        (["-o", "a.jpg"], 2, "pictures are PNG"),
+        (["-o", "nowhere/a.png"], 3, "no folder"),
+    ],
+)
+def test_what_cannot_be_drawn(mracad, samples, tmp_path, monkeypatch, words, code, says):
+    monkeypatch.chdir(tmp_path)
+    result = mracad("render", samples / "trimmed.step", *([] if "-o" in words else ["-o", "a.png"]), *words)
+    one_line(result, code)
+    assert says in result.err
+    assert not list(tmp_path.iterdir())
+
+
+def test_an_edit_refuses_a_picture_before_it_starts(mracad, samples, tmp_path):
+    words = ("--scale", "25mm", "-o", tmp_path / "a.png", "--show", "zebras")
+    one_line(mracad("smooth", samples / "panel.step", *words), 2)
