@@ -8,7 +8,8 @@ import numpy as np
 
 from mracad.edit.feature.chart import DEGREE, monomials
 from mracad.edit.feature.ground import SIDEWAYS, Feet, Ground
-from mracad.edit.feature.pattern import edge_of, rotation
+from mracad.edit.feature.locate import edge_of
+from mracad.edit.feature.pattern import rotation
 from mracad.seam.trace import EVENLY
 from mracad.spec import motions
 from mracad.spec.steps.shape import Sweep

@@ -92,10 +92,11 @@ TOGETHER: Mapping[str, Sequence[tuple[str, Sequence[Words]]]] = {
             ],
         ),
         (
-            "at grid polar along fill margin skip_off",
+            "at grid polar along fill margin skip_off align size_by height_by",
             [
                 ("--fill", "poisson,spacing:4mm", "--margin", "1mm"),
-                ("--fill", "poisson,spacing:20%"),
+                ("--fill", "hexagons,spacing:20%", "--align", "X"),
+                ("--fill", "grid,spacing:5", "--size-by", "distance-to:edge#1,from:0=0.5,to:9mm=1"),
             ],
         ),
     ],

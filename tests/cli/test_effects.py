@@ -229,6 +229,9 @@ OWN = {
     "transfer keep": ("--keep g2", "IN tangent.step --to 9.4,5,0 --clip --faces #1"),
     "repeat fill": ("--fill poisson,spacing:5mm", "LESS --at --fill poisson,spacing:4mm"),
     "repeat margin": ("--margin 1mm", "LESS --at --fill poisson,spacing:4mm"),
+    "repeat align": ("--align 1,2,0", "LESS --at --fill grid,spacing:4mm"),
+    "repeat size_by": ("--size-by distance-to:edge#5,from:1mm=0.5,to:15mm=1", "LESS --at --fill grid,spacing:4mm"),
+    "repeat height_by": ("--height-by distance-to:edge#5,from:1mm=0.5,to:15mm=1", "LESS --at --fill grid,spacing:4mm"),
     "repeat polar": ("--polar 2,8,5,0,0,0,1",),
 }
 

@@ -79,6 +79,12 @@ def borders(ground: Ground, joined: Joints, of: Array, step: float) -> Spots:
     return NOWHERE.and_(*found)
 
 
+def along(ground: Ground, of: Array, edge: int, step: float) -> Spots:
+    """Points along an edge (its index), seen from all faces of the ground beside it."""
+    sides = [(p, f, t) for p in ground.patches.values() for f in p.faces for t in f.trims if t.edge == edge]
+    return NOWHERE.and_(*(_spots(p, f, of, _along(ground, p, f, trim, step)) for p, f, trim in sides))
+
+
 def _spots(patch: Patch, face: Face, of: Array, uv: Array) -> Spots:
     points, _, _, normals = patch.evaluate(uv)
     surface, own, part = (np.full(len(uv), x) for x in (patch.index, face.index, of[face.index]))

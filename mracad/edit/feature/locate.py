@@ -11,7 +11,8 @@ from mracad.bspline.surface import Net
 from mracad.edit.feature.ground import SIDEWAYS, Feet, Ground
 from mracad.edit.feature.patch import Patch
 from mracad.errors import EditError, UsageError
-from mracad.model.brep import Model
+from mracad.model.brep import Face, Model
+from mracad.seam.trace import Trace, trace_of
 from mracad.spec.places import FEATURE, PLACE, Disc, OnFace, Point, Rectangle, whole
 
 Array = np.ndarray
@@ -124,6 +125,20 @@ def stood(ground: Ground, places: Sequence[Place], far: float) -> tuple[Feet, di
 def _domain(patch: Patch) -> str:
     u, v = patch.knots
     return f"u goes from {u.domain[0]:g} to {u.domain[1]:g}, v from {v.domain[0]:g} to {v.domain[1]:g}"
+
+
+def edge_of(ground: Ground, number: int, name: str, hint: str) -> tuple[Face, Trace]:
+    """A face of the ground that an edge bounds, by its number, and its trace; raises UsageError and EditError."""
+    model = ground.model
+    if not 1 <= number <= len(model.edges):
+        known = f"edges edge#1 to edge#{len(model.edges)}" if model.edges else "no edges"
+        raise UsageError(f"{name}: edge#{number}: the model has {known}", hint)
+    edge = model.edges[number - 1]
+    side = next((s for s in edge.sides if s.face in ground.chosen and s.uv is not None), None)
+    if side is None or edge.degenerate:
+        raise EditError(f"{name}: edge#{number} bounds no face to edit", "select one of its faces with --faces")
+    face = model.faces[side.face]
+    return face, trace_of(model, face, face.trim(edge.index))
 
 
 @dataclass(frozen=True, eq=False)

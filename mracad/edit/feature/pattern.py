@@ -11,11 +11,11 @@ import numpy as np
 from mracad.edit.feature.detail import Feature
 from mracad.edit.feature.fill import filled
 from mracad.edit.feature.ground import SIDEWAYS, Feet, Ground, axes
-from mracad.edit.feature.locate import ON, Place, place, standing, stood, told
+from mracad.edit.feature.locate import ON, Place, edge_of, place, standing, stood, told
 from mracad.edit.feature.patch import Patch
-from mracad.errors import EditError, UsageError
+from mracad.errors import EditError
 from mracad.model.brep import Face
-from mracad.seam.trace import EVENLY, Trace, trace_of
+from mracad.seam.trace import EVENLY, Trace
 from mracad.seam.wishes import Wishes
 from mracad.spec import places as spec
 from mracad.spec.quantity import length
@@ -150,20 +150,6 @@ def along(ground: Ground, given: spec.Along) -> list[Place]:
     if offset:
         points = points + offset * _inward(ground, face, points, tangents)
     return [Place(f"place {k + 1} along edge#{number}", points[k], direction=tangents[k]) for k in range(count)]
-
-
-def edge_of(ground: Ground, number: int, name: str, hint: str) -> tuple[Face, Trace]:
-    """A face of the ground that an edge bounds, by its number, and its trace; raises UsageError and EditError."""
-    model = ground.model
-    if not 1 <= number <= len(model.edges):
-        known = f"edges edge#1 to edge#{len(model.edges)}" if model.edges else "no edges"
-        raise UsageError(f"{name}: edge#{number}: the model has {known}", hint)
-    edge = model.edges[number - 1]
-    side = next((s for s in edge.sides if s.face in ground.chosen and s.uv is not None), None)
-    if side is None or edge.degenerate:
-        raise EditError(f"{name}: edge#{number} bounds no face to edit", "select one of its faces with --faces")
-    face = model.faces[side.face]
-    return face, trace_of(model, face, face.trim(edge.index))
 
 
 def _even(patch: Patch, trace: Trace, count: int) -> tuple[Array, Array]:

@@ -8,6 +8,8 @@ from msgspec import Meta
 
 from mracad.errors import UsageError
 from mracad.spec import places
+from mracad.spec.fill import align as read_align
+from mracad.spec.fill import fade as read_fade
 from mracad.spec.fill import fill as read_fill
 from mracad.spec.quantity import Angle, Length, band_of
 from mracad.spec.steps.base import Selection
@@ -166,8 +168,8 @@ class Repeat(Single, frozen=True, kw_only=True, forbid_unknown_fields=True):
     fill: Annotated[
         Annotated[str, read_fill] | None,
         Meta(
-            description="poisson,spacing:4mm: places all over the selected faces, at random, nowhere nearer than this "
-            "along the surface, over smooth seams."
+            description="hexagons, grid or poisson (at random), with ,spacing:4mm: places all over the selected faces, "
+            "this far apart along the surface, over smooth seams."
         ),
     ] = None
     margin: Annotated[
@@ -176,6 +178,24 @@ class Repeat(Single, frozen=True, kw_only=True, forbid_unknown_fields=True):
             description="With --fill: width kept clear of copies along borders, which are free and held edges, creases "
             "and holes. Default: copies just fit, or with --clip may run over borders."
         ),
+    ] = None
+    align: Annotated[
+        Annotated[str, read_align] | None,
+        Meta(
+            description="With --fill: direction of its rows and of each copy's x: X, Y or Z or three numbers, brought "
+            "to the surface, or edge#4, whose direction goes on over the faces. Default: as even as can be, near u."
+        ),
+    ] = None
+    size_by: Annotated[
+        Annotated[str, read_fade] | None,
+        Meta(
+            description="With --fill: sizes of copies by their distance along the surface from an edge: "
+            "distance-to:edge#4,from:2mm=0.4,to:30mm=1 (factors, even between and beyond these distances)."
+        ),
+    ] = None
+    height_by: Annotated[
+        Annotated[str, read_fade] | None,
+        Meta(description="With --fill: heights of copies by their distance from an edge, written like --size-by."),
     ] = None
     skip_off: Annotated[
         bool, Meta(description="Leave out places that are not on the faces, instead of refusing them all.")
@@ -208,8 +228,10 @@ class Repeat(Single, frozen=True, kw_only=True, forbid_unknown_fields=True):
         if self.fill and (self.at or self.skip_off):
             name = "at" if self.at else "skip-off"
             raise UsageError(f"fill: it finds all places itself, without --{name}", f"leave --{name} out", "fill")
-        if self.margin and not self.fill:
-            raise UsageError("margin: only --fill keeps borders clear", "give --fill poisson,spacing:4mm", "margin")
+        alone = [name for name in ("margin", "align", "size_by", "height_by") if getattr(self, name) is not None]
+        if alone and not self.fill:
+            message = f"{alone[0].replace('_', '-')}: it goes with --fill only"
+            raise UsageError(message, "give --fill hexagons,spacing:4mm", alone[0])
 
     @property
     def done(self) -> str:
