@@ -25,6 +25,7 @@ import numpy as np
 
 from mracad.bspline.surface import Net
 from mracad.inspect.evidence import noises
+from mracad.inspect.floor import floor
 from mracad.inspect.profiles import SIZES, lines, profiles
 from mracad.memo import kept
 from mracad.model.brep import Face, Model
@@ -72,6 +73,8 @@ class Band:
         Integral of the squared height over the area, mm⁴.
     share : float
         Share of the energy of all bands.
+    floor : float
+        Root mean square height that the noise makes in this band, mm.
     """
 
     low: float
@@ -80,6 +83,7 @@ class Band:
     rms: float
     energy: float
     share: float
+    floor: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -156,7 +160,7 @@ class Spectrum:
 
 
 @dataclass(frozen=True, eq=False)
-class _Modes:
+class Modes:
     """The modes of a free beam over even steps.
 
     Attributes
@@ -178,7 +182,7 @@ class _Modes:
 
 
 @kept(len(SIZES))
-def _modes(count: int) -> _Modes:
+def modes(count: int) -> Modes:
     second = np.diff(np.eye(count), 2, axis=0)
     values, shapes = np.linalg.eigh(second.T @ second)
     angle = 2.0 * np.arcsin(np.clip(np.sqrt(np.sqrt(np.maximum(values, 0.0))) / 2.0, 0.0, 1.0))
@@ -188,7 +192,7 @@ def _modes(count: int) -> _Modes:
     waves = LONGEST * 2.0 ** (-np.arange(0.0, octaves, 1.0 / FINE))
     at = np.linspace(0.0, 1.0, count)
     table = np.abs(shapes.T @ np.exp(2j * np.pi * at[:, None] / waves)) ** 2
-    return _Modes(shapes, lengths, waves, table[2:] / table[2:].sum(axis=0))
+    return Modes(shapes, lengths, waves, table[2:] / table[2:].sum(axis=0))
 
 
 def spectra(model: Model, faces: Sequence[int]) -> list[Spectrum]:
@@ -208,6 +212,11 @@ def together(each: Sequence[Spectrum]) -> Spectrum:
         bands = [band for one in each for band in getattr(one, name).bands]
         waves, energies = np.array([[band.middle, band.energy] for band in bands]).reshape(-1, 2).T
         whole = _direction(waves, energies / max(area, 1e-300), area)
+        floors = {band.low: 0.0 for band in whole.bands}
+        for one in each:
+            for band in getattr(one, name).bands:
+                floors[band.low] += one.area / area * band.floor**2
+        whole = _over(whole, [math.sqrt(floors[band.low]) for band in whole.bands])
         ways.append(replace(whole, shape=_middle([(getattr(s, name).shape, s.area) for s in each])))
     noises = [(one.area, one.noise) for one in each]
     size = float(np.sqrt(sum(a * s**2 for a, s in noises) / area)) if area else 0.0
@@ -226,7 +235,17 @@ def spectrum(net: Net, face: Face, noise: float = 0.0) -> Spectrum:
     ways = [_along(net, face, axis) for axis in (0, 1)]
     area = max(each for _, each in ways)
     u, v = (_direction(*waves, area) for waves, _ in ways)
+    if noise:
+        u, v = (
+            _over(way, floor(net, k, noise, np.array([band.low for band in way.bands]))) for k, way in ((0, u), (1, v))
+        )
     return Spectrum((face.index,), area, u, v, noise)
+
+
+def _over(way: Direction, floors: Sequence[float] | Array) -> Direction:
+    """A direction with the noise floors of its bands."""
+    bands = (replace(band, floor=float(each)) for band, each in zip(way.bands, floors, strict=True))
+    return replace(way, bands=tuple(bands))
 
 
 def _along(net: Net, face: Face, axis: int) -> tuple[tuple[Array, Array], float]:
@@ -249,25 +268,28 @@ def _along(net: Net, face: Face, axis: int) -> tuple[tuple[Array, Array], float]
 
 def _explained(energy: Array, count: int) -> tuple[Array, Array]:
     """Wavelengths over the length, and the energies ``(r, j)`` of such waves that explain the modes of each row."""
-    modes = _modes(count)
-    found = np.repeat(energy.sum(axis=1, keepdims=True) / len(modes.waves), len(modes.waves), axis=1)
+    beam = modes(count)
+    found = np.repeat(energy.sum(axis=1, keepdims=True) / len(beam.waves), len(beam.waves), axis=1)
     for _ in range(PASSES):
-        found *= (energy / np.maximum(found @ modes.table.T, 1e-300)) @ modes.table
-    return modes.waves, found
+        found *= (energy / np.maximum(found @ beam.table.T, 1e-300)) @ beam.table
+    return beam.waves, found
+
+
+def heights(points: Array, normals: Array) -> Array:
+    """Heights of profiles ``(p, n)`` above their slow part, along its normals, mm; arguments ``(p, n, 3)`` each."""
+    beam = modes(points.shape[1])
+    shapes = beam.shapes[:, beam.lengths > SLOW]
+    above = points - shapes @ (shapes.T @ points)
+    return np.asarray((above * _unit(shapes @ (shapes.T @ normals))).sum(axis=2))
 
 
 def _of_beams(points: Array, normals: Array) -> Array:
     """Energies of the modes of profiles other than rigid motions ``(p, n - 2)``, mm²."""
-    count = points.shape[1]
-    modes = _modes(count)
-    slow = int((modes.lengths > SLOW).sum())
-    shapes = modes.shapes[:, :slow]
-    found = np.einsum("nm,pnk->pmk", modes.shapes, points, optimize=True)
-    calm = _unit(shapes @ (shapes.T @ normals))
-    heights = ((points - shapes @ found[:, :slow]) * calm).sum(axis=2)
-    energy = (heights @ modes.shapes) ** 2
-    energy[:, :slow] = (found[:, :slow] ** 2).sum(axis=2)
-    return np.asarray(energy[:, 2:] / count)
+    beam = modes(points.shape[1])
+    slow = beam.lengths > SLOW
+    energy = (heights(points, normals) @ beam.shapes) ** 2
+    energy[:, slow] = ((beam.shapes[:, slow].T @ points) ** 2).sum(axis=2)
+    return np.asarray(energy[:, 2:] / points.shape[1])
 
 
 def _of_rings(points: Array, normals: Array) -> Array:

@@ -63,8 +63,20 @@ def test_a_model_without_nurbs_faces_says_so(mracad, tmp_path):
 def test_a_picture_shows_the_bands_of_the_model(mracad, tmp_path):
     from matplotlib.image import imread
 
-    for name, faces in (("a.png", ("--faces", "#1")), ("b.png", ("--faces", "#1")), ("c.png", ("--faces", "#2"))):
+    two = "--faces", "#1", "--faces", "#2"
+    for name, faces in (("a.png", two), ("b.png", two), ("c.png", ("--faces", "#2"))):
         assert mracad("spectrum", PANEL, *faces, "-o", tmp_path / name).code == 0
-    one, same, other = (imread(tmp_path / name) for name in ("a.png", "b.png", "c.png"))
-    assert one.shape[:2] == (400, 1000) and (one == same).all() and (one != other).any()
-    assert (tmp_path / "a.png").stat().st_size < 1e5
+    one, same, scalograms = (imread(tmp_path / name) for name in ("a.png", "b.png", "c.png"))
+    assert one.shape[:2] == (400, 1000) and (one == same).all()
+    assert scalograms.shape[:2] == (700, 1000)
+    assert (tmp_path / "c.png").stat().st_size < 1e5
+
+
+def test_drawings_state_the_noise_and_the_scale(mracad, tmp_path):
+    for name in ("a.svg", "b.svg"):
+        assert mracad("spectrum", PANEL, "--faces", "#1", "-o", tmp_path / name).code == 0
+    text = (tmp_path / "a.svg").read_text()
+    scale = json.loads(mracad("spectrum", PANEL, "--faces", "#1", "--json").out)["model"]["scale"]
+    assert text == (tmp_path / "b.svg").read_text() and all(
+        f">{x}<" in text for x in ("noise", f"--scale {scale:.3g}mm")
+    )

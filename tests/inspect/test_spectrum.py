@@ -8,7 +8,7 @@ import pytest
 from mracad.bspline.fit import through
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
-from mracad.inspect.spectrum import spectra, together
+from mracad.inspect.spectrum import spectra, spectrum, together
 from mracad.model.brep import Trim
 from tests.edit.models import segment, sheet
 
@@ -100,8 +100,8 @@ WANTED = np.array([SHORT[1], LONG[1]])
 
 
 def test_both_ripples_have_their_amplitudes_in_their_bands(panel):
-    for name, (spectrum, way) in panel.items():
-        got = amplitudes(getattr(spectrum, way))
+    for name, (found, way) in panel.items():
+        got = amplitudes(getattr(found, way))
         print(name, got / WANTED)
         np.testing.assert_allclose(got, WANTED, rtol=0.05, err_msg=name)
 
@@ -206,3 +206,18 @@ def test_noise_is_found_and_a_scale_that_takes_it():
     clean, rough = found(net), found(noisy)
     assert clean.noise == 0.0 and clean.scale is None
     assert rough.noise == pytest.approx(0.03, rel=0.1) and 6.0 <= rough.scale <= 30.0
+
+
+@pytest.mark.parametrize("degrees", [(3, 3), (2, 5)])
+def test_noise_reaches_the_floor(degrees):
+    """On uneven spans: in every octave from twice the spans, within the scatter of the noise."""
+    u, v = (KnotVector.clamped(breaks(200.0, 2.0, 0.3), d) for d in degrees)
+    net = Net(u, v, np.zeros((u.count, v.count, 3)))
+    x, y = np.meshgrid(u.greville(), v.greville(), indexing="ij")
+    flat = np.stack([x, y, 0.05 * np.random.default_rng(3).standard_normal(x.shape)], axis=-1)
+    model = sheet(net.with_poles(flat))
+    found = spectrum(model.surfaces[0].net, model.faces[0], 0.05)
+    for way in (found.u, found.v):
+        seen = [band for band in way.bands if 4.0 < band.low < 25.0]
+        assert len(seen) == 3
+        assert [band.floor for band in seen] == pytest.approx([band.rms for band in seen], rel=0.1)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
@@ -16,10 +18,15 @@ from mracad_cli.outputs import check_target, deliver, read
 from mracad_cli.progress import Progress
 from mracad_cli.say import json_text
 
+if TYPE_CHECKING:
+    from mracad.inspect.spectrum import Spectrum
+    from mracad.model.brep import Model
+
 OTHERS = "instance hold keep edges"
 """Options of edits that do not apply here."""
 
-ENDINGS = ".csv", ".json", ".png"
+PICTURES = ".png", ".svg"
+ENDINGS = ".csv", ".json", *PICTURES
 
 
 @click.command("spectrum", cls=Command, help=__doc__)
@@ -31,7 +38,8 @@ ENDINGS = ".csv", ".json", ".png"
         "--output",
         metavar="F",
         type=options.path,
-        help="Write all bands of all faces to a .csv, .json or .png file.",
+        help="Write all bands of all faces to a .csv or .json file, or draw them: .png or .svg, with a scalogram of a "
+        "single face.",
     ),
     options.overwrite,
     options.printing,
@@ -40,12 +48,12 @@ def command(reading: Reading, chosen: Selection, output: str | None, overwrite: 
     if output:
         if Path(output).suffix not in ENDINGS:
             raise UsageError(
-                f"cannot write {output}: unknown extension {Path(output).suffix!r}", "use .csv, .json or .png"
+                f"cannot write {output}: unknown extension {Path(output).suffix!r}", f"use {', '.join(ENDINGS)}"
             )
         check_target(Path(output), overwrite)
     from mracad.inspect.spectrum import spectra
     from mracad.job.look import looked_at
-    from mracad_cli.render import plot, spectrum
+    from mracad_cli.render import spectrum
 
     with Progress() as progress:
         progress("reading", 0, 1)
@@ -56,12 +64,23 @@ def command(reading: Reading, chosen: Selection, output: str | None, overwrite: 
             progress("measuring waves", done, len(every))
             found += spectra(model, [face])
     body = json_text(spectrum.body(model.name, found))
-    if output and output.endswith(".png") and not found:
+    if output and output.endswith(PICTURES) and not found:
         raise EditError(f"{model.name}: there is no NURBS face to draw", "choose others with --faces")
     forms: dict[str, Callable[[], str | bytes]] = {
         ".csv": lambda: spectrum.csv(found),
         ".json": lambda: body + "\n",
-        ".png": lambda: plot.png(model.name, found),
-    }
+    } | {form: partial(_drawn, model, found, form[1:]) for form in PICTURES}
     files: dict[str, str | bytes | None] = {output: forms[Path(output).suffix]()} if output else {}
     deliver(files, [body] if as_json else spectrum.lines(model.name, found))
+
+
+def _drawn(model: Model, found: Sequence[Spectrum], form: str) -> bytes:
+    """A picture of spectra; of a single face with its scalograms."""
+    from mracad.inspect.scalogram import scalogram
+    from mracad_cli.render import plot
+
+    face = model.faces[found[0].faces[0]]
+    alone = len(found) == 1 and face.surface is not None
+    net = model.surfaces[face.surface or 0].net
+    shown = {way: scalogram(net, face, axis) for axis, way in enumerate("uv")} if alone else {}
+    return plot.picture(model.name, found, shown, form)

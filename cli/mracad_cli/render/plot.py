@@ -3,39 +3,82 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from mracad.inspect.spectrum import Spectrum
+    from mracad.inspect.scalogram import Scalogram
+    from mracad.inspect.spectrum import Direction, Spectrum
 
 DECADES = 6.0
 """Number of decades of height that a picture shows at most."""
 
+SHADES = 3.0
+"""Number of decades of height that the shades of a scalogram show at most."""
 
-def png(name: str, each: Sequence[Spectrum]) -> bytes:
-    """Heights by band along u and v: the model in black with where its shape begins, each face in grey."""
+
+def picture(name: str, each: Sequence[Spectrum], scalograms: Mapping[str, Scalogram | None], form: str) -> bytes:
+    """A picture of spectra, in one of matplotlib's formats.
+
+    Heights by band along u and v: the model in black, with its noise floor, where its shape begins and the scale that
+    leaves the shape; each face in grey.  Under them scalograms, by direction, if there are any.
+    """
+    from matplotlib import rc_context
     from matplotlib.figure import Figure
 
     from mracad.inspect.spectrum import together
 
-    figure = Figure(figsize=(10, 4), layout="constrained")
+    whole = together(each)
+    figure = Figure(figsize=(10, 7 if scalograms else 4), layout="constrained")
+    rows = 2 if scalograms else 1
     for place, way in enumerate("uv", 1):
-        axes = figure.add_subplot(1, 2, place, title=f"{name}: waves along {way}")
-        axes.set(xscale="log", yscale="log", xlabel="wavelength, mm", ylabel="rms height, mm")
-        axes.grid(alpha=0.3)
-        whole = getattr(together(each), way)
-        for direction, style in [*((getattr(s, way), "0.8") for s in each if len(each) > 1), (whole, "0")]:
-            if not direction.bands:
-                continue
-            ends = [direction.bands[0].low, *(band.high for band in direction.bands)]
-            axes.stairs([band.rms for band in direction.bands], ends, baseline=None, color=style)
-        seen = [band.rms for band in whole.bands if band.rms > 0.0]
-        if seen:
-            axes.set_ylim(bottom=max(max(seen) * 10**-DECADES, min(seen) / 2))
-        if whole.shape:
-            axes.axvline(whole.shape, color="0", linestyle="--", label=f"shape begins at {whole.shape:.3g} mm")
-            axes.legend()
-    picture = io.BytesIO()
-    figure.savefig(picture, format="png", dpi=100, metadata={"Software": None})
-    return picture.getvalue()
+        axes = figure.add_subplot(rows, 2, place, title=f"{name}: waves along {way}")
+        faces = [getattr(one, way) for one in each] if len(each) > 1 else []
+        _bands(axes, getattr(whole, way), faces, whole.scale)
+        shown = scalograms.get(way)
+        if shown is not None:
+            _shades(figure, figure.add_subplot(rows, 2, 2 + place), way, shown)
+    file = io.BytesIO()
+    with rc_context({"svg.hashsalt": "mracad", "svg.fonttype": "none"}):
+        meta: dict[str, Any] = {"Software": None} if form == "png" else {"Date": None, "Creator": None}
+        figure.savefig(file, format=form, dpi=100, metadata=meta)
+    return file.getvalue()
+
+
+def _bands(axes: Any, whole: Direction, faces: Sequence[Direction], scale: float | None) -> None:
+    """Heights by band."""
+    axes.set(xscale="log", yscale="log", xlabel="wavelength, mm", ylabel="rms height, mm")
+    axes.grid(alpha=0.3)
+    for direction, style in [*((face, "0.8") for face in faces), (whole, "0")]:
+        if direction.bands:
+            axes.stairs([band.rms for band in direction.bands], _ends(direction), baseline=None, color=style)
+    seen = [band.rms for band in whole.bands if band.rms > 0.0]
+    if seen:
+        axes.set_ylim(bottom=max(max(seen) * 10**-DECADES, min(seen) / 2))
+    if any(band.floor for band in whole.bands):
+        floors = [band.floor for band in whole.bands]
+        axes.stairs(floors, _ends(whole), baseline=None, color="C1", label="noise")
+    if whole.shape:
+        axes.axvline(whole.shape, color="0", linestyle="--", label=f"shape begins at {whole.shape:.3g} mm")
+    if scale is not None:
+        axes.axvline(scale, color="C0", linestyle=":", label=f"--scale {scale:.3g}mm")
+    if axes.get_legend_handles_labels()[0]:
+        axes.legend(loc="upper left")
+
+
+def _ends(direction: Direction) -> list[float]:
+    return [direction.bands[0].low, *(band.high for band in direction.bands)]
+
+
+def _shades(figure: Any, axes: Any, way: str, shown: Scalogram) -> None:
+    """Heights by place and wavelength."""
+    import numpy as np
+    from matplotlib.colors import LogNorm
+
+    most = max(float(shown.rms.max()), 1e-300)
+    places = np.linspace(0.0, shown.length, shown.rms.shape[1] + 1)
+    waves = np.append(shown.lows, 2.0 * shown.lows[-1])
+    shades = LogNorm(most * 10**-SHADES, most, clip=True)
+    drawn = axes.pcolormesh(places, waves, shown.rms, norm=shades, cmap="viridis", rasterized=True)
+    axes.set(yscale="log", xlabel=f"along {way}, mm", ylabel="wavelength, mm")
+    figure.colorbar(drawn, ax=axes, label="rms height, mm")

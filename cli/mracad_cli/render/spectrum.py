@@ -17,7 +17,18 @@ WIDTH = 20
 DECADES = 5.0
 """Number of decades of height that bars show."""
 
-HEAD = "face,direction,from_mm,to_mm,wavelength_mm,rms_mm,energy_mm4,share"
+BAND = {
+    "from": "low",
+    "to": "high",
+    "wavelength": "middle",
+    "rms": "rms",
+    "noise": "floor",
+    "energy": "energy",
+    "share": "share",
+}
+"""What is written about a band."""
+
+HEAD = "face,direction,from_mm,to_mm,wavelength_mm,rms_mm,noise_mm,energy_mm4,share"
 
 
 def body(name: str, each: Sequence[Spectrum]) -> dict[str, Any]:
@@ -39,8 +50,7 @@ def _values(spectrum: Spectrum) -> dict[str, Any]:
 
 
 def _way(way: Direction) -> dict[str, Any]:
-    names = {"from": "low", "to": "high", "wavelength": "middle", "rms": "rms", "energy": "energy", "share": "share"}
-    bands = [{name: getattr(band, own) for name, own in names.items()} for band in way.bands]
+    bands = [{name: getattr(band, own) for name, own in BAND.items()} for band in way.bands]
     return {"shape": way.shape or None, "detail": way.detail, "bands": bands}
 
 
@@ -54,7 +64,7 @@ def csv(each: Sequence[Spectrum]) -> str:
     for face, spectrum in rows:
         for name in ("u", "v"):
             bands = getattr(spectrum, name).bands
-            values = ((b.low, b.high, b.middle, b.rms, b.energy, b.share) for b in bands)
+            values = ([getattr(band, own) for own in BAND.values()] for band in bands)
             found += [",".join([face, name, *(f"{value:.9g}" for value in row)]) for row in values]
     return "\n".join(found) + "\n"
 
