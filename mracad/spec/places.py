@@ -8,12 +8,16 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from mracad.errors import FileError, UsageError
+from mracad.spec import sources
 from mracad.spec.files import Naming
 from mracad.spec.quantity import NUMBER, length
 
 PLACE = "write a place as X,Y,Z in millimetres or #FACE@u,v"
 VECTOR = "write X,Y,Z in millimetres: 0,0,-2.5"
-FEATURE = "write a feature as near:X,Y,Z,radius:R (mm), #FACE@u0:u1,v0:v1 or the name of a .feature file"
+FEATURE = (
+    "write a feature as near:X,Y,Z,radius:R (mm), #FACE@u0:u1,v0:v1, the name of a .feature file or a source such as "
+    "logo.png,width:30mm,height:0.4mm"
+)
 ZONE = "write a region as near:X,Y,Z,radius:R or box:X,Y,Z,X,Y,Z (mm), or radius<25mm"
 GRID = "write it as NxM,DX,DY: 4x3,25,25"
 POLAR = "write it as N,x|y|z or N,X,Y,Z,DX,DY,DZ: 6,z"
@@ -146,10 +150,13 @@ def place(text: str, name: str) -> Point | OnFace | Listed:
     return Listed(text[1:]) if text.startswith("@") else spot(text, name)
 
 
-def feature(text: str, name: str) -> Disc | Rectangle | Stored:
-    """A feature from ``near:X,Y,Z,radius:R``, ``#3@u0:u1,v0:v1`` or ``FILE.feature``; raises UsageError."""
+def feature(text: str, name: str) -> Disc | Rectangle | Stored | sources.Source:
+    """A feature from ``near:X,Y,Z,radius:R``, ``#3@u0:u1,v0:v1``, ``FILE.feature`` or the text of a source; raises
+    UsageError."""
     if text.endswith(".feature"):
         return Stored(text)
+    if sources.is_source(text):
+        return sources.source(text, name)
     if disc := _disc(text, name, FEATURE):
         return disc
     box = re.fullmatch(rf"(.+)@({NUMBER}):({NUMBER}),({NUMBER}):({NUMBER})", text.replace(" ", ""))
@@ -199,7 +206,12 @@ def zone(text: str, name: str, diagonal: float) -> Zone:
 
 def is_feature(text: str) -> bool:
     """Whether a text means a feature, and not a face."""
-    return text.startswith("near:") or "@" in text or text.endswith(".feature")
+    return text.startswith("near:") or "@" in text or is_made(text)
+
+
+def is_made(text: str) -> bool:
+    """Whether a text means a feature that no model contains: that of a file, or of a source."""
+    return text.endswith(".feature") or sources.is_source(text)
 
 
 def table(path: str) -> list[tuple[str, tuple[float, ...]]]:
@@ -329,5 +341,8 @@ Vector = Annotated[str, vector]
 Spot = Annotated[str, spot]
 """The type of a field that is a place."""
 
-Feature = Annotated[str, Naming(ending=".feature"), feature]
+NAMED = Naming(ending=(".feature", *sources.IMAGES, *sources.GRIDS, *sources.OUTLINES), keyed=True)
+"""How the text of a feature names a file."""
+
+Feature = Annotated[str, NAMED, feature]
 """The type of a field that is a feature, or names the file of one."""

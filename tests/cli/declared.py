@@ -207,6 +207,7 @@ ARGUMENTS = {
     "batch": ("recipe.toml", "IN"),
     "compare": ("REF", "IN"),
     "compose": ("IN", "MRA"),
+    "feature make": ("formula:0.2*cos(x)*cos(y),radius:3mm",),
     "pipeline": (PIPELINE, "IN"),
     "recipe check": ("recipe.toml",),
     "recipe schema": (),

@@ -1,4 +1,4 @@
-"""Find detail features in a model, or save one to a file for use on others."""
+"""Find detail features in a model, save one to a file for use on others, or make one."""
 
 from __future__ import annotations
 
@@ -7,7 +7,9 @@ from pathlib import Path
 import click
 
 from mracad.errors import UsageError
-from mracad.spec.steps import Extract, Selection
+from mracad.spec.quantity import LENGTH
+from mracad.spec.sources import source
+from mracad.spec.steps import Extract, Make, Selection
 from mracad_cli import options
 from mracad_cli.command import Group
 from mracad_cli.options import Reading
@@ -60,10 +62,7 @@ def extract(reading: Reading, chosen: Extract, output: str, overwrite: bool, as_
     from mracad.job.look import looked_at
     from mracad_cli.render.text import mm
 
-    path = Path(output)
-    if path.suffix != ".feature":
-        raise UsageError(f"cannot write {path}: unknown extension {path.suffix!r}", "use .feature")
-    check_target(path, overwrite)
+    path = _target(output, overwrite)
     model, scope = looked_at(read(reading), chosen)
     found = feature_of(model, chosen, scope.chosen, chosen.feature)
     body = {
@@ -76,3 +75,41 @@ def extract(reading: Reading, chosen: Extract, output: str, overwrite: bool, as_
     }
     said = f"{model.name}: {mm(found.height)} high, {mm(2 * found.radius)} across; wrote {path.name}"
     deliver({output: save(found)}, [json_text(body) if as_json else said])
+
+
+@command.command(help=Make.__doc__)
+@options.apply(
+    options.of(Make, "given", arguments={"source": "SOURCE"}),
+    click.option("-o", "--output", metavar="F.feature", required=True, type=options.path, help="File to write."),
+    options.overwrite,
+    options.printing,
+)
+def make(given: Make, output: str, overwrite: bool, as_json: bool) -> None:
+    from mracad.edit.feature.detail import save
+    from mracad.edit.feature.source import made
+    from mracad_cli.render.text import mm
+
+    path = _target(output, overwrite)
+    width = None if given.taper is None else LENGTH.read(given.taper, "taper")
+    found = made(source(given.source, "source"), given.source, width)
+    body = {
+        "radius": found.radius,
+        "reach": found.reach,
+        "height": found.height,
+        "spacing": found.spacing,
+        "notes": found.notes,
+        "written": path.name,
+    }
+    across, apart = mm(2 * found.radius), mm(found.spacing)
+    said = [f"{mm(found.height)} high, {across} across, knots {apart} apart; wrote {path.name}"]
+    said += [f"note: {note}" for note in found.notes]
+    deliver({output: save(found)}, [json_text(body)] if as_json else said)
+
+
+def _target(output: str, overwrite: bool) -> Path:
+    """The path of a feature file to write; refuses others."""
+    path = Path(output)
+    if path.suffix != ".feature":
+        raise UsageError(f"cannot write {path}: unknown extension {path.suffix!r}", "use .feature")
+    check_target(path, overwrite)
+    return path

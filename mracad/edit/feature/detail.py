@@ -62,6 +62,8 @@ class Feature:
         None for a feature from a file.
     base : float
         Error of the surface that it was separated from, root mean square, mm; 0 if not known.
+    notes : tuple of str
+        What to know about how it was made.
     """
 
     radius: float
@@ -71,6 +73,7 @@ class Feature:
     name: str = ""
     origin: Origin | None = field(default=None)
     base: float = 0.0
+    notes: tuple[str, ...] = ()
 
     @cached_property
     def height(self) -> float:

@@ -74,7 +74,8 @@ def repeat(
     feature = feature_of(model, options, chosen, options.feature)
     ground = Ground.of(model, chosen).without(feature.origin.offsets if feature.origin else {})
     found, skipped = places(ground, feature, options, _wishes(options, scope))
-    return replace(_edit(model, scope, _laid(ground, feature, found, options, scope, {})), notes=skipped)
+    edit = _edit(model, scope, _laid(ground, feature, found, options, scope, {}))
+    return replace(edit, notes=(*feature.notes, *skipped))
 
 
 def transferred(model: Model, options: Transfer, source: Model, scope: Scope) -> Edit:
@@ -84,7 +85,8 @@ def transferred(model: Model, options: Transfer, source: Model, scope: Scope) ->
     every = {f.index for f in source.faces if f.surface is not None}
     feature = replace(feature_of(source, options, every, options.from_), origin=None)
     ground = Ground.of(model, scope.movable(model))
-    return _edit(model, scope, _laid(ground, feature, [_target(ground, options.to, options)], options, scope, {}))
+    found = [_target(ground, options.to, options)]
+    return replace(_edit(model, scope, _laid(ground, feature, found, options, scope, {})), notes=feature.notes)
 
 
 def _refuse_held(model: Model, offsets: Mapping[int, Array], scope: Scope) -> None:

@@ -15,12 +15,13 @@ from mracad.edit.feature.detail import LOST, Feature, Origin, load, taper
 from mracad.edit.feature.ground import STEEP, Ground
 from mracad.edit.feature.locate import Window, window
 from mracad.edit.feature.patch import Patch
+from mracad.edit.feature.source import made
 from mracad.errors import EditError
 from mracad.model.brep import Model
 from mracad.seam.hold import separate
 from mracad.seam.natural import seams
 from mracad.seam.wishes import Wishes
-from mracad.spec.places import Stored, feature
+from mracad.spec.places import Disc, Rectangle, Stored, feature
 from mracad.spec.quantity import band_of, length
 from mracad.spec.steps import Featured, Transfer
 from mracad.wavelet.project import band
@@ -44,7 +45,7 @@ class Cut:
 
 
 def feature_of(model: Model, options: Featured | Transfer, faces: Collection[int], text: str) -> Feature:
-    """The feature that a text names: from a file, or from a window on faces of a model.
+    """The feature that a text names: from a file, a source, or a window on faces of a model.
 
     Raises
     ------
@@ -58,10 +59,12 @@ def feature_of(model: Model, options: Featured | Transfer, faces: Collection[int
     given = feature(text, "feature")
     if isinstance(given, Stored):
         return load(given.path)
+    width = None if options.taper is None else length(options.taper, model.diagonal, "taper")
+    if not isinstance(given, Disc | Rectangle):
+        return made(given, text, width)
     if not faces:
         raise EditError(f"{model.name}: no NURBS face to edit", "select faces with --faces")
     ground = Ground.of(model, faces)
-    width = None if options.taper is None else length(options.taper, model.diagonal, "taper")
     area = window(ground, given, text, width)
     if options.base == "surroundings":
         return above_surroundings(ground, area, options.keep)

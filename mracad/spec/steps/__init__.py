@@ -9,14 +9,14 @@ from __future__ import annotations
 from mracad.spec.steps import checks, features, levels, shape, smooth, transfer
 from mracad.spec.steps.base import Options, Selection
 from mracad.spec.steps.checks import Check, Compare
-from mracad.spec.steps.features import Copied, Extract, Featured, Move, Repeat, Single
+from mracad.spec.steps.features import Copied, Extract, Featured, Make, Move, Repeat, Single
 from mracad.spec.steps.levels import Compose, Level, Shaped
 from mracad.spec.steps.smooth import Fairing, Fitting, Smooth
 from mracad.spec.steps.transfer import Transfer
 
 __all__ = [
-    "STEPS", "Check", "Compare", "Compose", "Copied", "Extract", "Fairing", "Featured", "Fitting", "Level", "Move",
-    "Options", "Repeat", "Selection", "Shaped", "Single", "Smooth", "Transfer",
+    "STEPS", "Check", "Compare", "Compose", "Copied", "Extract", "Fairing", "Featured", "Fitting", "Level", "Make",
+    "Move", "Options", "Repeat", "Selection", "Shaped", "Single", "Smooth", "Transfer",
 ]  # fmt: skip
 
 STEPS: dict[str, type[Options]] = {

@@ -7,25 +7,27 @@ from typing import Annotated, ClassVar, Literal
 from msgspec import Meta
 
 from mracad.errors import UsageError
-from mracad.spec import places
+from mracad.spec import places, sources
 from mracad.spec.fill import align as read_align
 from mracad.spec.fill import fade as read_fade
 from mracad.spec.fill import fill as read_fill
 from mracad.spec.quantity import Angle, Length, band_of
-from mracad.spec.steps.base import Selection
+from mracad.spec.steps.base import Options, Selection
 
 _Feature = Annotated[
     places.Feature,
     Meta(
-        description="The feature: near:X,Y,Z,radius:R (a disc, mm), #3@u0:u1,v0:v1 (a rectangle of parameters) or "
-        "a file made by mracad feature extract."
+        description="The feature: near:X,Y,Z,radius:R (a disc, mm), #3@u0:u1,v0:v1 (a rectangle of parameters), "
+        "a .feature file made by mracad feature extract, or a source as for mracad feature make: "
+        "logo.png,width:30mm,height:0.4mm."
     ),
 ]
 Taper = Annotated[
     Length | None,
     Meta(
         description="Width over which the feature fades out beyond its window. Default: a quarter of the window's "
-        "radius, or of the shorter side of a rectangle."
+        "radius, or of the shorter side of a rectangle. Heightmaps and textures that are not level at their border "
+        "fade out inside it, by default over an eighth of their shorter side."
     ),
 ]
 Base = Annotated[
@@ -90,6 +92,28 @@ class Extract(Featured, frozen=True, kw_only=True, forbid_unknown_fields=True):
     feature: _Feature
 
 
+class Make(Options, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Make a feature file from SOURCE: a heightmap, an outline, a texture or a formula.
+
+    \b
+    logo.png,width:30mm,height:0.4mm      heightmap: PNG, TIFF, .npy or .csv
+    logo.svg,height:0.4mm,edge:0.3mm      outline: SVG or DXF; width: scales it
+    texture:leather,width:40mm,height:0.2mm,pitch:2mm,seed:1
+                                          or knurl, hammered, brushed, hexagons, dimples
+    formula:'0.3*cos(x)*cos(y)',radius:10mm
+
+    spacing:0.2mm sets how far apart its knots are; by default they are as far apart as its detail allows.
+    """
+
+    command: ClassVar[str] = "feature make"
+
+    source: Annotated[
+        Annotated[str, places.NAMED, sources.source],
+        Meta(description="A heightmap, an outline, a texture or a formula, with its sizes."),
+    ]
+    taper: Taper = None
+
+
 class Copied(Featured, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Options of edits that make copies of a feature."""
 
@@ -126,8 +150,8 @@ class Move(Single, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.feature.endswith(".feature"):
-            message = f"feature: a file cannot be moved: {self.feature}"
+        if places.is_made(self.feature):
+            message = f"feature: one that is not in the model cannot be moved: {self.feature}"
             raise UsageError(message, "copy it with mracad repeat", "feature")
 
     @property

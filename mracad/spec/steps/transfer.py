@@ -10,7 +10,7 @@ from msgspec import Meta
 from mracad.errors import UsageError
 from mracad.spec import places
 from mracad.spec.fields import dashed
-from mracad.spec.files import File, Naming
+from mracad.spec.files import File
 from mracad.spec.quantity import Length, band_of, blend_of
 from mracad.spec.steps import features
 from mracad.spec.steps.base import Edges
@@ -52,7 +52,7 @@ class Transfer(Fairing, frozen=True, kw_only=True, forbid_unknown_fields=True):
         File, Meta(description="The file that the detail is taken from: a model, or details (.mra) of mracad level.")
     ]
     from_: Annotated[
-        Annotated[str, Naming(ending=".feature")] | None,
+        Annotated[str, places.NAMED] | None,
         Meta(description="What to take: a face (#3 or its name) with its detail, or a feature as for mracad repeat."),
     ] = None
     to: Annotated[str | None, Meta(description="Where to: a face for the detail of a face; a place for a feature.")] = (
