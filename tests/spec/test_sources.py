@@ -49,7 +49,9 @@ def test_a_source_names_its_file_and_keeps_its_sizes_when_that_moves():
     assert options.files() == ("logo.png",)
     assert options.relocated({"logo.png": "/b/logo.png"}).feature == "/b/logo.png,width:30mm,height:0.4mm"
     assert Repeat(feature="texture:knurl,width:9,height:1", at=("0,0,0",)).files() == ()
-    assert path_of("formula:x,radius:3") is None and not is_source("#3@0:1,0:1") and not is_source("near:1,2,3,radius:4")
+    assert (
+        path_of("formula:x,radius:3") is None and not is_source("#3@0:1,0:1") and not is_source("near:1,2,3,radius:4")
+    )
 
 
 def test_what_no_model_contains_cannot_be_moved():

@@ -60,6 +60,8 @@ def shapes(file: Path) -> list[Shape]:
         if file.stat().st_size > MOST_BYTES:
             raise FileError(f"'{file.name}' is larger than {MOST_BYTES // 10**6} MB", "simplify it")
         found = _svg(file) if kind == "svg" else _dxf(file)
+    except FileError:
+        raise
     except OSError as error:
         if error.strerror is None:
             raise _damaged(file, kind) from error
@@ -103,6 +105,8 @@ def _svg(file: Path) -> list[Shape]:
                 stroked += loops
             else:
                 filled.append(Shape(loops, "evenodd" in str(each.values.get("fill-rule", "")).replace("-", "")))
+    except FileError:
+        raise
     except (ElementTree.ParseError, ValueError, TypeError, AttributeError, KeyError, IndexError, ZeroDivisionError,
             OverflowError, RecursionError) as error:  # fmt: skip
         raise _damaged(file, "svg") from error
@@ -164,6 +168,8 @@ def _dxf(file: Path) -> list[Shape]:
         every = np.array([(p.x, p.y) for c in curves for p in c.control_vertices()]).reshape(-1, 2)
         size = max(float(np.ptp(every, axis=0).max()) if len(every) else 0.0, 1e-9)
         lines = [np.array([(p.x, p.y) for p in c.flattening(size / 10_000, 16)]) * factor for c in curves]
+    except FileError:
+        raise
     except (ezdxf.DXFError, UnicodeDecodeError, ValueError, TypeError, KeyError, IndexError, RecursionError) as error:
         raise _damaged(file, "dxf") from error
     return [Shape(tuple(joined(lines)), True)]

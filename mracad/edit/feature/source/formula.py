@@ -15,8 +15,8 @@ from mracad.spec.sources import Formula
 
 Array = np.ndarray
 
-CELLS = 768
-"""Cells across the window."""
+CELLS = 769
+"""Cells across the window; their number is odd, so that one is in its middle."""
 
 LONGEST = 1000
 """Longest formula, in characters."""

@@ -94,6 +94,8 @@ def _image(file: Path) -> tuple[Array, float]:
                 _small_enough(file, image.size[::-1])
                 image.load()
                 return _levels(image)
+    except FileError:
+        raise
     except UnidentifiedImageError as error:
         raise FileError(f"'{file.name}' is not a PNG or TIFF image", hint) from error
     except Image.DecompressionBombError as error:
@@ -174,6 +176,8 @@ def _table(file: Path) -> Array:
             raise FileError(f"'{file.name}' is larger than {MOST_BYTES // 10**6} MB", "give it as .npy, or coarser")
         with open(file, encoding="utf-8") as stream:
             lines = list(_rows(stream, file.name))
+    except FileError:
+        raise
     except (OSError, UnicodeDecodeError) as error:
         why = error.strerror if isinstance(error, OSError) else "it is not UTF-8 text"
         raise FileError(f"cannot read '{file}': {why}", "give the path of a grid of numbers") from error

@@ -94,7 +94,7 @@ def _brushed(x: Array, y: Array, rng: np.random.Generator) -> Array:
     """Fine grooves along x, each of its own length and depth."""
     step = x[1, 0] - x[0, 0]
     coarse, fine = _noise(x.shape, rng, step, (8.0, 0.22)), _noise(x.shape, rng, step, (4.0, 0.11))
-    return np.asarray(0.5 + np.clip(0.7 * coarse + 0.5 * fine, -3, 3) / 6)
+    return np.asarray(0.5 + 0.5 * np.tanh(0.5 * coarse + 0.35 * fine))
 
 
 TEXTURES: Mapping[str, Callable[[Array, Array, np.random.Generator], Array]] = {
