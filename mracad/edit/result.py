@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import Literal
+
+import numpy as np
 
 from mracad.edit.feature.score import Copy
 from mracad.inspect.roughness import Roughness
 from mracad.model.brep import Face
-from mracad.model.displacement import Displacement
+from mracad.model.displacement import Displacement, Offset
 from mracad.seam.natural import Treatment
 from mracad.spec.select import Scope
 
@@ -63,6 +66,8 @@ class FaceOutcome:
         Control points that are free, and all control points of the surface after the edit.
     inserted : int
         Knots inserted.
+    added, moving : int
+        Control points of the surface that the edit added, and those that it moves.
     creases : int
         Crease lines inside the surface, which every edit keeps.
     roughness : pair of Roughness, optional
@@ -83,6 +88,8 @@ class FaceOutcome:
     free: int = 0
     points: int = 0
     inserted: int = 0
+    added: int = 0
+    moving: int = 0
     creases: int = 0
     roughness: tuple[Roughness, Roughness] | None = None
     noise: float | None = None
@@ -93,6 +100,12 @@ class FaceOutcome:
         """The reason with its details."""
         told = "" if self.reason is None else self.reason.value
         return f"{told}: {self.said}" if told and self.said else told or self.said
+
+    def grown(self, points: int, offset: Offset) -> FaceOutcome:
+        """The outcome with the control points that a surface of so many has after an edit by an offset."""
+        now, inserted = math.prod(offset.poles.shape[:2]), len(offset.u_knots) + len(offset.v_knots)
+        moving = int(np.any(offset.poles, axis=2).sum())
+        return replace(self, points=now, inserted=inserted, added=now - points, moving=moving)
 
 
 @dataclass(frozen=True, eq=False)

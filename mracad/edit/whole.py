@@ -132,17 +132,15 @@ def _outcome(face: Face, result: Result, scope: Scope, options: Fitting, wish: W
     change = moved.changes[face.index]
     known = replace(known, free=moved.free, roughness=(change.before, change.after))
     if moved.amount:
-        offset = moved.displacement()
-        return replace(
+        edited = replace(
             known,
             status="edited",
             reason=None,
             said=_figures(moved.limits),
             moved=moved.motion,
             amount=moved.amount,
-            points=math.prod(offset.poles.shape[:2]),
-            inserted=len(offset.u_knots) + len(offset.v_knots),
         )
+        return edited.grown(known.points, moved.displacement())
     status, reason, said = _left(moved, options, math.isfinite(wish.growth.curvature))
     return replace(known, status=status, reason=reason, said=said)
 

@@ -24,6 +24,9 @@ if TYPE_CHECKING:
 FINDINGS = 8
 """Largest number of findings shown for one layer."""
 
+GROWN = 3
+"""Largest number of faces named of those that got more control points."""
+
 REASONS = 3
 """Largest number of reasons named in one line."""
 
@@ -130,8 +133,7 @@ def deviation_line(report: Report, options: Selection) -> str:
     if isinstance(options, Fitting) and options.max_deviation is not None:
         line += f", along the normal {mm(max(d.normal for d in report.deviations))}"
     line += roughness_words(report.edit.faces("edited"))
-    before, after = report.control_points
-    return line + (f"; control points: {after} (were {before})" if after != before and not report.edit.copies else "")
+    return line if report.edit.copies else line + growth_words(report)
 
 
 def noise_lines(outcomes: Sequence[FaceOutcome]) -> list[str]:
@@ -178,7 +180,9 @@ def roughness_words(edited: Sequence[FaceOutcome]) -> str:
 
 def copies_line(report: Report) -> str:
     """The quality of the copies of a feature."""
-    copies, (before, after) = report.edit.copies, report.control_points
+    from mracad.edit.feature.score import share
+
+    copies = report.edit.copies
     worst = max(copies, key=lambda c: c.deviation)
     exact = sum(c.exact for c in copies)
     text = f"copies: {len(copies)}" + (f", {exact} exact" if exact else "")
@@ -186,10 +190,27 @@ def copies_line(report: Report) -> str:
     lost = max(copies, key=lambda c: c.lost)
     if lost.lost > 1e-9:
         text += f"; lost to constraints ≤ {mm(lost.lost)} ({lost.place})"
+    if taken := share(copies):
+        text += f"; edges and holes take {100 * taken:.2g} % of their volume"
     base = max(c.base for c in copies)
     if base > worst.deviation:
         text += f"; the surface under the feature is known to {mm(base)}"
-    return f"{text}; control points: {after}" + (f" (were {before})" if after != before else "")
+    return text + growth_words(report)
+
+
+def growth_words(report: Report) -> str:
+    """The control points after an edit, where knots were added, and how many of them move."""
+    before, after = report.control_points
+    faces = {report.model.faces[o.face].surface: o for o in reversed(report.edit.faces("edited")) if o.added}
+    most = sorted(faces.values(), key=lambda outcome: -outcome.added)
+    if not most:
+        return f"; control points: {after}" if report.edit.copies else ""
+    parts = [f"{each.added} more on #{each.face + 1}" for each in most[:GROWN]]
+    if rest := most[GROWN:]:
+        parts.append(f"{sum(each.added for each in rest)} on {plural(len(rest), 'other face')}")
+    moving = sum(each.moving for each in most)
+    words = f"; control points: {after} (were {before}: {', '.join(parts)}"
+    return words + (f", by whole knot lines; {moving} of these faces' move)" if report.edit.copies else ")")
 
 
 def edge_words(edges: tuple[Treatment, ...]) -> str:

@@ -104,6 +104,13 @@ class Charts:
         reach = self.reach[which]
         return np.asarray(reach[:, None] * self._sums(xy.T / reach, which, self.exp))
 
+    def points(self, xy: Array, which: Array) -> Array:
+        """Points ``(q, 3)`` of the graphs at normal coordinates."""
+        ab = self.places(xy, which)
+        height = self.reach[which, None] * self._sums(ab.T / self.reach[which], which, self._graphs)
+        local = np.concatenate([ab, height], axis=1)
+        return np.asarray(self.origin[which] + np.einsum("qi,qij->qj", local, self.axes[which]))
+
     @staticmethod
     def _sums(at: Array, which: Array, coefficients: Array) -> Array:
         """Polynomials ``(m, terms, k)`` of degree :data:`DEGREE` + 1 at points ``(2, q)``, each in its own chart."""
@@ -115,10 +122,14 @@ class Charts:
         return found
 
     @cached_property
+    def _graphs(self) -> Array:
+        """Coefficients ``(m, terms, 1)`` of the graphs, with those of the degree of the maps, which are 0."""
+        return np.asarray(np.pad(self.graph, ((0, 0), (0, self.log.shape[1] - self.graph.shape[1])))[..., None])
+
+    @cached_property
     def _jets(self) -> Array:
         """Coefficients ``(m, terms, 8)`` of x, y, their derivatives by a and by b, and the slopes of the graph."""
-        terms = self.log.shape[1]
-        graph = np.pad(self.graph, ((0, 0), (0, terms - self.graph.shape[1])))[..., None]
+        graph = self._graphs
         by_a, by_b = _derivations()
         parts = [self.log, by_a @ self.log, by_b @ self.log, by_a @ graph, by_b @ graph]
         return np.concatenate(parts, axis=2)

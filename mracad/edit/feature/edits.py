@@ -152,5 +152,4 @@ def _outcome(model: Model, face: Face, laid: Laid, touched: Collection[int]) -> 
     moved = 0.0 if offset is None else float(np.linalg.norm(offset.poles, axis=-1).max())
     if offset is None or (len(surface.faces) > 1 and face.index not in touched and not moved):
         return FaceOutcome(face.index, "unchanged", Reason.NO_COPY, points=points)
-    inserted = len(offset.u_knots) + len(offset.v_knots)
-    return FaceOutcome(face.index, "edited", moved=moved, points=points, inserted=inserted)
+    return FaceOutcome(face.index, "edited", moved=moved).grown(points, offset)

@@ -26,7 +26,8 @@ MISSED = 3e-4
 """Share of its height by which a copy may miss the ideal before knots are inserted."""
 
 SMOOTH = 3
-"""Degree to which degree 1 is raised under copies."""
+"""Degree to which directions of a lower one are raised where copies need knots: they would crease facets, and jump in
+curvature."""
 
 FIRST = 4.0
 """Spans under a copy are at first no longer than its reach over this."""
@@ -55,12 +56,15 @@ def holding(copies: Copies, patch: Patch) -> tuple[Knots, Array]:
     poles : ndarray (nu, nv, 3)
         As from :func:`over_knots`.
     """
-    u, v = (kv.elevated(SMOOTH) if kv.degree == 1 else kv for kv in patch.knots)
     poles = cache(lambda knots: over_knots(copies, patch, knots))
     widest = [float(arc_lengths(patch.net, axis).max()) for axis in (0, 1)]
-    least = [_least(copies, kv) for kv in (u, v)]
-    if all(UNEVEN * x <= SPARE * width for x, width in zip(widest, least, strict=True)):
+    fine = [
+        kv.degree > 1 and UNEVEN * x <= SPARE * _least(copies, kv) for x, kv in zip(widest, patch.knots, strict=True)
+    ]
+    u, v = (kv if enough else kv.elevated(SMOOTH) for enough, kv in zip(fine, patch.knots, strict=True))
+    if all(fine):
         return (u, v), poles((u, v))
+    least = [_least(copies, kv) for kv in (u, v)]
     first = _first(copies, patch, max(widest))
 
     def more(knots: Knots) -> Sequence[Array]:

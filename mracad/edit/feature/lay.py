@@ -19,6 +19,7 @@ from mracad.edit.feature.ground import Ground
 from mracad.edit.feature.ideal import Copies
 from mracad.edit.feature.score import Copy, compared, refuse
 from mracad.edit.feature.seams import ALLOWED, Crossing, Wanted, crossing, held, refined, trace
+from mracad.edit.feature.taken import clipped
 from mracad.edit.pose import WITHIN
 from mracad.model.brep import Model
 from mracad.model.displacement import Displacement, Offset, lifted
@@ -138,7 +139,9 @@ def laid(copies: Copies, wishes: Wishes, coupled: bool, clip: bool, removed: Map
         frozenset(edge for each in moving if isinstance(each.seam, kind) for edge in each.edges)
         for kind in (Seam, TrimmedSeam)
     )
-    return Laid(attempt.offsets, tuple(found), {**task.joints.frozen, **given_up}, exact - loose, loose)
+    frozen = {**task.joints.frozen, **given_up}
+    found = clipped(copies, found, attempt.wanted, attempt.done, frozen)
+    return Laid(attempt.offsets, tuple(found), frozen, exact - loose, loose)
 
 
 def _task(copies: Copies, shifts: Shifts, wishes: Wishes, removed: Mapping[int, Array]) -> _Task:

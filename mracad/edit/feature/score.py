@@ -41,6 +41,10 @@ class Copy:
         Whether it is an exact shift of control points.
     base : float
         Error of the surface that the feature was separated from, root mean square, in the copy, mm.
+    volume : float
+        Between the ideal copy and the surface under it, whatever its sign, mm³.
+    taken : float
+        Share of its volume, 0 to 1, that edges and holes that stay take away, or that lies beyond them.
     """
 
     place: str
@@ -52,6 +56,8 @@ class Copy:
     short: float
     exact: bool
     base: float = 0.0
+    volume: float = 0.0
+    taken: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,6 +107,12 @@ def copied(place: str, at: Array, found: Sequence[Figures], exact: bool = False)
     rms = float(np.sqrt(squares / max(count, 1)))
     x, y, z = at.tolist()
     return Copy(place, (x, y, z), tuple(sorted(faces)), worst, rms, lost, short, exact)
+
+
+def share(found: Sequence[Copy]) -> float:
+    """The share of the volume of all copies that is taken, 0 to 1."""
+    whole = sum(copy.volume for copy in found)
+    return sum(copy.volume * copy.taken for copy in found) / whole if whole else 0.0
 
 
 def _figures(copies: Copies, patch: Patch, wanted: Wanted, done: Array) -> Iterator[tuple[int, Figures]]:

@@ -302,6 +302,26 @@ def test_copies_over_seams_of_a_curved_panel(feature, tmp_path):
     assert [len(c["faces"]) for c in report["copies"]] == [2, 4, 4]
 
 
+def test_what_a_net_grew_by_is_told(feature, tmp_path, capsys):
+    """By face, and how many control points move: whole knot lines are inserted."""
+    k = KnotVector.clamped(np.linspace(0.0, 1.0, 5), 3)
+    x, y = np.meshgrid(120 * k.greville(), 120 * k.greville(), indexing="ij")
+    source = grounds.save(tmp_path / "flat.step", Net(k, k, np.stack([x, y, 0 * x], axis=-1)))
+    capsys.readouterr()
+    _, _, body = repeated(source, tmp_path / "out.step", "--at", "60,60,0", feature=feature)
+    text = capsys.readouterr().out
+    (face,), points = body["faces"], body["control_points"]
+    assert points["before"] == 49 and face["points"] == points["after"] == 49 + face["added"]
+    assert 100 < face["moving"] < face["points"]
+    words = f"control points: {points['after']} (were 49: {face['added']} more on #1, by whole knot lines; "
+    assert f"{words}{face['moving']} of these faces' move)" in text
+    assert "take" not in text
+    _, _, body = repeated(source, tmp_path / "cut.step", "--at", "0,60,0", "--clip", feature=feature)
+    (copy,) = body["copies"]
+    assert 0.5 < copy["taken"] < 0.6
+    assert f"edges and holes take {100 * copy['taken']:.2g} % of their volume" in capsys.readouterr().out
+
+
 def test_copies_on_an_analytic_cylinder(feature, tmp_path):
     """The face is converted; a copy lies over the edge where it closes."""
     radius = 40.0

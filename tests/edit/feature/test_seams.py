@@ -100,6 +100,34 @@ def test_a_copy_on_a_ruled_face_is_smooth(feature, axis):
     assert np.abs(found - slopes).max() <= 5e-3 * np.abs(slopes).max()
 
 
+@pytest.mark.parametrize("degrees", [(2, 2), (1, 2)])
+def test_low_degrees_are_raised_exactly_where_copies_need_knots(feature, degrees):
+    """A bump on a face of degree 2 has no jumps of curvature at its knots, and the face below it is what it was."""
+    u, v = (KnotVector.clamped([0.0, 0.3, 1.0] if d > 1 else [0.0, 1.0], d) for d in degrees)
+    x, y = np.meshgrid(120 * u.greville(), 120 * v.greville(), indexing="ij")
+    bent = sheet(Net(u, v, np.stack([x, y, 3e-3 * y**2 - 2e-3 * x], axis=-1)))
+    edit = repeat(bent, Repeat(feature=feature, at=("61.3,58.8,10",)))
+    own, offset = bent.surfaces[0].net, edit.displacement.offsets[0]
+    assert offset.degrees == (3, 3) and edit.copies[0].deviation <= 1e-3 * HEIGHT
+    uv = np.random.default_rng(0).random((500, 2))
+    assert np.abs(offset.over(own).evaluate(uv) - own.evaluate(uv)).max() <= 1e-12
+    for axis, knots in enumerate((offset.over(own).u, offset.over(own).v)):
+        assert (knots.multiplicities[1:-1] == np.where(np.isin(knots.breaks[1:-1], (u, v)[axis].breaks), 2, 1)).all()
+
+
+def test_degrees_are_raised_across_closing_edges_and_not_where_nothing_lies(feature):
+    """A cylinder of the kernel, rational, of degree 2 round its axis, where it closes, and 1 along it."""
+    model = view(shapes.document(zoo.nurbs(zoo.cylinder().val().wrapped)))
+    (wall,) = (f for f in model.faces if len({t.edge for t in f.trims}) == 3)
+    edit = repeat(model, Repeat(feature=feature, at=("15,0,15",), size=0.3))
+    (offset,) = edit.displacement.offsets.values()
+    net = model.surfaces[wall.surface].net
+    assert list(edit.displacement.offsets) == [wall.surface] and offset.degrees == (3, 3)
+    fine = offset.over(net)
+    assert [k.periodic for k in (fine.u, fine.v)] == [k.periodic for k in (net.u, net.v)] == [True, False]
+    assert edit.copies[0].deviation <= 1e-3 * HEIGHT and edit.copies[0].taken == 0.0
+
+
 def test_a_copy_over_a_sharp_edge_is_refused(feature):
     """What lies beyond it is another side of the body, on which there is nothing of the copy."""
     document = shapes.document(zoo.nurbs(BRepPrimAPI_MakeBox(100.0, 100.0, 100.0).Shape()))
