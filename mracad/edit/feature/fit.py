@@ -38,6 +38,9 @@ UNEVEN = 1.4
 CHECKS, FEWEST, ALL = 300, 60, 30_000
 """Points in each direction at which a copy is compared with the ideal: at most, at least, and in all for all copies."""
 
+APART, FINE = 3.0, 400_000
+"""Where a copy has so many spans that more points are needed: so many spans between them, and points in all copies."""
+
 NARROWEST = 1e-3
 """Least width of a knot span made for a copy, mm."""
 
@@ -142,7 +145,9 @@ def between(copies: Copies, patch: Patch, knots: Knots) -> Sites:
     rng = np.random.default_rng(0)
     which = np.flatnonzero(copies.on(patch))
     hits = tree.query_ball_point(copies.charts.origin[which], copies.reach[which])
-    most = int(np.clip(ALL // max(len(which), 1), FEWEST, CHECKS))
+    each = max(len(which), 1)
+    fine = (2 * copies.feature.reach / copies.feature.spacing / APART) ** 2
+    most = int(max(np.clip(ALL // each, FEWEST, CHECKS), min(fine, FINE / each)))
     chosen = [np.asarray(h, int) if len(h) <= most else rng.choice(h, most, replace=False) for h in hits]
     place = np.divmod(np.unique(np.concatenate(chosen)), len(at[1]))
     found = []

@@ -8,8 +8,9 @@ from mracad_cli.__main__ import main
 from PIL import Image
 
 from mracad.edit.feature.edits import repeat
+from mracad.edit.feature.extract import feature_of
 from mracad.occ.step import write_step
-from mracad.spec.steps import Repeat
+from mracad.spec.steps import Repeat, Single
 from tests.edit.feature import grounds
 from tests.edit.models import sheet
 
@@ -41,6 +42,24 @@ def test_a_formula_stands_as_high_as_it_says_on_a_sphere(folder):
     s = 60 * np.arccos(points[:, 2] / radius)
     assert np.abs(radius - 60 - 0.3 * np.exp(-(s**2) / 8)).max() < 3e-3 * 0.3
     assert edit.copies[0].deviation < 2e-3 * 0.3
+
+
+def test_sharp_edges_are_held_all_along_them_and_ring_nowhere(folder):
+    x, y = np.meshgrid(*2 * [np.linspace(-7, 7, 400)])
+    levels = ((np.hypot(x, y) < 5) & (np.hypot(x - 1, y) > 2)).astype(np.uint8)
+    Image.fromarray(255 * levels).save(folder / "sharp.png")
+    source = f"{folder / 'sharp.png'},width:14mm,height:0.3mm,spacing:0.1mm"
+    model = sheet(grounds.above("sphere 60", lambda a, b: 0 * a, 25.0, 16))
+    edit = repeat(model, Repeat(feature=source, at=("0,0,60",)))
+    after = edit.displacement.applied(model).surfaces[0].net
+    at = [np.random.default_rng(axis).uniform(-6.5, 6.5, 700) for axis in (0, 1)]
+    points = np.asarray(after.grid(*(np.sort(x) for x in at))).reshape(-1, 3)
+    radius = np.linalg.norm(points, axis=1)
+    away = 60 * np.arccos(points[:, 2] / radius) / np.hypot(*points[:, :2].T)
+    ideal = feature_of(model, Single(feature=source), {0}, source).lookup(away[:, None] * points[:, :2])[:, 2]
+    error = (radius - 60 - ideal) / 0.3
+    assert np.abs(error).max() < 0.045 and np.sqrt(np.mean(error**2)) < 0.005
+    assert (radius - 60).min() / 0.3 > -0.01 and (radius - 60).max() < 1.01 * 0.3
 
 
 def test_a_logo_goes_over_the_seams_of_three_patches_with_points_under_it_alone(folder, tmp_path):
