@@ -34,6 +34,10 @@ FLATTEST = 1e-4
 """Least ratio of the metric's singular values: where it is smaller (at poles), the shorter direction is floored."""
 
 
+_AT_ONCE = 400_000
+"""Points of the quadrature handled at a time."""
+
+
 @dataclass(frozen=True, eq=False)
 class Forms:
     """Forms of one surface, ``scipy.sparse.csr_array`` over its control points in row-major order.
@@ -84,6 +88,28 @@ def forms(
     area = _sparse(integrals(along, {(ORDERS[0], ORDERS[0]): mass}), periodic, scale)
     bending = _sparse(integrals(along, bend), periodic, scale)
     return Forms(area, bending + smooth if smooth.nnz else _on_pattern(bending, area), sharp)
+
+
+def masses(net: Net, quadrature: Quadrature) -> Forms:
+    """Mass alone of displacements of a net in its own metric; parameters as for :func:`forms`."""
+    from scipy.sparse import csr_array
+
+    (pieces, points), across = quadrature.u.shape, sites(net.v, quadrature.v, quadrature.wv)
+    form = np.zeros((net.u.count, net.v.count, 2 * net.u.degree + 1, 2 * net.v.degree + 1))
+    step = max(1, _AT_ONCE // (points * quadrature.v.size))
+    for begin in range(0, pieces, step):
+        mask = quadrature.mask[begin * points : (begin + step) * points]
+        if mask.any():
+            part = slice(begin, begin + step)
+            along = sites(net.u, quadrature.u[part], quadrature.wu[part]), across
+            xu, xv = _jets(net, along)[1:3]
+            e, f, g = _dot(xu, xu), _dot(xu, xv), _dot(xv, xv)
+            area = np.sqrt(np.maximum(e * g - f * f, 0.0)) * (along[0].weight.reshape(-1, 1) * along[1].weight.ravel())
+            if net.weights is not None:
+                area = area / _jets(Net(net.u, net.v, net.weights[..., None]), along)[0, 0] ** 2
+            form += integrals(along, {(ORDERS[0], ORDERS[0]): np.where(mask, area, 0.0)})
+    none = csr_array((net.u.count * net.v.count,) * 2)
+    return Forms(_sparse(form, (net.u.periodic, net.v.periodic), net.weights), none, none)
 
 
 def slopes(net: Net, metric: Net, quadrature: Quadrature) -> Any:

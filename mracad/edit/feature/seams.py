@@ -23,7 +23,7 @@ from mracad.seam.conditions import SAME, doubled, matched
 from mracad.seam.conditions import rows as seam_rows
 from mracad.seam.contact import Contact
 from mracad.seam.contact import rows as contact_rows
-from mracad.seam.energy import forms
+from mracad.seam.energy import masses
 from mracad.seam.natural import Seam
 from mracad.seam.solve import Problem, Soft, Space
 from mracad.seam.trace import Trace, along, crossings
@@ -210,8 +210,11 @@ def _problem(
     spaces = {}
     for i, window in windows.items():
         # copies continue beyond trim curves, so control points that barely reach into a face stay near them
-        masses = forms(window.net, window.net, quadrature(window.net, [replace(faces[i], trims=())]))
-        spaces[i] = Space(window.net, masses, window.local, np.ones_like(window.local))
+        points = quadrature(window.net, [replace(faces[i], trims=())])
+        reached = Net(window.net.u, window.net.v, window.local[..., None].astype(float))
+        near = np.asarray(reached.grid(points.u.ravel(), points.v.ravel()))[..., 0] > 0
+        form = masses(window.net, replace(points, mask=points.mask & near))
+        spaces[i] = Space(window.net, form, window.local, np.ones_like(window.local))
     rows, _ = seam_rows(nets, _exact_parts(found), everywhere=True)
     contacts = [
         Contact(each.seam.a.part(*stretch), each.seam.b.part(*stretch), each.seam.order, since=each.seam.since)
