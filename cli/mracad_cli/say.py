@@ -22,6 +22,11 @@ def say(*lines: str, file: TextIO | None = None) -> None:
         print(printable(line), file=file)
 
 
+def size(count: int) -> str:
+    """A number of bytes."""
+    return f"{count / 1e6:.1f} MB" if count >= 1e5 else f"{count / 1e3:.1f} kB"
+
+
 def json_text(value: Any, indent: int | None = None) -> str:
     """JSON that any parser accepts: null for numbers that are not finite, escapes for text that UTF-8 cannot hold."""
     body = _finite(value)

@@ -10,7 +10,7 @@ from math import comb
 
 import numpy as np
 
-from mracad.bspline.basis import basis
+from mracad.bspline.basis import jet
 from mracad.bspline.knots import Array, KnotVector, Side
 from mracad.bspline.refine import refinement
 from mracad.errors import UsageError
@@ -58,12 +58,11 @@ class Curve:
             ``[r]`` is the r-th derivative with respect to the parameter.
         """
         poles = homogeneous(self.poles, self.weights)
-        stack = []
-        for r in range(derivatives + 1):
-            first, values = basis(self.knots, t, r, side)
-            index = (first[:, None] + np.arange(self.knots.degree + 1)) % self.knots.count
-            stack.append(np.einsum("qa,qak->qk", values, poles[index]))
-        return np.array(stack) if self.weights is None else _curve_quotient(np.array(stack))
+        first, values = jet(self.knots, t, range(derivatives + 1), side)
+        index = (first[:, None] + np.arange(self.knots.degree + 1)) % self.knots.count
+        near = poles[index]
+        stack = np.array([np.einsum("qa,qak->qk", values[:, r], near) for r in range(derivatives + 1)])
+        return stack if self.weights is None else _curve_quotient(stack)
 
     def refined(self, extra_knots: Array | Sequence[float]) -> Curve:
         """The same curve with more knots, exactly; itself if there are none to insert."""

@@ -10,7 +10,7 @@ import numpy as np
 from mracad.bspline.vectors import unit
 from mracad.model.facets import Body
 from mracad.spec.pictures import Show
-from mracad.view.colours import CLAY, INK, diverging, rgb, sequential, several
+from mracad.view.colours import CLAY, diverging, rgb, sequential, several
 from mracad.view.seen import Seen, Stage
 
 Array = np.ndarray
@@ -18,7 +18,7 @@ Array = np.ndarray
 SHARE = 0.98
 """Share of a picture whose curvature lies within the range of the colours."""
 
-_WHITE = np.array([0.97, 0.97, 0.965])
+_WHITE, _DARK = np.array([0.97, 0.97, 0.965]), np.array([0.24, 0.27, 0.31])  # of stripes
 _KEY = np.array([-0.42, 0.58, 0.70])  # directions to the lights: right, up, to the viewer
 _STEPS = 1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0
 
@@ -88,7 +88,7 @@ def _striped(stage: Stage, seen: Seen, pole: Array, stripes: int) -> Array:
     wide = np.clip(slope * (stripes / np.pi), 1e-6, 1e6)
     light = (_under(phase + 0.5 * wide) - _under(phase - 0.5 * wide)) / wide
     facing = np.clip(stage.camera.toward @ seen.facing, 0.0, 1.0)
-    colours = INK + light[:, None] * (_WHITE - INK)
+    colours = _DARK + light[:, None] * (_WHITE - _DARK)
     return np.asarray(colours * (0.80 + 0.20 * facing)[:, None])
 
 

@@ -48,14 +48,18 @@ class Panel:
     ink: Array
 
     def image(self, scale: Scale | None) -> Array:
-        """The picture, ``(height, width, 3)`` in [0, 1]."""
+        """The picture, ``(height, width, 3)`` bytes."""
         width, height = self.stage.camera.size
         colours = scale.colours(self.shown) if scale else self.shown
-        held = np.bincount(self.pixel, self.weight, width * height)
-        sums = (np.bincount(self.pixel, self.weight * column, width * height) for column in colours.T)
-        picture = np.stack(list(sums), axis=1) + np.maximum(1.0 - held, 0.0)[:, None] * PAPER
-        cover = (EDGES * self.ink).reshape(-1, 1)
-        return np.asarray(((1.0 - cover) * picture + cover * INK).reshape(height, width, 3))
+        paper = np.maximum(1.0 - np.bincount(self.pixel, self.weight, width * height), 0.0)
+        lined = np.flatnonzero(self.ink)
+        cover = EDGES * self.ink.ravel()[lined]
+        picture = np.empty((height, width, 3), np.uint8)
+        for k in range(3):
+            light = np.bincount(self.pixel, self.weight * colours[:, k], width * height) + PAPER[k] * paper
+            light[lined] += cover * (INK[k] - light[lined])
+            picture[..., k] = (255.0 * light + 0.5).reshape(height, width)
+        return picture
 
 
 def panel(stage: Stage, look: Look) -> Panel:

@@ -11,7 +11,7 @@ from mracad.view.runs import groups, runs
 
 Array = np.ndarray
 
-AT_ONCE = 1 << 19
+AT_ONCE = 1 << 18
 """Number of samples that are processed together."""
 
 _FLAT = 1e-9  # area of a triangle, in samples, below which it is seen edge-on
@@ -104,10 +104,11 @@ def _samples(triangles: Triangles, rows: tuple[int, int], width: int) -> Iterato
     last = np.clip(np.ceil(high - 0.5), *rows).astype(np.int32)
     last[~triangles.weights.any(axis=(1, 2))] = 0
     seen = np.flatnonzero(last > first)
+    sides = _sides(triangles.corners)
     along = triangles.depth[1].astype(np.float32)
     for part in _parts((last - first)[seen]):
         which, row = runs(seen[part], first[seen[part]], last[seen[part]])
-        left, right = _span(triangles.corners[which], row + 0.5)
+        left, right = _span(sides, which, row + 0.5)
         start = np.clip(np.ceil(left - 0.5), 0, width).astype(np.int32)
         end = np.clip(np.ceil(right - 0.5), 0, width).astype(np.int32)
         keep = np.flatnonzero(end > start)
@@ -126,14 +127,18 @@ def _parts(counts: Array) -> Iterator[slice]:
     return groups(np.cumsum(counts) // AT_ONCE)
 
 
-def _span(corners: Array, y: Array) -> tuple[Array, Array]:
-    """Where rows enter and leave their triangles; the same for both triangles at a side, so that none is missed."""
-    left, right = np.full(len(y), np.inf), np.full(len(y), -np.inf)
-    for k in range(3):
-        a, b = corners[:, k], corners[:, (k + 1) % 3]
-        down = (a[:, 1] < b[:, 1])[:, None]
-        (ax, ay), (bx, by) = np.where(down, a, b).T, np.where(down, b, a).T
-        meets = (ay <= y) & (y < by)
-        x = ax + (y - ay) * ((bx - ax) / np.where(meets, by - ay, 1.0))
-        left, right = np.where(meets, np.minimum(left, x), left), np.where(meets, np.maximum(right, x), right)
-    return left, right
+def _sides(corners: Array) -> tuple[Array, ...]:
+    """The sides of triangles from their upper ends down: x, y and slope of the longest, then of the two others."""
+    order = np.argsort(corners[..., 1], axis=1, kind="stable")
+    (ax, ay), (bx, by), (cx, cy) = np.take_along_axis(corners, order[:, :, None], axis=1).transpose(1, 2, 0)
+    tall, upper, lower = (np.where(y > 0.0, y, np.inf) for y in (cy - ay, by - ay, cy - by))
+    return ax, ay, (cx - ax) / tall, (bx - ax) / upper, bx, by, (cx - bx) / lower
+
+
+def _span(sides: tuple[Array, ...], which: Array, y: Array) -> tuple[Array, Array]:
+    """Where rows enter and leave triangles; the same for both triangles at a side, so that no sample is missed."""
+    ax, ay, long, upper, bx, by, lower = (each[which] for each in sides)
+    below = y - ay
+    one = ax + below * long
+    other = np.where(y < by, ax + below * upper, bx + (y - by) * lower)
+    return np.minimum(one, other), np.maximum(one, other)

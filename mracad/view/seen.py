@@ -159,8 +159,10 @@ def seen(stage: Stage, nearest: Array, depth: Array, rows: tuple[int, int], orde
     x, y = _centres(rows, width)
     whole = (entry[:, 0] >= 0) & (entry == entry[:, :1]).all(axis=1)
     lead = np.flatnonzero(whole)
-    plane = np.stack([stage.triangles.deep(four[lead, 0], x[lead] + dx, y[lead] + dy) for dx, dy in _OFFSETS], axis=1)
-    apart = np.abs(_grouped(depth, width)[lead] - plane).max(axis=1, initial=0.0) > _OFF * stage.camera.pixel
+    own, deep = four[lead, 0], _grouped(depth, width)[lead]
+    deep -= stage.triangles.deep(own, x[lead], y[lead])[:, None]
+    deep -= stage.triangles.depth[1:, own].T @ np.transpose(_OFFSETS)
+    apart = np.abs(deep).max(axis=1, initial=0.0) > _OFF * stage.camera.pixel
     whole[lead[apart]] = False
     lead = np.flatnonzero(whole)
     mixed, which = np.nonzero((four >= 0) & ~whole[:, None])

@@ -72,7 +72,7 @@ def png(
     font = _font(letters(size))
     for (left, top, _, _), panel, caption in zip(places, panels, captions, strict=True):
         picture = panel.image(legend[1] if legend else None)
-        sheet.paste(Image.fromarray((picture * 255.0 + 0.5).astype(np.uint8)), (left, top))
+        sheet.paste(Image.fromarray(picture), (left, top))
         for text, x, y in _numbers(panel) if numbered else ():
             draw.text((left + x, top + y), text, _TONE, font, "mm", stroke_width=_HALO, stroke_fill="white")
         if caption:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from mracad.spec.pictures import Picture, size_of
-from mracad_cli.render.text import size
+from mracad_cli.say import size
 
 if TYPE_CHECKING:
     from mracad.view.picture import Rendered

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from mracad.job.words import notes, numbers, placed
 from mracad.spec.steps import Fitting, Selection
+from mracad_cli.say import size
 
 if TYPE_CHECKING:
     from mracad.edit.result import FaceOutcome
@@ -264,8 +265,3 @@ def batch_lines(outcomes: Sequence[Outcome], seconds: float) -> list[str]:
 def sizes(made: Sequence[Made]) -> str:
     """The outputs: names, sizes, and the faces that are in parts."""
     return ", ".join(", ".join([m.target.name, size(len(m.data)), *map(str, m.written.cut)]) for m in made)
-
-
-def size(count: int) -> str:
-    """A number of bytes."""
-    return f"{count / 1e6:.1f} MB" if count >= 1e5 else f"{count / 1e3:.1f} kB"
