@@ -87,7 +87,7 @@ class TrimmedSeam:
         return share, (now / limit)[: self.order + 1].max(axis=0)
 
 
-def trimmed(model: Model, edge: Edge, twin: Edge, wishes: Wishes) -> TrimmedSeam | Cause:
+def trimmed(model: Model, edge: Edge, twin: Edge, wishes: Wishes, part: bool = False) -> TrimmedSeam | Cause:
     """The seam of an edge between two NURBS faces along their trim curves, or why it cannot move.
 
     Parameters
@@ -96,6 +96,8 @@ def trimmed(model: Model, edge: Edge, twin: Edge, wishes: Wishes) -> TrimmedSeam
     edge, twin : Edge
         The edge, twice; or the two free edges that coincide in an unsewn model.
     wishes : Wishes
+    part : bool
+        Whether it coincides with only a part of its twin.
     """
     faces = [model.faces[i] for i in (edge.sides[0].face, twin.sides[-1].face)]
     if not np.allclose(faces[0].frame, faces[1].frame, rtol=0, atol=1e-12):
@@ -104,11 +106,23 @@ def trimmed(model: Model, edge: Edge, twin: Edge, wishes: Wishes) -> TrimmedSeam
         return Cause(Still.ITSELF)
     a, b = (trace_of(model, face, face.trim(each.index)) for face, each in zip(faces, (edge, twin), strict=True))
     if edge is not twin:
-        fractions = _followed(model, a, b, runs_back(edge.points, twin.points))
+        fractions = (
+            _nearest(model, a, b, _first(model, a, b))
+            if part
+            else _followed(model, a, b, runs_back(edge.points, twin.points))
+        )
         if (np.diff(fractions) * (fractions[-1] - fractions[0]) <= 0).any():
             return Cause(Still.UNEVEN)
         b = replace(b, law=(EVENLY, fractions))
     return _judged(model, edge.index, twin.index, (a, b), wishes)
+
+
+def _first(model: Model, a: Trace, b: Trace) -> Array:
+    """The even fractions of b whose points are nearest to those at even fractions of a."""
+    from scipy.spatial import cKDTree
+
+    one, two = (np.asarray(model.surfaces[trace.surface].net.evaluate(trace.places(EVENLY))) for trace in (a, b))
+    return np.asarray(EVENLY[cKDTree(two).query(one)[1]])
 
 
 def _followed(model: Model, a: Trace, b: Trace, back: bool) -> Array:

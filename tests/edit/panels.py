@@ -220,17 +220,21 @@ def pair(left, right):
     return documents.single(topology.shell([faces[0].Reversed(), faces[1]]), "pair")
 
 
-def junction(noisy):
-    """Half of the panel as one patch and two quarters beside it, as a document: a T-junction."""
+def thirds(noisy):
+    """The nets of half of the panel and of two quarters beside it, by their corners."""
     quarters = cut(noisy, (2, 2))
-    v = noisy.v
-    fine = noisy.over(noisy.u.refined(np.repeat(SIZE, noisy.u.degree - 1)), v)
+    fine = noisy.over(noisy.u.refined(np.repeat(SIZE, noisy.u.degree - 1)), noisy.v)
     rows, u = _piece(fine.u, 0)
-    nets = {
-        (0, 0, 1, 2): Net(u, v, fine.poles[rows]),
+    return {
+        (0, 0, 1, 2): Net(u, noisy.v, fine.poles[rows]),
         (1, 0, 2, 1): quarters[1, 0].net,
         (1, 1, 2, 2): quarters[1, 1].net,
     }
+
+
+def junction(noisy):
+    """Half of the panel as one patch and two quarters beside it, as a document: a T-junction."""
+    quarters, nets = cut(noisy, (2, 2)), thirds(noisy)
     corners = {(i, j): topology.vertex(noisy.evaluate([(SIZE * i, SIZE * j)])[0]) for i in range(3) for j in range(3)}
     edges, faces = {}, []
     for (i0, j0, i1, j1), net in nets.items():

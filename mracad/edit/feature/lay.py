@@ -27,6 +27,7 @@ from mracad.seam.border import opening
 from mracad.seam.cause import Cause, Still
 from mracad.seam.hold import separate
 from mracad.seam.interface import Joints, joints
+from mracad.seam.junction import pieced
 from mracad.seam.natural import Seam
 from mracad.seam.trace import Trace
 from mracad.seam.trimmed import TrimmedSeam, followed
@@ -157,7 +158,7 @@ def _task(copies: Copies, shifts: Shifts, wishes: Wishes, removed: Mapping[int, 
                 nets[i], poles[i] = own.over(*knots), laid @ patch.turn
     under = {face.index for i in nets for face in ground.patches[i].faces}
     size = MISSED * copies.height, float(copies.reach.max())
-    joined = joints(ground.model, under, wishes)
+    joined = pieced(ground.model, joints(ground.model, under, wishes), under, wishes)
     joined = replace(joined, loose=tuple(followed(ground.model, seam) for seam in joined.loose))
     return _Task(rest, known, removed, nets, poles, _explained(ground, under, joined), size)
 

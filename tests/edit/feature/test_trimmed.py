@@ -18,8 +18,10 @@ from mracad.seam.cause import Cause, Still
 from mracad.seam.interface import joints
 from mracad.seam.wishes import Wishes
 from mracad.spec.steps import Move, Repeat
-from tests.edit import halves
+from samples.models import documents, geometry
+from tests.edit import halves, panels
 from tests.edit.feature.grounds import HEIGHT, bump
+from tests.occ import shapes
 
 
 def document(sewn=True):
@@ -124,6 +126,21 @@ def test_a_copy_lies_over_a_trimmed_seam_that_is_not_sewn(feature):
     print(f"gap {old.gap:.1e} -> {new.gap:.1e} mm, angle {new.angle:.1e}°, off by {copy.deviation:.1e} mm")
     assert new.gap <= old.gap + 1e-5 and new.angle <= old.angle + 0.008
     assert copy.deviation <= 1e-3 * HEIGHT and copy.lost <= 1e-3 * HEIGHT
+
+
+@pytest.mark.parametrize("place", [(102.0, 98.0), (97.0, 60.0)], ids=["corner", "beside"])
+def test_a_copy_lies_over_a_junction_of_one_edge_with_two_that_are_not_sewn(feature, place):
+    clean, _ = panels.whole(16, 0.0, patches=(2, 2))
+    nets = panels.thirds(clean).values()
+    faces = [shapes.face_on(geometry.surface(net.poles, net.u.knots, net.v.knots, (3, 3))) for net in nets]
+    paper = documents.single(shapes.compound(*faces), "junction")
+    at = word(clean.evaluate(np.array([place]))[0])
+    report = run(paper, repeat, Repeat(feature=feature, at=(at,)))
+    (copy,), new = report.edit.copies, seams(read_back(paper))
+    assert [t.how for t in report.edit.edges].count("to tolerance") == (3 if len(copy.faces) == 3 else 2)
+    assert copy.deviation <= 3e-3 * HEIGHT
+    print(f"gap {max(m.gap for m in new):.1e} mm, off by {copy.deviation:.1e} mm")
+    assert len(new) >= 3 and max(m.gap for m in new) <= 1e-4 and max(m.angle for m in new) <= 0.01
 
 
 def test_points_that_correspond_are_nearest_not_at_equal_fractions(feature):
