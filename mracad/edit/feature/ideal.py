@@ -20,7 +20,7 @@ from mracad.edit.feature.patch import Patch
 
 Array = np.ndarray
 
-BATCH = 48
+BATCH = 192
 """Copies processed at a time."""
 
 

@@ -42,7 +42,7 @@ WIDER = 1e-7
 MOVED = 1e-7
 """A seam moves where a copy displaces it by more than this share of its height."""
 
-HALVINGS, LARGEST = 3, 100_000
+HALVINGS, LARGEST = 3, 400_000
 """How often the spans under a trimmed seam are halved at most, and the largest net, in control points, for which."""
 
 _EVENLY = np.linspace(0, 1, 401)
