@@ -20,7 +20,7 @@ export SOURCE_DATE_EPOCH ?= 0
 
 SAMPLES := $(wildcard samples/*.step)
 
-.PHONY: demo example test test-long regress fuzz lint bench bench-batch docs samples smooth wheel clean
+.PHONY: demo example test test-long regress fuzz lint bench bench-batch docs pictures samples smooth wheel clean
 
 demo: $(VENV)/ready
 	@mkdir -p build
@@ -62,11 +62,14 @@ bench: $(VENV)/dev
 bench-batch: $(VENV)/dev
 	$(BIN)/python benchmarks/batch.py
 
-# The page of steps, from their declaration, the picture of the rooms, from the imports, and those of the samples
+# The page of steps, from their declaration, and the picture of the rooms, from the imports
 docs: $(VENV)/ready
-	$(BIN)/python docs/picture.py
 	$(BIN)/python -c 'from mracad.spec.schema import page; print(page(), end="")' > docs/steps.md
 	$(BIN)/python docs/house.py > docs/house.svg
+
+# All other pictures of the documentation, and the gallery, by mracad itself
+pictures: $(VENV)/ready
+	$(BIN)/python docs/pictures.py
 
 samples: $(VENV)/ready
 	$(BIN)/python samples/make.py samples
