@@ -57,6 +57,7 @@ bench: $(VENV)/dev
 	$(BIN)/python benchmarks/command.py
 	$(BIN)/python benchmarks/features.py
 	$(BIN)/python benchmarks/seams.py
+	$(BIN)/python benchmarks/fill.py 1000
 
 # Batches: what workers gain, kills, a lost cluster worker; some minutes
 bench-batch: $(VENV)/dev

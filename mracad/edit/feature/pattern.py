@@ -18,6 +18,7 @@ from mracad.model.brep import Face
 from mracad.seam.trace import EVENLY, Trace
 from mracad.seam.wishes import Wishes
 from mracad.spec import places as spec
+from mracad.spec.fill import fill
 from mracad.spec.quantity import length
 from mracad.spec.steps import Repeat
 
@@ -69,7 +70,16 @@ def places(ground: Ground, feature: Feature, options: Repeat, wishes: Wishes) ->
     if options.jitter is not None or options.spin:
         jitter = 0.0 if options.jitter is None else length(options.jitter, ground.model.diagonal, "jitter")
         found = scattered(found, feet, jitter, math.radians(options.spin), options.seed)
-    return found, skipped
+    return found, skipped + (_crowded(ground, feature, options, found) if options.fill else ())
+
+
+def _crowded(ground: Ground, feature: Feature, options: Repeat, found: Sequence[Place]) -> tuple[str, ...]:
+    """A note if copies that fill the faces overlap."""
+    spacing = length(fill(options.fill or "", "fill").spacing, ground.model.diagonal, "fill: spacing")
+    wide = 2 * feature.radius * max(p.size for p in found)
+    if wide <= spacing * (1 + 1e-9):
+        return ()
+    return (f"copies are up to {wide:.3g} mm wide and {spacing:.3g} mm apart: they overlap",)
 
 
 def _beginning(ground: Ground, feature: Feature, first: Place | None) -> tuple[Array, Array]:

@@ -11,6 +11,7 @@ from mracad.edit.feature.detail import Feature
 from mracad.edit.feature.fill import Room, random
 from mracad.edit.feature.fill import filled as all_over
 from mracad.edit.feature.ground import Ground
+from mracad.edit.feature.pattern import places
 from mracad.edit.feature.spread import NOWHERE, Spots, arcs
 from mracad.errors import Code, EditError, MracadError
 from mracad.occ.view import view
@@ -180,6 +181,14 @@ def test_copies_fade_with_the_distance_from_an_edge():
     assert np.abs(np.array([p.size for p in places]) - wanted).max() < 0.06
     assert [p.size for p in places] == [p.height for p in places]
     assert all(p.point[0] >= p.size - 1e-3 for p in places)
+
+
+def test_copies_that_overlap_are_told():
+    model = view(grounds.sewn([grounds.uneven(60.0)]))
+    feature = Feature(4.0, 4.0, 0.5, np.zeros((5, 5, 4)))
+    for spacing, told in ((9, ()), (7, ("copies are up to 8 mm wide and 7 mm apart: they overlap",))):
+        options = Repeat(feature="bump.feature", fill=f"poisson,spacing:{spacing}mm")
+        assert places(Ground.of(model, {0}), feature, options, Wishes())[1] == told
 
 
 def test_no_place_is_left_by_a_margin():
