@@ -18,7 +18,7 @@ Array = np.ndarray
 CELLS = 1024
 """Largest number of cells across a table."""
 
-HELD, NEARLY, LOSS = 3e-4, 1.5e-3, 5e-3
+HELD, NEARLY, LOSS = 1e-3, 2e-3, 5e-3
 """Root mean square errors, as shares of the height where something stands out: of a spline through a source, of one
 whose knots cannot be closer, and of rounding."""
 

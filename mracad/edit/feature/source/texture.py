@@ -18,7 +18,7 @@ SHARE = 16
 MOST = 60
 """Largest number of pitches across."""
 
-FINE = 24
+FINE = 32
 """Cells of a pitch, where there are enough."""
 
 
@@ -59,7 +59,8 @@ def _tooth(t: Array) -> Array:
 def _hexagons(x: Array, y: Array, rng: np.random.Generator) -> Array:
     """Flat hexagons with grooves between them."""
     first, second = _nearest(x, y, _honeycomb(x))[:2]
-    return _smooth((second - first) / 0.45)
+    gap = _blurred(second - first, 0.06 / (x[1, 0] - x[0, 0]))  # its creases would be edges of the grooves
+    return _smooth((gap - 0.08) / 0.42)
 
 
 def _dimples(x: Array, y: Array, rng: np.random.Generator) -> Array:

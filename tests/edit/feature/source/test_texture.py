@@ -34,7 +34,7 @@ def test_a_texture_has_its_height_fades_out_and_is_the_same_again(name):
 @pytest.mark.parametrize("name", ["leather", "hammered", "brushed"])
 def test_seeds_give_others_of_the_same_kind(name):
     one, two = (inner(build(name, f"pitch:4mm,seed:{seed}")) for seed in (1, 2))
-    assert abs(np.corrcoef(one.ravel(), two.ravel())[0, 1]) < 0.3
+    assert abs(np.corrcoef(one.ravel(), two.ravel())[0, 1]) < 0.5
     assert np.std(one) == pytest.approx(np.std(two), rel=0.4)
 
 
