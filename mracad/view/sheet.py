@@ -26,7 +26,7 @@ LEAST_LABEL = 220
 
 _SMALL, _LARGE = 9, 20  # heights of letters, pixels
 _TONE = tuple(round(255 * float(each)) for each in INK)
-_BAR = 7.2  # width of the strip for the colour bar, heights of letters
+_BAR = 8.5  # width of the strip for the colour bar, heights of letters
 _LONGEST = 0.2  # of a panel: the scale
 _HALO = 2  # pixels around numbers of faces
 
