@@ -24,45 +24,39 @@ class Triangles:
     Attributes
     ----------
     corners : ndarray (m, 3, 2)
-    depth : ndarray (3, m)
-        Depth at the first corner, and its slopes along x and y.
-    weights : ndarray (m, 2, 2)
-        How the weights of the second and third corner grow along x and y.
+    origin : ndarray (2, m)
+        The first corner.
+    planes : ndarray (3, 3, m)
+        Depth, u and v: each at the first corner, and its slopes along x and y.
     front : ndarray of bool (m,)
         Whether their outer side is seen.
     """
 
     corners: Array
-    depth: Array
-    weights: Array
+    origin: Array
+    planes: Array
     front: Array
 
     @classmethod
-    def of(cls, corners: Array, depth: Array) -> Triangles:
-        """From corners ``(m, 3, 2)`` and their depths ``(m, 3)``."""
+    def of(cls, corners: Array, values: Array) -> Triangles:
+        """From corners ``(m, 3, 2)`` and depth, u and v there ``(m, 3, 3)``."""
         (bx, by), (cx, cy) = (corners[:, 1] - corners[:, 0]).T, (corners[:, 2] - corners[:, 0]).T
         area = bx * cy - by * cx
         share = 1.0 / np.where(np.abs(area) > _FLAT, area, np.inf)
-        weights = np.stack([np.stack([cy, -cx], axis=1), np.stack([-by, bx], axis=1)], axis=1) * share[:, None, None]
-        slopes = (weights * (depth[:, 1:] - depth[:, :1])[:, :, None]).sum(axis=1)
-        return cls(corners, np.stack([depth[:, 0], *slopes.T]), weights, area < 0)
+        first, second, third = values.transpose(1, 2, 0)
+        second, third = (second - first) * share, (third - first) * share
+        planes = np.stack([first, second * cy - third * by, third * bx - second * cx], axis=1)
+        return cls(corners, np.ascontiguousarray(corners[:, 0].T), planes, area < 0)
 
     def some(self, which: Array) -> Triangles:
         """Some of the triangles."""
-        return Triangles(self.corners[which], self.depth[:, which], self.weights[which], self.front[which])
+        return Triangles(self.corners[which], self.origin[:, which], self.planes[..., which], self.front[which])
 
-    def deep(self, which: Array, x: Array, y: Array) -> Array:
-        """Depth of the planes of triangles at places."""
-        base, along, down = (each[which] for each in self.depth)
-        left, top = self.corners[:, 0].T
+    def at(self, plane: int, which: Array, x: Array, y: Array) -> Array:
+        """One of the planes of triangles at places."""
+        base, along, down = (each[which] for each in self.planes[plane])
+        left, top = self.origin
         return np.asarray(base + along * (x - left[which]) + down * (y - top[which]))
-
-    def shares(self, which: Array, x: Array, y: Array) -> Array:
-        """Weights of the three corners at places, ``(3, q)``."""
-        left, top = self.corners[:, 0].T
-        dx, dy = x - left[which], y - top[which]
-        second, third = (self.weights[which, k, 0] * dx + self.weights[which, k, 1] * dy for k in (0, 1))
-        return np.stack([1.0 - second - third, second, third])
 
 
 def rasterised(
@@ -102,10 +96,9 @@ def _samples(triangles: Triangles, rows: tuple[int, int], width: int) -> Iterato
     low, high = triangles.corners[..., 1].min(axis=1), triangles.corners[..., 1].max(axis=1)
     first = np.clip(np.ceil(low - 0.5), *rows).astype(np.int32)
     last = np.clip(np.ceil(high - 0.5), *rows).astype(np.int32)
-    last[~triangles.weights.any(axis=(1, 2))] = 0
     seen = np.flatnonzero(last > first)
     sides = _sides(triangles.corners)
-    along = triangles.depth[1].astype(np.float32)
+    along = triangles.planes[0, 1].astype(np.float32)
     for part in _parts((last - first)[seen]):
         which, row = runs(seen[part], first[seen[part]], last[seen[part]])
         left, right = _span(sides, which, row + 0.5)
@@ -113,7 +106,7 @@ def _samples(triangles: Triangles, rows: tuple[int, int], width: int) -> Iterato
         end = np.clip(np.ceil(right - 0.5), 0, width).astype(np.int32)
         keep = np.flatnonzero(end > start)
         which, row, start, end = which[keep], row[keep], start[keep], end[keep]
-        deep = triangles.deep(which, start + 0.5, row + 0.5).astype(np.float32)
+        deep = triangles.at(0, which, start + 0.5, row + 0.5).astype(np.float32)
         begin = (row - rows[0]).astype(np.intp) * width + start
         for spans in _parts(end - start):
             some = np.arange(spans.start, spans.stop)

@@ -40,10 +40,8 @@ class Stage:
         In samples, of all entries.
     entry : ndarray of int (m,)
         The entry of each triangle.
-    corners : ndarray of int (m, 3)
     points : ndarray (n, 3)
         All points projected to samples and depth.
-    uv : ndarray (n, 2)
     first : ndarray of int
         The first point of each entry.
     bounds : ndarray (2, entries, 2)
@@ -55,9 +53,7 @@ class Stage:
     entries: Sequence[tuple[Placed, int, Facets]]
     triangles: Triangles
     entry: Array
-    corners: Array
     points: Array
-    uv: Array
     first: Array
     bounds: Array
 
@@ -83,11 +79,12 @@ class Stage:
         )
         every = np.concatenate(points)
         every[:, :2] *= FINE
-        entry = np.repeat(np.arange(len(entries)), [len(facets.corners) for _, _, facets in entries])
-        triangles = Triangles.of(every[corners, :2], every[corners, 2])
+        kind = np.uint16 if len(entries) < 1 << 16 else np.int64  # short numbers are sorted faster
+        entry = np.repeat(np.arange(len(entries), dtype=kind), [len(facets.corners) for _, _, facets in entries])
         uv = np.concatenate([facets.uv for _, _, facets in entries])
+        triangles = Triangles.of(every[corners, :2], np.column_stack([every[:, 2], uv])[corners])
         bounds = np.stack([[f(facets.uv, axis=0) for _, _, facets in entries] for f in (np.min, np.max)])
-        return cls(body, camera, entries, triangles, entry, corners, every, uv, first, bounds)
+        return cls(body, camera, entries, triangles, entry, every, first, bounds)
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,13 +152,13 @@ def seen(stage: Stage, nearest: Array, depth: Array, rows: tuple[int, int], orde
     """
     width = stage.camera.size[0]
     four = _grouped(nearest, width)
-    entry = np.where(four < 0, -1, stage.entry[four])
+    entry = stage.entry[four]
     x, y = _centres(rows, width)
-    whole = (entry[:, 0] >= 0) & (entry == entry[:, :1]).all(axis=1)
+    whole = (four >= 0).all(axis=1) & (entry == entry[:, :1]).all(axis=1)
     lead = np.flatnonzero(whole)
     own, deep = four[lead, 0], _grouped(depth, width)[lead]
-    deep -= stage.triangles.deep(own, x[lead], y[lead])[:, None]
-    deep -= stage.triangles.depth[1:, own].T @ np.transpose(_OFFSETS)
+    deep -= stage.triangles.at(0, own, x[lead], y[lead])[:, None]
+    deep -= stage.triangles.planes[0, 1:, own] @ np.transpose(_OFFSETS)
     apart = np.abs(deep).max(axis=1, initial=0.0) > _OFF * stage.camera.pixel
     whole[lead[apart]] = False
     lead = np.flatnonzero(whole)
@@ -193,13 +190,11 @@ def _evaluated(stage: Stage, which: Array, at: Array, pixel: Array, weight: Arra
     """The surface at places of triangles."""
     sorting = np.argsort(stage.entry[which], kind="stable")
     which, at, pixel, weight = which[sorting], at[sorting], pixel[sorting], weight[sorting]
-    entry, corners = stage.entry[which], stage.corners[which]
-    shares = stage.triangles.shares(which, *at.T)
-    uv = sum(share[:, None] * stage.uv[corner] for share, corner in zip(shares, corners.T, strict=True))
-    uv = np.clip(uv, *stage.bounds[:, entry])
-    inner = stage.uv[corners[:, 0]]
+    entry = stage.entry[which]
+    uv = np.stack([stage.triangles.at(plane, which, *at.T) for plane in (1, 2)], axis=1)
+    np.clip(uv, *stage.bounds[:, entry], out=uv)
     outward = np.array([facets.outward for _, _, facets in stage.entries])[entry]
-    jets = _jets(stage, entry, uv, inner, order)
+    jets = _jets(stage, which, uv, order)
     if order == 1:
         return Seen(pixel, weight, entry, *_flat(jets, outward), stage.triangles.front[which])
     at = at.T / FINE
@@ -211,29 +206,32 @@ def _evaluated(stage: Stage, which: Array, at: Array, pixel: Array, weight: Arra
         if not len(far):
             break
         uv[far] = np.clip(uv[far] + step.T[wrong], *stage.bounds[:, entry[far]])
-        jets[..., far] = _jets(stage, entry[far], uv[far], inner[far], order)
+        jets[..., far] = _jets(stage, which[far], uv[far], order)
     return Seen(pixel, weight, entry, *_bent(stage.camera, jets, outward, at), stage.triangles.front[which])
 
 
-def _jets(stage: Stage, entry: Array, uv: Array, inner: Array, order: int) -> Array:
-    """The jets of sorted entries as placed, ``(orders, 3, q)``."""
-    jets = np.empty((1 + order * (order + 3) // 2, 3, len(entry)))
+def _jets(stage: Stage, which: Array, uv: Array, order: int) -> Array:
+    """The jets at places of triangles, sorted by entry, as placed: ``(orders, 3, q)``."""
+    jets = np.empty((1 + order * (order + 3) // 2, 3, len(which)))
+    entry = stage.entry[which]
     for own in groups(entry):
-        place, _, facets = stage.entries[entry[own.start]]
-        jets[..., own] = _jet(facets, place, uv[own], inner[own], order)
+        jets[..., own] = _jet(stage, stage.entries[entry[own.start]], which[own], uv[own], order)
     return jets
 
 
-def _jet(facets: Facets, place: Placed, uv: Array, inner: Array, order: int) -> Array:
-    """The jet of a face as placed, ``(orders, 3, q)``, a little inside where it is degenerate."""
+def _jet(stage: Stage, entry: tuple[Placed, int, Facets], which: Array, uv: Array, order: int) -> Array:
+    """The jet of a face as placed, ``(orders, 3, q)``; a little inside its triangles where it is degenerate."""
+    place, _, facets = entry
     jet = np.array(facets.ground.jets(uv, order))
     for nudge in (_NUDGE, 100 * _NUDGE):
         su, sv = jet[1].T, jet[2].T
-        size, most = _dot(*2 * (_cross(su, sv),)), _dot(su, su) * _dot(sv, sv)
-        flat = np.flatnonzero(~(size > _THIN**2 * most))
+        cut = _cross(su, sv)
+        flat = np.flatnonzero(~(_dot(cut, cut) > _THIN**2 * _dot(su, su) * _dot(sv, sv)))
         if not len(flat):
             break
-        jet[:, flat] = facets.ground.jets(uv[flat] + nudge * (inner[flat] - uv[flat]), order)
+        middle = stage.triangles.corners[which[flat]].mean(axis=1).T
+        inner = np.stack([stage.triangles.at(plane, which[flat], *middle) for plane in (1, 2)], axis=1)
+        jet[:, flat] = facets.ground.jets(uv[flat] + nudge * (inner - uv[flat]), order)
     turned = jet @ place.frame[:3, :3].T
     turned[0] += place.frame[:3, 3]
     return np.asarray(turned.swapaxes(1, 2))
