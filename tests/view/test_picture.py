@@ -18,6 +18,7 @@ from mracad.occ.facets import facets
 from mracad.spec.pictures import VIEWS
 from mracad.view.camera import axes, fitted
 from mracad.view.picture import ANGLE, CHORD
+from mracad.view.sheet import boxes
 from tests.occ import shapes
 
 
@@ -45,7 +46,7 @@ def disc(size, radius, share):
 def test_the_curvature_of_a_sphere_is_one_colour(what, value):
     picture, drawn = pixels(sphere(10.0), show=f"curvature:{what}", view=("0.3,-1,0.2",), size="300x200")
     assert (drawn.lowest, drawn.highest) == pytest.approx((value, value), rel=1e-5)
-    wide = 300 - 65
+    wide = boxes((300, 200), 1, 1, bar=True)[0][2]
     inside, _ = disc((wide, 200), 10.0, 0.97)
     colours = picture[:, :wide][inside]
     assert np.ptp(colours, axis=0).max() <= 2.55
@@ -54,7 +55,8 @@ def test_the_curvature_of_a_sphere_is_one_colour(what, value):
 
 
 def test_an_outline_covers_pixels_by_their_share():
-    picture, _ = pixels(sphere(10.0), show="curvature", view=("front",), size="365x300")
+    picture, _ = pixels(sphere(10.0), show="curvature", view=("front",), size="376x300")
+    assert boxes((376, 300), 1, 1, bar=True)[0][2] == 300
     seen = picture[:, :300]
     ground, colour = 255.0, np.median(seen[140:160, 140:160].reshape(-1, 3), axis=0)
     share = ((ground - seen) / (ground - colour)).mean(axis=2)[:270]
