@@ -25,6 +25,9 @@ LINKED = 2.2
 ROUNDS = 30
 """Steps of inverse iteration."""
 
+LEAST = 1e-3
+"""Weight from which a direction is asked for: a part without any gets the smoothest field."""
+
 AROUND = 6
 """Points from which a direction between them is taken."""
 
@@ -110,7 +113,9 @@ class Cloud:
         size = np.hypot(x, y)
         target = (x + 1j * y) / np.maximum(size, 1e-300)
         every = form + diags_array(weight + 1e-9)
-        return Field(self, count, splu(every.tocsc()).solve(weight * target**count))
+        z = splu(every.tocsc()).solve(weight * target**count)
+        asked = np.isin(self.spots.part, self.spots.part[weight > LEAST])
+        return Field(self, count, z if asked.all() else np.where(asked, z, self.field(count).z))
 
 
 @dataclass(frozen=True, eq=False)

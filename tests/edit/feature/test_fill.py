@@ -171,6 +171,13 @@ def test_rows_and_copies_are_aligned_along_a_direction_and_an_edge():
         assert np.minimum(along, np.abs(along - 1)).max() < 0.01
 
 
+def test_parts_of_which_no_direction_is_asked_get_the_smoothest_one(ball):
+    cloud = room(ball).cloud(6.0)
+    ways, weight = np.ones((len(cloud.spots), 3)), np.zeros(len(cloud.spots))
+    assert np.array_equal(cloud.field(4, ways, weight).z, cloud.field(4).z)
+    assert not np.allclose(cloud.field(4, ways, weight + 1.0).z, cloud.field(4).z)
+
+
 def test_copies_fade_with_the_distance_from_an_edge():
     model = view(grounds.sewn([grounds.uneven(60.0)]))
     edge = next(e for e in model.edges if np.ptp(e.points[:, 0]) < 1e-9 and e.points[0, 0] < 1)
