@@ -15,15 +15,19 @@ from mracad.errors import EditError, UsageError
 
 Array = np.ndarray
 
-CELLS = 1024
-"""Largest number of cells across a table."""
+CELLS, MOST_CELLS = 1024, 2048
+"""Largest number of cells across a table, and where its spacing is given."""
 
 HELD, NEARLY, LOSS = 1e-3, 2e-3, 5e-3
 """Root mean square errors, as shares of the height where something stands out: of a spline through a source, of one
 whose knots cannot be closer, and of rounding."""
 
-ROUND = 0.7
-"""Standard deviation of the rounding, over the width of a span: at 0.7 a step overshoots by 0.3 %, at 0.5 by 3 %."""
+ROUND, SHARP = 0.7, 1.2
+"""Standard deviations of the rounding, over the width of a span: at 0.7 a step overshoots by 0.3 %, at 0.5 by 3 %.
+Edges as steep as that cannot be matched across the seams of patches of other parameters; at 1.2 they can."""
+
+STEEP = 4.0
+"""Where rounding takes more than so many times its allowed error, edges are sharp."""
 
 FINER = 1.5
 """Least width of a span, in cells of the source, where it is rounded."""
@@ -119,7 +123,7 @@ def tabulated(relief: Relief, name: str, spacing: float | None = None) -> Featur
     if not relief.height > 1e-7:
         raise EditError(f"feature {name}: nothing stands out in it", "give one with heights")
     radius = float(np.linalg.norm(relief.sides)) / 2
-    least = 4 * radius / (CELLS - 16)
+    least = 4 * radius / ((CELLS if spacing is None else MOST_CELLS) - 16)
     spectrum = _Spectrum.of(relief)
     if spacing is not None and not least <= spacing <= radius / FEWEST:
         raise UsageError(
@@ -141,7 +145,7 @@ def _table(relief: Relief, reach: float, width: float, rounding: float, pad: int
     """The table of a feature over the square of its reach."""
     from scipy.ndimage import gaussian_filter, map_coordinates
 
-    cells = int(np.clip(np.ceil(4 * reach / width), 32, CELLS))
+    cells = int(np.clip(np.ceil(4 * reach / width), 32, MOST_CELLS))
     side = np.linspace(-reach, reach, cells + 1)
     table = np.zeros((cells + 1, cells + 1, 4))
     axes = [side / relief.cell + pad + (count - 1) / 2 for count in relief.heights.shape]
@@ -201,7 +205,11 @@ class _Spectrum:
     def at(self, width: float) -> tuple[float, float]:
         """A width of spans, and the rounding that it needs, mm."""
         exact = self.grain <= HELD * self.height and self.missed(width) <= NEARLY * self.height
-        return width, 0.0 if exact else ROUND * max(width, self.cell)
+        if exact:
+            return width, 0.0
+        least = max(width, self.cell)
+        sharp = self.loss(ROUND * least) > STEEP * LOSS * self.height
+        return width, (SHARP if sharp else ROUND) * least
 
     def chosen(self, least: float, most: float) -> tuple[float, float]:
         """The largest width of spans between two that holds the relief, and the rounding that it needs, mm."""
