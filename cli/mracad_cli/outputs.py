@@ -14,6 +14,9 @@ from mracad.formats import FORMATS, by_extension
 from mracad_cli.options import Reading, Reports, Writing
 from mracad_cli.say import json_text, say
 
+PAGES = ".html", ".htm"
+"""Extensions of pages."""
+
 if TYPE_CHECKING:
     from mracad.job.judge import Judged
     from mracad.job.produce import Made, Target
@@ -74,6 +77,13 @@ def check_reports(*paths: str | None, overwrite: bool) -> None:
         if path.resolve() in [other.resolve() for other in given[:number]]:
             raise UsageError(f"{path} is named twice", "give each file that is written a name of its own")
         check_target(path, overwrite)
+
+
+def check_page(path: str, overwrite: bool) -> None:
+    """Refuse a page that is not HTML, or could not be written."""
+    if not path.lower().endswith(PAGES):
+        raise UsageError(f"cannot write {path}: reports with pictures are HTML", "name a file that ends in .html")
+    check_target(Path(path), overwrite)
 
 
 def check_target(path: Path, overwrite: bool) -> None:

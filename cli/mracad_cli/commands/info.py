@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from mracad.spec.quantity import LENGTH, length
+from mracad.spec.quantity import LENGTH
 from mracad_cli import options
 from mracad_cli.command import Command
 from mracad_cli.options import Reading
@@ -49,12 +49,6 @@ from mracad_cli.say import json_text, say
 def command(reading: Reading, scale: str, keep: Any, everything: bool, places: tuple[str, ...], as_json: bool) -> None:
     import numpy as np
 
-    from mracad.inspect.scales import scales
-    from mracad.inspect.seams import seams
-    from mracad.occ.check import check
-    from mracad.occ.measure import face_masses
-    from mracad.occ.probe import middles, nearest
-    from mracad.occ.view import view
     from mracad.spec.places import vector
     from mracad_cli.outputs import read
     from mracad_cli.render import info
@@ -63,15 +57,6 @@ def command(reading: Reading, scale: str, keep: Any, everything: bool, places: t
     with Progress() as progress:
         progress("reading", 0, 1)
         document = read(reading)
-        progress("looking at faces", 0, 1)
-        model = view(document)
-        width = length(scale, model.diagonal, "scale")
-        found = scales(model, width, keep, lambda done, total: progress("looking at scales", done, total))
-        progress("measuring seams", 0, 1)
-        measures = seams(model)
-        progress("checking", 0, 1)
-        valid = check(document)
-        sizes = list(zip(face_masses(document), middles(document), strict=True)) if everything or as_json else []
-        spots = [nearest(document, model, point) for point in points] if model.faces else []
-    seen = info.Seen(document, model, width, keep, found, measures, valid, sizes, spots)
+        sized = everything or as_json
+        seen = info.Seen.of(document, scale, keep, sized=sized, places=points, progress=progress)
     say(*([json_text(info.body(seen))] if as_json else info.lines(seen, everything)))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -37,6 +37,38 @@ class Seen:
     sizes: Sequence[tuple[Mass, Spot]]
     spots: Sequence[Spot]
 
+    @classmethod
+    def of(
+        cls,
+        document: Document,
+        scale: str,
+        keep: str,
+        *,
+        sized: bool,
+        places: Sequence[np.ndarray] = (),
+        progress: Callable[[str, int, int], None],
+    ) -> Seen:
+        """Look at a document; with ``sized`` also at the sizes of its faces."""
+        from mracad.inspect.scales import scales
+        from mracad.inspect.seams import seams
+        from mracad.occ.check import check
+        from mracad.occ.measure import face_masses
+        from mracad.occ.probe import middles, nearest
+        from mracad.occ.view import view
+        from mracad.spec.quantity import length
+
+        progress("looking at faces", 0, 1)
+        model = view(document)
+        width = length(scale, model.diagonal, "scale")
+        found = scales(model, width, keep, lambda done, total: progress("looking at scales", done, total))
+        progress("measuring seams", 0, 1)
+        measures = seams(model)
+        progress("checking", 0, 1)
+        valid = check(document)
+        sizes = list(zip(face_masses(document), middles(document), strict=True)) if sized else []
+        spots = [nearest(document, model, point) for point in places] if model.faces else []
+        return cls(document, model, width, keep, found, measures, valid, sizes, spots)
+
 
 def body(seen: Seen) -> dict[str, Any]:
     """Everything, as JSON-ready values; lengths in millimetres."""
@@ -63,10 +95,9 @@ def body(seen: Seen) -> dict[str, Any]:
     }
 
 
-def lines(seen: Seen, everything: bool) -> list[str]:
-    """A summary; with ``everything`` also instances, faces that are not NURBS and every seam."""
-    from mracad.inspect.seams import summary
-    from mracad.occ.boxes import face_boxes
+def summary(seen: Seen, everything: bool = False) -> list[str]:
+    """The content in a few lines; with ``everything`` also instances."""
+    from mracad.inspect.seams import summary as totals
     from mracad.occ.instance import instances
 
     model, kinds = seen.model, Counter(face.kind for face in seen.model.faces)
@@ -76,8 +107,19 @@ def lines(seen: Seen, everything: bool) -> list[str]:
     if everything:
         said += [f"  {path}" for path in instances(seen.document)]
     said.append(f"faces: {len(model.faces)}: " + ", ".join(f"{n} {kind}" for kind, n in kinds.most_common()))
-    said.append(text.seam_line(summary(seen.seams)))
-    said += [f"valid: {text.verdict(seen.valid.valid)}", *(f"  {failure}" for failure in seen.valid.failures[:10])]
+    said.append(text.seam_line(totals(seen.seams)))
+    return [
+        *said,
+        f"valid: {text.verdict(seen.valid.valid)}",
+        *(f"  {failure}" for failure in seen.valid.failures[:10]),
+    ]
+
+
+def lines(seen: Seen, everything: bool) -> list[str]:
+    """A summary, and the NURBS faces; with ``everything`` also instances, other faces and every seam."""
+    from mracad.occ.boxes import face_boxes
+
+    model, said = seen.model, summary(seen, everything)
     shown = [face for face in model.faces if everything or face.surface is not None]
     if shown:
         said.append(f"detail below {text.mm(seen.width)}, free with all edges held at {seen.keep.upper()}")

@@ -1,0 +1,43 @@
+"""Make a report of a model that opens in any browser, without a network: one HTML file.
+
+It holds facts, a check layer by layer, pictures, the model to turn, spectra, and tables of faces and seams. With REF
+the model is compared with that, too. A report is no check: the exit code tells only whether it was made.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import click
+
+from mracad_cli import options
+from mracad_cli.command import Command
+from mracad_cli.options import Reading
+from mracad_cli.outputs import check_page, deliver, load, read
+from mracad_cli.progress import Progress
+from mracad_cli.say import json_text
+
+
+@click.command(cls=Command, help=__doc__)
+@options.apply(
+    options.reading(),
+    click.argument("reference", metavar="[REF]", required=False, type=click.Path(allow_dash=True)),
+    click.option("-o", "--output", metavar="F.html", required=True, type=options.path, help="Report to write (HTML)."),
+    options.overwrite,
+    options.printing,
+)
+def command(reading: Reading, reference: str | None, output: str, overwrite: bool, as_json: bool) -> None:
+    check_page(output, overwrite)
+    from mracad.report.page import html
+    from mracad_cli.render import report
+
+    with Progress() as progress:
+        progress("reading", 0, 1)
+        text = load(reading.file)
+        document = read(reading, text)
+        other = read(replace(reading, file=reference)) if reference else None
+        told = report.told(document, other, text.getvalue(), progress)
+        progress("drawing", 0, 1)
+        data = html(report.page(told))
+    line = json_text(told.body | {"written": output}) if as_json else report.line(told, output, len(data))
+    deliver({output: data}, [line])

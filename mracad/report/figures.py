@@ -1,0 +1,50 @@
+"""The pictures of reports."""
+
+from __future__ import annotations
+
+from mracad.occ.document import Document
+from mracad.report.page import Figure
+from mracad.spec.pictures import Picture
+from mracad.view.picture import Rendered, render
+
+SIZE = "960x640"
+"""Of pictures of one model, pixels."""
+
+PAIR = "1440x600"
+"""Of two models side by side, pixels."""
+
+ALONE = {
+    "zebra": "Zebra stripes: they break at creases, and kink at tangent joints whose curvatures differ",
+    "curvature:max": "Larger principal curvature, without its sign",
+    "curvature:mean": "Mean curvature, positive where convex",
+    "faces": "Faces and their numbers",
+}
+"""What is shown of one model, and its captions."""
+
+
+def still(document: Document) -> Figure:
+    """The model in soft light."""
+    return Figure(f"{document.name}, shaded", render(document, Picture(size=SIZE)).data)
+
+
+def alone(document: Document, without: str = "") -> list[Figure]:
+    """Pictures of one model."""
+    return [
+        Figure(caption, render(document, Picture(show=show, size=SIZE)).data)
+        for show, caption in ALONE.items()
+        if show != without
+    ]
+
+
+def both(document: Document, before: Document) -> list[Figure]:
+    """Pictures of a model beside another, and of its deviation from that."""
+    stripes = render(document, Picture(show="zebra", size=PAIR), before=before)
+    moved = render(document, Picture(show="deviation", size=SIZE), reference=before)
+    return [
+        Figure(f"Zebra stripes: {before.name} and {document.name}", stripes.data, wide=True),
+        Figure(f"Deviation from {before.name}, {_range(moved)}, positive outside", moved.data),
+    ]
+
+
+def _range(drawn: Rendered) -> str:
+    return f"{drawn.lowest:.3g} to {drawn.highest:.3g} {drawn.unit}".replace("-", "−")

@@ -1,0 +1,107 @@
+"""Tables made of the records of reports: every cell knows the value that it shows."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+MOST = 2000
+"""Largest number of rows."""
+
+NOTHING = "–"
+"""What stands for a value that there is not."""
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column.
+
+    Attributes
+    ----------
+    title : str
+    key : str
+        Where its values are in the records; keys of records in records follow after dots.
+    sign : str
+        What stands before numbers: ``"#"`` of faces.
+    """
+
+    title: str
+    key: str
+    sign: str = ""
+
+
+@dataclass(frozen=True)
+class Cell:
+    """What stands in a cell, and the exact value where it is a number, else None."""
+
+    text: str
+    value: int | float | None = None
+
+    @property
+    def exact(self) -> str:
+        """The value as JSON has it."""
+        return repr(self.value)
+
+
+@dataclass(frozen=True)
+class Table:
+    """Records as rows.
+
+    Attributes
+    ----------
+    name : str
+        Identifies it in the page.
+    title : str
+    columns : sequence of Column
+    records : sequence of mapping
+        As in the report that is JSON.
+    """
+
+    name: str
+    title: str
+    columns: Sequence[Column]
+    records: Sequence[Mapping[str, Any]]
+
+    @cached_property
+    def shown(self) -> list[Column]:
+        """The columns that hold anything."""
+        return [
+            each for each in self.columns if any(_at(record, each.key) not in (None, "") for record in self.records)
+        ]
+
+    @cached_property
+    def rows(self) -> list[list[Cell]]:
+        """The cells of the first rows."""
+        return [[cell(_at(record, each.key), each.sign) for each in self.shown] for record in self.records[:MOST]]
+
+    @property
+    def left_out(self) -> int:
+        """The number of records that have no row."""
+        return max(len(self.records) - MOST, 0)
+
+
+def cell(value: Any, sign: str = "") -> Cell:
+    """A value as it is shown: numbers with five significant digits, lists of them with their signs."""
+    if value is None or (isinstance(value, float) and not math.isfinite(value)):
+        return Cell(NOTHING)
+    if isinstance(value, bool):
+        return Cell("yes" if value else "no")
+    if isinstance(value, int | float):
+        return Cell(sign + _number(value), value)
+    if isinstance(value, list | tuple):
+        return Cell((" " if sign else " × ").join(cell(each, sign).text for each in value))
+    return Cell(str(value))
+
+
+def _number(value: int | float) -> str:
+    text = str(value) if isinstance(value, int) else f"{value:.5g}"
+    return text.replace("-", "−")
+
+
+def _at(record: Any, key: str) -> Any:
+    for part in key.split("."):
+        record = record.get(part) if isinstance(record, Mapping) else None
+    return record
