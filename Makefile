@@ -20,7 +20,7 @@ export SOURCE_DATE_EPOCH ?= 0
 
 SAMPLES := $(wildcard samples/*.step)
 
-.PHONY: demo example test test-long regress fuzz lint bench bench-batch docs pictures samples smooth wheel clean
+.PHONY: demo example test test-long regress fuzz lint bench bench-batch bench-fill docs pictures samples smooth wheel clean
 
 demo: $(VENV)/ready
 	@mkdir -p build
@@ -57,7 +57,10 @@ bench: $(VENV)/dev
 	$(BIN)/python benchmarks/command.py
 	$(BIN)/python benchmarks/features.py
 	$(BIN)/python benchmarks/seams.py
-	$(BIN)/python benchmarks/fill.py 1000
+
+# Dimples all over a ball of six patches: minutes and gigabytes, most of them for seams
+bench-fill: $(VENV)/dev
+	$(BIN)/python benchmarks/fill.py 300
 
 # Batches: what workers gain, kills, a lost cluster worker; some minutes
 bench-batch: $(VENV)/dev
