@@ -13,7 +13,7 @@ from mracad.edit.feature.seams import Wanted
 
 Array = np.ndarray
 
-POINTS, MOST, LEAST = 100_000, 4000, 300
+POINTS, MOST, LEAST = 20_000, 1000, 300
 """Points at which copies beside edges are compared: in all, and in one copy at most and at least."""
 
 GOLDEN = np.pi * (3 - np.sqrt(5))
