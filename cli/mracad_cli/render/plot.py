@@ -52,9 +52,12 @@ def _bands(axes: Any, whole: Direction, faces: Sequence[Direction], scale: float
     for direction, style in [*((face, "0.8") for face in faces), (whole, "0")]:
         if direction.bands:
             axes.stairs([band.rms for band in direction.bands], _ends(direction), baseline=None, color=style)
-    seen = [band.rms for band in whole.bands if band.rms > 0.0]
-    if seen:
-        axes.set_ylim(bottom=max(max(seen) * 10**-DECADES, min(seen) / 2))
+    heights = [band.rms for band in whole.bands if band.rms > 0.0]
+    if heights:
+        least = max(max(heights) * 10**-DECADES, min(heights) / 2)
+        seen = [band for each in (*faces, whole) for band in each.bands if band.rms > least]
+        axes.set_ylim(least, 3.0 * max(band.rms for band in seen))
+        axes.set_xlim(min(band.low for band in seen), max(band.high for band in seen))
     if any(band.floor for band in whole.bands):
         floors = [band.floor for band in whole.bands]
         axes.stairs(floors, _ends(whole), baseline=None, color="C1", label="noise")
