@@ -162,6 +162,7 @@ class Editing:
     """Files that are written beside the models."""
 
     report: str | None
+    report_html: str | None
     depfile: str | None
     dry_run: bool
     as_json: bool
@@ -174,6 +175,7 @@ class Reports:
 
     junit: str | None
     sarif: str | None
+    report_html: str | None
     overwrite: bool
     as_json: bool
 
@@ -210,6 +212,9 @@ verify = click.option(
     help="Read each output back and check it before it is put in place. off: write without checking.",
 )
 depfile = click.option("--depfile", metavar="F.d", type=path, help="Write what the outputs depend on, for make.")
+report_html = click.option(
+    "--report-html", metavar="F.html", type=path, help="Write a report with pictures and the model to turn (HTML)."
+)
 record = click.option(
     "--record", is_flag=True, help="Write the recipe with all its options and versions beside the output (OUT.toml)."
 )
@@ -287,6 +292,7 @@ editing = gathered(
     "editing",
     Editing,
     click.option("--report", metavar="F.json", type=path, help="Write the full report (JSON) to a file."),
+    report_html,
     depfile,
     click.option("--dry-run", is_flag=True, help="Report what would be done; write nothing but the report."),
 )
@@ -295,6 +301,7 @@ reports = gathered(
     Reports,
     click.option("--junit", metavar="F.xml", type=path, help="Write the verdict as JUnit, one case per layer."),
     click.option("--sarif", metavar="F.sarif", type=path, help="Write the findings as SARIF."),
+    report_html,
     click.option("--overwrite", is_flag=True, help="Replace existing reports."),
 )
 

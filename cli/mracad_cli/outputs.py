@@ -33,14 +33,19 @@ def load(source: str) -> Text:
 
 def read(reading: Reading, text: Text | None = None) -> Document:
     """Read a model, from ``text`` if it is loaded already; print warnings."""
-    from mracad.occ.files import read as read_file
-
     text = text or load(reading.file)
     note.doing("reading", text.name)
-    document = read_file(text, reading.input_unit, reading.encoding)
+    document = read_silently(reading, text)
     for warning in document.warnings:
         say(f"warning: {warning}", file=sys.stderr)
     return document
+
+
+def read_silently(reading: Reading, text: Text) -> Document:
+    """Read a model, maybe once more."""
+    from mracad.occ.files import read as read_file
+
+    return read_file(text, reading.input_unit, reading.encoding)
 
 
 def check_outputs(writing: Writing, beside: Iterable[str | None] = (), *, needed: bool = True) -> list[Target]:
@@ -79,11 +84,10 @@ def check_reports(*paths: str | None, overwrite: bool) -> None:
         check_target(path, overwrite)
 
 
-def check_page(path: str, overwrite: bool) -> None:
-    """Refuse a page that is not HTML, or could not be written."""
-    if not path.lower().endswith(PAGES):
+def check_page(path: str | None) -> None:
+    """Refuse a page that is not HTML."""
+    if path is not None and not path.lower().endswith(PAGES):
         raise UsageError(f"cannot write {path}: reports with pictures are HTML", "name a file that ends in .html")
-    check_target(Path(path), overwrite)
 
 
 def check_target(path: Path, overwrite: bool) -> None:
@@ -144,13 +148,17 @@ def deliver_models(
     deliver({**changed, **files}, lines, stream=stream)
 
 
-def deliver_verdict(judged: Judged, command: str, reports: Reports) -> int:
-    """End a command that judges: print the verdict, write its reports; returns the exit code."""
+def deliver_verdict(judged: Judged, command: str, reports: Reports, document: Document, other: Document | None) -> int:
+    """End a command that judges a document, maybe beside an ``other``; returns the exit code."""
     from mracad_cli.render import json, junit, sarif, text
 
     found = judged.verdict, judged.failed
-    files = {reports.junit: junit.verdict(*found, command)} if reports.junit else {}
+    files: dict[str, str | bytes | None] = {reports.junit: junit.verdict(*found, command)} if reports.junit else {}
     files |= {reports.sarif: json_text(sarif.verdict(*found, command), 1) + "\n"} if reports.sarif else {}
+    if reports.report_html:
+        from mracad_cli.render import pages
+
+        files[reports.report_html] = pages.judged(document, other, judged, command)
     deliver(files, [json_text(json.verdict(*found))] if reports.as_json else text.verdict_lines(*found))
     return 0 if judged.passed else 1
 

@@ -14,7 +14,7 @@ from mracad.spec.steps import STEPS, Options, Selection
 from mracad_cli import options
 from mracad_cli.command import Command
 from mracad_cli.options import Editing, Reading, Writing
-from mracad_cli.outputs import check_outputs, deliver_models, depfile_text, load, read
+from mracad_cli.outputs import check_outputs, check_page, deliver_models, depfile_text, load, read, read_silently
 from mracad_cli.progress import Progress
 from mracad_cli.say import json_text
 
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from mracad.job.document import Report
     from mracad.job.produce import Production, Target
     from mracad.occ.document import Document
+    from mracad.occ.load import Text
     from mracad.spec.recipe import Recipe, Step
 
 
@@ -77,9 +78,12 @@ def run_steps(
 
     start = time.perf_counter()
     places = [f"{path}.toml" for path in writing.outputs if editing.record and path != "-"]
-    targets = check_outputs(writing, (editing.report, editing.depfile, *places, *beside), needed=not editing.dry_run)
+    check_page(editing.report_html)
+    others = (editing.report, editing.report_html, editing.depfile, *places, *beside)
+    targets = check_outputs(writing, others, needed=not editing.dry_run)
     records = {place: record_of(steps, place) for place in places}
-    document, done = produced(reading, writing, [] if editing.dry_run else targets, steps, title(steps))
+    text = load(reading.file)
+    document, done = produced(reading, text, writing, [] if editing.dry_run else targets, steps, title(steps))
     body = _body(document.name, steps, done, recipe) | {"warnings": document.warnings, **json.written(done.made)}
     files: dict[str, str | bytes | None] = {editing.report: json_text(body, 1) + "\n"} if editing.report else {}
     if done.made:
@@ -87,6 +91,11 @@ def run_steps(
         files |= {path: make(done.results[0]) for path, make in beside.items()}  # type: ignore[arg-type]  # it is an edit
         needs = [reading.file, *needed(steps, recipe), *writing.picture.files()]
         files |= {editing.depfile: depfile_text(writing.outputs, needs)} if editing.depfile else {}
+    if editing.report_html:
+        from mracad_cli.render import pages
+
+        before = read_silently(reading, text)
+        files[editing.report_html] = pages.edited(before, None if editing.dry_run else done.document, steps, done, body)
     seconds = None if editing.dry_run else time.perf_counter() - start
     lines = [json_text(body)] if editing.as_json else _lines(steps, done, recipe, seconds)
     deliver_models(writing, done.made, files, lines)
@@ -94,19 +103,17 @@ def run_steps(
 
 
 def produced(
-    reading: Reading, writing: Writing, targets: Sequence[Target], steps: Sequence[Step], title: str
+    reading: Reading, text: Text, writing: Writing, targets: Sequence[Target], steps: Sequence[Step], title: str
 ) -> tuple[Document, Production]:
     """Read a document and take it through steps; returns the document and what was produced from it."""
     with Progress() as progress:
         progress("reading", 0, 1)
-        text = load(reading.file)
         document = read(reading, text)
         from mracad.job.produce import produce
-        from mracad.occ.files import read as read_again
 
         return document, produce(
             document,
-            lambda: read_again(text, reading.input_unit, reading.encoding),
+            lambda: read_silently(reading, text),
             steps,
             targets,
             title=title,

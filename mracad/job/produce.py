@@ -64,8 +64,10 @@ class Made:
 
 @dataclass(frozen=True)
 class Production:
-    """The result of each step, and the outputs: none where a check failed, or on a dry run."""
+    """The result of each step, the outputs (none where a check failed, or on a dry run), and the document after the
+    steps; the last one is not in it on a dry run."""
 
+    document: Document = field(repr=False)
     results: tuple[Report | Judged, ...] = ()
     made: tuple[Made, ...] = ()
 
@@ -126,7 +128,7 @@ def produce(
             if faults:
                 raise _refused(document.name, faults) from error
             raise
-        done = Production(tuple(results))
+        done = Production(document, tuple(results))
         if not (targets and done.passed):
             return done
         tell(progress, "writing")

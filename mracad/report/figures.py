@@ -40,9 +40,11 @@ def both(document: Document, before: Document) -> list[Figure]:
     """Pictures of a model beside another, and of its deviation from that."""
     stripes = render(document, Picture(show="zebra", size=PAIR), before=before)
     moved = render(document, Picture(show="deviation", size=SIZE), reference=before)
+    same = before.name == document.name
+    names = "before and after" if same else f"{before.name} and {document.name}"
     return [
-        Figure(f"Zebra stripes: {before.name} and {document.name}", stripes.data, wide=True),
-        Figure(f"Deviation from {before.name}, {_range(moved)}, positive outside", moved.data),
+        Figure(f"Zebra stripes: {names}", stripes.data, wide=True),
+        Figure(f"Deviation from {'before' if same else before.name}, {_range(moved)}, positive outside", moved.data),
     ]
 
 

@@ -23,7 +23,7 @@ class Column:
     ----------
     title : str
     key : str
-        Where its values are in the records; keys of records in records follow after dots.
+        Where its values are in the records; keys and positions in what these hold follow after dots.
     sign : str
         What stands before numbers: ``"#"`` of faces.
     """
@@ -103,5 +103,8 @@ def _number(value: int | float) -> str:
 
 def _at(record: Any, key: str) -> Any:
     for part in key.split("."):
-        record = record.get(part) if isinstance(record, Mapping) else None
+        if isinstance(record, list | tuple):
+            record = record[int(part)]
+        else:
+            record = record.get(part) if isinstance(record, Mapping) else None
     return record

@@ -185,6 +185,7 @@ VALUES: Mapping[str, Sequence[Any]] = {
     "reference_unit": ["mm"],
     "report": ["report.json"],
     "retry": ["1"],
+    "report_html": ["out.html"],
     "rotate": ["30"],
     "sarif": ["out.sarif"],
     "scale": ["4mm", "20%"],

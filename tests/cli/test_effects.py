@@ -137,6 +137,7 @@ WAYS = {
     "reference_unit": ("--reference-unit in",),
     "refine": ("--refine never", "IN strips.step --scale 8mm --faces #2"),
     "report": ("--report a.json",),
+    "report_html": ("--report-html a.html",),
     "rotate": ("--rotate 40",),
     "sarif": ("--sarif a.sarif",),
     "scale": ("--scale 9mm",),

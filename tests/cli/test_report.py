@@ -6,10 +6,10 @@ import pytest
 
 from tests.cli.test_errors import one_line
 from tests.conftest import CORPUS
+from tests.report.test_page import Read
 
 
-def test_a_model_is_compared_with_a_reference(mracad, samples, tmp_path, monkeypatch):
-    monkeypatch.setattr("mracad.report.figures.SIZE", "96x64")
+def test_a_model_is_compared_with_a_reference(mracad, samples, tmp_path, small_pictures):
     out = tmp_path / "a.html"
     result = mracad("report", samples / "panel.step", samples / "panel_clean.step", "-o", out)
     assert result.code == 0 and "valid: yes" in result.out and "compared with panel_clean.step: failed" in result.out
@@ -18,6 +18,84 @@ def test_a_model_is_compared_with_a_reference(mracad, samples, tmp_path, monkeyp
     blade = samples / "blade.step"
     same = mracad("report", blade, blade, "-o", tmp_path / "b.html", "--json")
     assert json.loads(same.out)["compare"]["passed"] is True
+
+
+@pytest.fixture
+def small_pictures(monkeypatch):
+    for name in ("SIZE", "PAIR"):
+        monkeypatch.setattr(f"mracad.report.figures.{name}", "96x64")
+
+
+def agree(table, records):
+    """How many numbers of a table there are, all of them those of the records."""
+    rows = [row for row in table["rows"] if row]
+    assert len(rows) == len(records)
+    count = 0
+    for row, record in zip(rows, records, strict=True):
+        for key, (exact, _) in zip(table["keys"], row, strict=True):
+            value = record
+            for part in key.split("."):
+                value = value[int(part)] if isinstance(value, list) else value[part]
+            if exact is not None:
+                assert json.loads(exact) == value
+                count += 1
+    return count
+
+
+def test_an_edit_makes_a_report_of_what_it_did(mracad, samples, tmp_path, small_pictures):
+    out = [tmp_path / name for name in ("a.html", "b.html")]
+    words = ("smooth", samples / "panel.step", "--scale", "25mm", "--json")
+    told = json.loads(mracad(*words, "-o", tmp_path / "a.step", "--report-html", out[0]).out)
+    again = mracad(*words, "-o", tmp_path / "a.step", "--overwrite", "--report-html", out[1])
+    assert again.code == 0 and out[0].read_bytes() == out[1].read_bytes()
+    page = Read(out[0].read_text(encoding="utf-8"))
+    said = " ".join(page.texts)
+    assert "smooth --scale 25mm" in said and "valid: yes, as read back" in said and "wrote a.step" in said
+    assert "Deviation from before, −0.0" in said and "Zebra stripes: before and after" in said
+    assert agree(page.tables["faces"], told["faces"]) > 6 * 7
+    assert agree(page.tables["seams"], told["seams"]["each"]) >= 7 * 7
+    assert agree(page.tables["deviation"], told["deviation"]) == 6 * 5
+    assert agree(page.tables["edges"], told["edges"]) == 17
+
+
+def test_a_dry_run_makes_a_report_of_the_input(mracad, samples, tmp_path, small_pictures):
+    words = ("smooth", samples / "panel.step", "--scale", "25mm", "--dry-run", "--report-html", tmp_path / "a.html")
+    assert mracad(*words).code == 0
+    said = " ".join(Read((tmp_path / "a.html").read_text(encoding="utf-8")).texts)
+    assert "dry run, nothing written" in said and "Deviation from" not in said
+
+
+def test_a_recipe_tells_each_of_its_steps(mracad, samples, tmp_path, small_pictures):
+    steps = "offset --distance 0.5mm ! offset --distance 0.2mm ! check --fail-on free-edges"
+    words = ("-o", tmp_path / "a.step", "--report-html", tmp_path / "a.html", "--json")
+    result = mracad("pipeline", steps, samples / "panel.step", *words)
+    assert result.code == 1 and not (tmp_path / "a.step").exists()
+    page, parts = Read((tmp_path / "a.html").read_text(encoding="utf-8")), json.loads(result.out)["steps"]
+    said = " ".join(page.texts)
+    assert "check: failed" in said and "nothing written" in said and "offset-2: Faces" in said
+    assert agree(page.tables["deviation"], parts[1]["deviation"]) == agree(
+        page.tables["deviation1"], parts[0]["deviation"]
+    )
+    assert page.tables["deviation"] != page.tables["deviation1"]
+
+
+def test_checks_and_comparisons_make_reports(mracad, samples, tmp_path, small_pictures):
+    panel, clean = samples / "panel.step", samples / "panel_clean.step"
+    for number, (words, code, says) in enumerate(
+        ((("check", panel), 0, "check: passed"), (("compare", clean, panel), 1, "Deviation from panel_clean.step"))
+    ):
+        out = tmp_path / f"{number}.html"
+        assert mracad(*words, "--report-html", out).code == code
+        assert says in " ".join(Read(out.read_text(encoding="utf-8")).texts)
+
+
+@pytest.mark.parametrize("words", [["--report-html", "a.pdf"], ["--report-html", "there.html"]])
+@pytest.mark.parametrize("command", [["check"], ["smooth", "--scale", "25mm", "-o", "a.step"]])
+def test_pages_are_refused_before_the_work(mracad, samples, tmp_path, monkeypatch, command, words):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "there.html").write_text("precious")
+    one_line(mracad(*command, samples / "panel.step", *words), 2)
+    assert [path.name for path in tmp_path.iterdir()] == ["there.html"]
 
 
 @pytest.mark.parametrize(

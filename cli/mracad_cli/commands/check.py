@@ -12,14 +12,15 @@ from mracad.spec.steps import Check
 from mracad_cli import options
 from mracad_cli.command import Command
 from mracad_cli.options import Reading, Reports
-from mracad_cli.outputs import check_reports, deliver_verdict, load, read
+from mracad_cli.outputs import check_page, check_reports, deliver_verdict, load, read
 from mracad_cli.progress import Progress
 
 
 @click.command(cls=Command, help=__doc__)
 @options.apply(options.reading(), options.of(Check, "limits"), options.reports, options.printing)
 def command(reading: Reading, limits: Check, reports: Reports) -> int:
-    check_reports(reports.junit, reports.sarif, overwrite=reports.overwrite)
+    check_page(reports.report_html)
+    check_reports(reports.junit, reports.sarif, reports.report_html, overwrite=reports.overwrite)
     from mracad.job import check
 
     with Progress() as progress:
@@ -28,4 +29,4 @@ def command(reading: Reading, limits: Check, reports: Reports) -> int:
         document = read(reading, text)
         progress("checking", 0, 1)
         judged = check.check(document, limits, text=text.getvalue())
-    return deliver_verdict(judged, "check", reports)
+    return deliver_verdict(judged, "check", reports, document, None)

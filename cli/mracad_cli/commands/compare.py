@@ -14,7 +14,7 @@ from mracad.spec.steps import Compare
 from mracad_cli import options
 from mracad_cli.command import Command
 from mracad_cli.options import Reading, Reports
-from mracad_cli.outputs import check_reports, deliver_verdict, read
+from mracad_cli.outputs import check_page, check_reports, deliver_verdict, read
 from mracad_cli.progress import Progress
 
 
@@ -24,7 +24,8 @@ from mracad_cli.progress import Progress
     options.reading("NEW"), options.of(Compare, "limits", without="reference"), options.reports, options.printing
 )
 def command(reference: str, reading: Reading, limits: Compare, reports: Reports) -> int:
-    check_reports(reports.junit, reports.sarif, overwrite=reports.overwrite)
+    check_page(reports.report_html)
+    check_reports(reports.junit, reports.sarif, reports.report_html, overwrite=reports.overwrite)
     from mracad.job import compare
 
     with Progress() as progress:
@@ -33,4 +34,4 @@ def command(reference: str, reading: Reading, limits: Compare, reports: Reports)
         new = read(reading)
         progress("comparing", 0, 1)
         judged = compare.compare(new, limits, lambda: old)
-    return deliver_verdict(judged, "compare", reports)
+    return deliver_verdict(judged, "compare", reports, new, old)

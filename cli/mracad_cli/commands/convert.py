@@ -7,7 +7,7 @@ import click
 from mracad_cli import options
 from mracad_cli.command import Command
 from mracad_cli.options import Reading, Writing
-from mracad_cli.outputs import check_outputs, deliver_models
+from mracad_cli.outputs import check_outputs, deliver_models, load
 from mracad_cli.say import json_text
 from mracad_cli.steps import produced
 
@@ -20,7 +20,8 @@ def command(reading: Reading, writing: Writing, as_json: bool) -> int:
     from mracad_cli.render import json, text
 
     start = time.perf_counter()
-    document, done = produced(reading, writing, check_outputs(writing), (), "convert")
+    targets = check_outputs(writing)
+    document, done = produced(reading, load(reading.file), writing, targets, (), "convert")
     found = text.found(done.made)
     valid = f"valid: {found.words}; " if found else ""
     line = f"{document.name}: {valid}wrote {text.sizes(done.made)}, {time.perf_counter() - start:.1f} s"

@@ -13,7 +13,7 @@ import click
 from mracad_cli import options
 from mracad_cli.command import Command
 from mracad_cli.options import Reading
-from mracad_cli.outputs import check_page, deliver, load, read
+from mracad_cli.outputs import check_page, check_reports, deliver, load, read
 from mracad_cli.progress import Progress
 from mracad_cli.say import json_text
 
@@ -27,7 +27,8 @@ from mracad_cli.say import json_text
     options.printing,
 )
 def command(reading: Reading, reference: str | None, output: str, overwrite: bool, as_json: bool) -> None:
-    check_page(output, overwrite)
+    check_page(output)
+    check_reports(output, overwrite=overwrite)
     from mracad.report.page import html
     from mracad_cli.render import report
 

@@ -11,6 +11,7 @@ from mracad.report.mesh import mesh
 from mracad.report.page import SVG, Figure, Page, Verdict
 from mracad.report.table import Column, Table
 from mracad_cli.render import info, json, text
+from mracad_cli.render.pages import passed
 
 if TYPE_CHECKING:
     from mracad.inspect.spectrum import Spectrum
@@ -93,7 +94,7 @@ def line(report: Told, output: str, size: int) -> str:
         f"valid: {text.verdict(body['check']['valid'])}",
     ]
     if report.reference:
-        said.append(f"compared with {report.reference.name}: {_passed(body['compare'])}")
+        said.append(f"compared with {report.reference.name}: {passed(body['compare'])}")
     return "; ".join([*said, f"wrote {output}, {text.size(size)}"])
 
 
@@ -105,7 +106,7 @@ def page(report: Told) -> Page:
     verdicts = [_valid(body["check"])]
     if "compare" in body:
         verdicts.append(
-            Verdict("comparison", _passed(body["compare"]), body["compare"]["passed"], body["compare"]["layers"])
+            Verdict("comparison", passed(body["compare"]), body["compare"]["passed"], body["compare"]["layers"])
         )
     compared = both(document, reference) if reference else []
     figures = [*compared, *alone(document, "zebra" if compared else ""), *_plots(document.name, report.spectra)]
@@ -129,10 +130,6 @@ def page(report: Told) -> Page:
 
 def _valid(body: Mapping[str, Any]) -> Verdict:
     return Verdict("valid", text.verdict(body["valid"]), body["valid"], body["layers"])
-
-
-def _passed(body: Mapping[str, Any]) -> str:
-    return "passed" if body["passed"] else f"failed ({', '.join(body['failed'])})"
 
 
 def _facts(body: Mapping[str, Any]) -> list[tuple[str, str]]:
