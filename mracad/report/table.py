@@ -77,6 +77,14 @@ class Table:
         """The cells of the first rows."""
         return [[cell(_at(record, each.key), each.sign) for each in self.shown] for record in self.records[:MOST]]
 
+    @cached_property
+    def heads(self) -> list[tuple[Column, bool]]:
+        """The columns that hold anything, and whether that is numbers."""
+        columns = zip(*self.rows, strict=True)
+        return [
+            (head, any(c.value is not None for c in cells)) for head, cells in zip(self.shown, columns, strict=True)
+        ]
+
     @property
     def left_out(self) -> int:
         """The number of records that have no row."""

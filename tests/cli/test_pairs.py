@@ -33,8 +33,8 @@ def rows(command, small, every):
 @pytest.mark.parametrize("command", declared.commands())
 def test_pairs_of_options(command, mracad, small, tmp_path, monkeypatch, pytestconfig):
     monkeypatch.setattr("mracad.job.batch.pool.Pool", declared.Here)
-    for name in ("SIZE", "PAIR"):
-        monkeypatch.setattr(f"mracad.report.figures.{name}", "96x64")
+    for name, value in (("SIZE", "96x64"), ("PAIR", "96x64"), ("ALONE", {})):
+        monkeypatch.setattr(f"mracad.report.figures.{name}", value)
     codes = Counter()
     for number, words in enumerate(rows(command, small, pytestconfig.getoption("--long"))):
         folder = tmp_path / str(number)

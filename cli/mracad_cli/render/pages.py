@@ -81,7 +81,8 @@ def edited(
         for number, (step, part) in enumerate(reversed(edits))
         for table in _tables(part, f"{number or ''}", f"{step.id}: " if len(edits) > 1 else "")
     ]
-    said = [line for step, result in pairs for line in _lines(step, result)]
+    found = text.found(done.made) if len(steps) == 1 else None
+    said = [line for step, result in pairs for line in _lines(step, result, found)]
     shown = after or before
     figures = [*(both(after, before) if after else []), *alone(shown, "zebra" if after else "")]
     asked = [(f"Step {k}" if len(steps) > 1 else "Step", step.text()) for k, step in enumerate(steps, 1)]
@@ -146,12 +147,12 @@ def _written(done: Production) -> Verdict:
     return Verdict("valid", f"{text.verdict(valid)}, in memory", valid)
 
 
-def _lines(step: Step, result: Report | Judged) -> list[str]:
+def _lines(step: Step, result: Report | Judged, found: text.Found | None) -> list[str]:
     """What is said of a step, without the time that it took."""
     from mracad.job.document import Report
 
     if isinstance(result, Report):
-        return [line.removesuffix("; ") for line in text.edit_lines(result, step.options, "")]  # type: ignore[arg-type]
+        return [line.removesuffix("; ") for line in text.edit_lines(result, step.options, "", found)]  # type: ignore[arg-type]
     return text.step_lines(step, result)
 
 
