@@ -52,6 +52,18 @@ def test_the_wheel_zooms_about_the_pointer(page):
     assert after == pytest.approx(before * np.exp(-2 * 0.0015 * 300), rel=0.05), "areas go with the square"
 
 
+def test_a_view_fits_the_model_into_the_picture(page):
+    for view in ("1,-1,1", "0,0,1", "1,0,0"):
+        page.ask(f"document.querySelector('[data-view=\"{view}\"]').click()")
+        seen = (page.seen("canvas")[2:-2, 2:-2] < 250).any(axis=2)
+        shares = []
+        for axis in (0, 1):
+            hit = np.flatnonzero(seen.any(axis=axis))
+            assert abs(hit[0] + hit[-1] - len(seen.any(axis=axis)) + 1) <= 3, "it is in the middle"
+            shares.append((hit[-1] - hit[0]) / len(seen.any(axis=axis)))
+        assert max(shares) == pytest.approx(1 / 1.08, abs=0.01)
+
+
 def test_zebra_and_edges_are_shown_as_asked(page):
     page.ask("document.querySelector('[data-view=\"1,-1,1\"]').click()")
     shaded = page.seen("canvas")

@@ -152,13 +152,27 @@ async function begin() {
     if (!waiting) requestAnimationFrame(() => { waiting = false; frame(); });
     waiting = true;
   };
+  const extent = (way) => { /* how far the model reaches along a direction */
+    let least = Infinity, most = -Infinity;
+    for (const { geometry, matrix: { elements: m } } of surfaces) {
+      const [x, y, z, shift] = [0, 4, 8, 12].map((k) => way.x * m[k] + way.y * m[k + 1] + way.z * m[k + 2]);
+      const points = geometry.attributes.position.array;
+      for (let k = 0; k < points.length; k += 3) {
+        const at = x * points[k] + y * points[k + 1] + z * points[k + 2] + shift;
+        least = Math.min(least, at);
+        most = Math.max(most, at);
+      }
+    }
+    return [least, most];
+  };
   const look = (x, y, z) => {
     eye.turn = x || y ? Math.atan2(y, x) : -Math.PI / 2;
     eye.rise = Math.atan2(z, Math.hypot(x, y));
     eye.zoom = 1;
+    const ways = axes().slice(0, 2), ends = ways.map(extent);
+    eye.spread = ends.map(([least, most]) => (most - least) / 2);
     eye.target.copy(middle);
-    const extent = high.clone().sub(low).multiplyScalar(0.5);
-    eye.spread = axes().slice(0, 2).map((way) => Math.abs(way.x) * extent.x + Math.abs(way.y) * extent.y + Math.abs(way.z) * extent.z);
+    ways.forEach((way, k) => eye.target.addScaledVector(way, (ends[k][0] + ends[k][1]) / 2 - way.dot(middle)));
     draw();
   };
   const shift = (dx, dy) => { /* pixels to the right and down */
