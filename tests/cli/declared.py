@@ -83,18 +83,13 @@ TOGETHER: Mapping[str, Sequence[tuple[str, Sequence[Words]]]] = {
     "repeat": [
         ("base band", _LEVEL),
         (
-            "at grid polar along",
+            "at grid polar along fill margin skip_off align size_by height_by",
             [
                 ("--at", "5,7,0"),
                 ("--at", "@places.csv", "--at", "#1@0.6,0.7"),
                 ("--grid", "2x2,2,2"),
                 ("--polar", "3,6,6,0,0,0,1"),
                 ("--along", "edge#1,3,3"),
-            ],
-        ),
-        (
-            "at grid polar along fill margin skip_off align size_by height_by",
-            [
                 ("--fill", "poisson,spacing:4mm", "--margin", "1mm"),
                 ("--fill", "hexagons,spacing:20%", "--align", "X"),
                 ("--fill", "grid,spacing:5", "--size-by", "distance-to:edge#1,from:0=0.5,to:9mm=1"),
