@@ -78,7 +78,7 @@ TOGETHER: Mapping[str, Sequence[tuple[str, Sequence[Words]]]] = {
     ],
     "level": [("scale level", [("--scale", "4mm"), ("--level", "1.5")])],
     "report": [("output", [("-o", "out.html")])],
-    "spectrum": [("output", [(), ("-o", "out.csv"), ("-o", "out.json")])],
+    "spectrum": [("outputs", [(), ("-o", "out.csv"), ("-o", "out.json")])],
     "move": [("base band", _LEVEL), ("to", [("--to", "5,7,0"), ("--to", "#1@0.6,0.7")])],
     "repeat": [
         ("base band", _LEVEL),

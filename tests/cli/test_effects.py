@@ -176,7 +176,7 @@ OWN = {
     "render stripes": ("--stripes 9", "--show zebra"),
     "report output": ("-o b.html",),
     "report overwrite": ("--overwrite", "OLD a.html"),
-    "spectrum output": ("-o b.csv",),
+    "spectrum outputs": ("-o b.csv",),
     "spectrum overwrite": ("--overwrite", "OLD a.csv -o a.csv"),
     "feature extract overwrite": ("--overwrite", "OLD a.feature"),
     "feature make overwrite": ("--overwrite", "OLD a.feature"),

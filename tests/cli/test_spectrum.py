@@ -49,6 +49,17 @@ def test_a_file_is_replaced_only_if_asked(mracad, tmp_path):
     assert len(read(tmp_path / "a.csv")) > 20
 
 
+def test_several_files_are_written_and_named(mracad, tmp_path):
+    result = mracad("spectrum", PANEL, "--faces", "#1", "-o", tmp_path / "a.csv", "-o", tmp_path / "a.json")
+    assert result.out.splitlines()[-1] == "wrote a.csv, a.json"
+    assert json.loads((tmp_path / "a.json").read_text())["faces"] and len(read(tmp_path / "a.csv")) > 20
+
+
+def test_a_plane_has_no_spectrum(mracad, samples):
+    result = mracad("spectrum", samples / "trimmed.step", "--faces", "#2")
+    assert (result.code, result.out) == (0, "trimmed.step: no NURBS face\n")
+
+
 def test_a_model_without_nurbs_faces_says_so(mracad, tmp_path):
     from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
 

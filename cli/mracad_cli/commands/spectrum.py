@@ -14,7 +14,7 @@ from mracad.spec.steps import Selection
 from mracad_cli import options
 from mracad_cli.command import Command
 from mracad_cli.options import Reading
-from mracad_cli.outputs import check_target, deliver, read
+from mracad_cli.outputs import check_reports, deliver, read
 from mracad_cli.progress import Progress
 from mracad_cli.say import json_text
 
@@ -36,42 +36,46 @@ ENDINGS = ".csv", ".json", *PICTURES
     click.option(
         "-o",
         "--output",
+        "outputs",
         metavar="F",
         type=options.path,
+        multiple=True,
         help="Write all bands of all faces to a .csv or .json file, or draw them: .png or .svg, with a scalogram of a "
-        "single face.",
+        "single face; repeatable.",
     ),
     options.overwrite,
     options.printing,
 )
-def command(reading: Reading, chosen: Selection, output: str | None, overwrite: bool, as_json: bool) -> None:
-    if output:
+def command(reading: Reading, chosen: Selection, outputs: tuple[str, ...], overwrite: bool, as_json: bool) -> None:
+    for output in outputs:
         if Path(output).suffix not in ENDINGS:
             raise UsageError(
                 f"cannot write {output}: unknown extension {Path(output).suffix!r}", f"use {', '.join(ENDINGS)}"
             )
-        check_target(Path(output), overwrite)
+    check_reports(*outputs, overwrite=overwrite)
     from mracad.inspect.spectrum import spectra
     from mracad.job.look import looked_at
+    from mracad.spec.select import NURBS
     from mracad_cli.render import spectrum
 
     with Progress() as progress:
         progress("reading", 0, 1)
         model, scope = looked_at(read(reading), chosen)
-        every = [i for i in sorted(scope.chosen) if model.faces[i].surface is not None]
+        every = [i for i in sorted(scope.chosen) if model.faces[i].kind in NURBS]
         found = []
         for done, face in enumerate(every):
             progress("measuring waves", done, len(every))
             found += spectra(model, [face])
     body = json_text(spectrum.body(model.name, found))
-    if output and output.endswith(PICTURES) and not found:
+    if not found and any(output.endswith(PICTURES) for output in outputs):
         raise EditError(f"{model.name}: there is no NURBS face to draw", "choose others with --faces")
     forms: dict[str, Callable[[], str | bytes]] = {
         ".csv": lambda: spectrum.csv(found),
         ".json": lambda: body + "\n",
     } | {form: partial(_drawn, model, found, form[1:]) for form in PICTURES}
-    files: dict[str, str | bytes | None] = {output: forms[Path(output).suffix]()} if output else {}
-    deliver(files, [body] if as_json else spectrum.lines(model.name, found))
+    files: dict[str, str | bytes | None] = {output: forms[Path(output).suffix]() for output in outputs}
+    written = [f"wrote {', '.join(Path(output).name for output in outputs)}"] if outputs else []
+    deliver(files, [body] if as_json else [*spectrum.lines(model.name, found), *written])
 
 
 def _drawn(model: Model, found: Sequence[Spectrum], form: str) -> bytes:

@@ -87,6 +87,9 @@ def along(ground: Ground, of: Array, edge: int, step: float) -> Spots:
 
 def _spots(patch: Patch, face: Face, of: Array, uv: Array) -> Spots:
     points, _, _, normals = patch.evaluate(uv)
+    poles = np.linalg.norm(normals, axis=1) < 0.5
+    if poles.any():
+        normals[poles] = np.nan_to_num(patch.signs(uv[poles])[:, None] * patch.net.normals(uv[poles]))
     surface, own, part = (np.full(len(uv), x) for x in (patch.index, face.index, of[face.index]))
     return Spots(surface, own, part, uv, points, normals)
 

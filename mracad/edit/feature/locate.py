@@ -102,7 +102,8 @@ def told(off: Collection[str]) -> str:
 
 
 def stood(ground: Ground, places: Sequence[Place], far: float) -> tuple[Feet, dict[str, int]]:
-    """The feet of places, and words about those farther than ``far`` (mm) from the ground, with their indices."""
+    """The feet of places, and words about those farther than ``far`` (mm) from the ground, or at its poles, with their
+    indices."""
     points = np.array([p.point for p in places]).reshape(-1, 3)
     given = np.array([p.face is not None for p in places], bool)
     feet = ground.feet(points[~given])
@@ -113,12 +114,14 @@ def stood(ground: Ground, places: Sequence[Place], far: float) -> tuple[Feet, di
     feet = ground.standing(surface, uv, apart)
     on = np.isfinite(apart) & (ground.faces(surface, uv) >= 0)
     bad = ~on | ~(given | ((apart <= far) & (feet.beside(points) <= SIDEWAYS * far)))
+    poles = on & (np.linalg.norm(feet.normals, axis=1) < 0.5)
     off = {}
-    for i in np.flatnonzero(bad).tolist():
+    for i in np.flatnonzero(bad | poles).tolist():
         name = places[i].label
         if "(" not in name:
             name += f" ({','.join(f'{round(x, 6) + 0.0:g}' for x in points[i])})"
-        off[f"{name} is {f'{apart[i]:.3g} mm away from' if on[i] else 'not on'} the faces to edit"] = i
+        where = f"{apart[i]:.3g} mm away from" if on[i] else "not on"
+        off[f"{name} is at a pole" if poles[i] else f"{name} is {where} the faces to edit"] = i
     return feet, off
 
 

@@ -149,14 +149,14 @@ def refuse(copies: Copies, found: Sequence[Copy], clip: bool) -> None:
     for copy, height in zip(found, heights, strict=True):
         if copy.short > SHORT * height:
             raise EditError(
-                f"{copy.place}: the faces there cannot hold the copy: it would deviate by "
+                f"{_at(copy)}: the faces there cannot hold the copy: it would deviate by "
                 f"{100 * copy.short / height:.0f} % of its height ({_numbers(copy)})",
-                "make it smaller with --size, or choose another place",
+                "make it smaller with --size, or choose other places",
             )
     for copy, height in zip(found, heights, strict=True):
         if copy.lost > LOST * height and not clip:
             raise EditError(
-                f"{copy.place}: edges or holes that stay in place cut off {100 * min(copy.lost / height, 1):.0f} % of "
+                f"{_at(copy)}: edges or holes that stay in place cut off {100 * min(copy.lost / height, 1):.0f} % of "
                 f"the copy's height ({_numbers(copy)})",
                 "move it away from them, make it smaller with --size, or allow that with --clip",
             )
@@ -164,3 +164,8 @@ def refuse(copies: Copies, found: Sequence[Copy], clip: bool) -> None:
 
 def _numbers(copy: Copy) -> str:
     return " ".join(f"#{i + 1}" for i in copy.faces)
+
+
+def _at(copy: Copy) -> str:
+    """The name of its place, with coordinates."""
+    return copy.place if "(" in copy.place else f"{copy.place} ({','.join(f'{x:.6g}' for x in copy.at)})"
