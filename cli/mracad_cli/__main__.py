@@ -6,6 +6,7 @@ import importlib
 import io
 import os
 import sys
+import traceback
 from collections.abc import Sequence
 
 import click
@@ -64,7 +65,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return run(group, words, guarded=arguments is None)
     except MracadError as error:
         if "--debug" in words:
-            raise
+            traceback.print_exception(error)
         failure = error
     except KeyboardInterrupt:
         failure = MracadError("interrupted", "nothing was written", Code.INTERRUPTED)

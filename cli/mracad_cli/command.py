@@ -23,7 +23,7 @@ class Command(click.Command):
 
     def invoke(self, ctx: click.Context) -> int:
         def work() -> int:
-            with told(debug):
+            with told():
                 code = click.Command.invoke(self, ctx)
                 sys.stdout.flush()
             return code if isinstance(code, int) else 0
@@ -47,8 +47,8 @@ class Group(click.Group):
 
 
 @contextlib.contextmanager
-def told(debug: bool | None) -> Iterator[None]:
-    """Turn exceptions in the block into MracadErrors; with ``debug`` unexpected ones are raised as they are."""
+def told() -> Iterator[None]:
+    """Turn exceptions in the block into MracadErrors."""
     try:
         yield
     except (MracadError, MemoryError, click.ClickException, click.exceptions.Exit):
@@ -59,8 +59,6 @@ def told(debug: bool | None) -> Iterator[None]:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # discard the rest of the output
         raise MracadError("standard output was closed", "", Code.FILE) from error
     except Exception as error:
-        if debug:
-            raise
         if not type(error).__module__.startswith("OCP"):
             raise internal(error) from error
         what = f"{type(error).__name__}: {error}"
@@ -71,7 +69,7 @@ def told(debug: bool | None) -> Iterator[None]:
 def run(group: click.Group, arguments: list[str], *, guarded: bool) -> int:
     """Run a command of a group; returns its exit code, and raises every failure as a MracadError."""
     try:
-        with told("--debug" in arguments):
+        with told():
             code: Any = group.main(arguments, prog_name="mracad", standalone_mode=False, obj=guarded)
             sys.stdout.flush()
     except click.exceptions.NoArgsIsHelpError as error:

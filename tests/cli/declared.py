@@ -16,7 +16,7 @@ from mracad_cli.__main__ import group
 Words = tuple[str, ...]
 
 COVERED_ELSEWHERE = {
-    "debug": "it lets errors through",
+    "debug": "tests/cli/test_errors.py",
     "cluster": "it starts one: tests/job/batch/test_cluster.py",
 }
 

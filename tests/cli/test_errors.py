@@ -153,3 +153,9 @@ def test_two_files_of_one_name(mracad, samples, tmp_path):
         one_line(mracad("smooth", blade, "--scale", "5%", *words), 2)
     one_line(mracad("check", blade, "--junit", one, "--sarif", tmp_path / "." / "one.step"), 2)
     assert not list(tmp_path.iterdir())
+
+
+def test_debug_shows_the_traceback_of_an_error_and_nothing_else_changes(mracad, tmp_path):
+    plain, debug = (mracad("info", tmp_path / "none.step", *words) for words in ((), ("--debug",)))
+    assert debug.code == plain.code == 3 and "Traceback" not in plain.err
+    assert debug.err.startswith("Traceback") and debug.err.endswith(plain.err)
