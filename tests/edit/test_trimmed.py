@@ -75,7 +75,7 @@ def test_a_trimmed_seam_moves_and_holds(rough_halves):
 
 
 def test_a_model_that_was_never_sewn_moves_like_a_sewn_one(rough_halves):
-    """As nearly as the edges of both faces lie together."""
+    """Within a seventh of what moves: the conditions along two trim curves are not those along one."""
     _, left, right = rough_halves
     y, moved = np.linspace(10, 190, 200), []
     for sewn in (True, False):
@@ -83,10 +83,10 @@ def test_a_model_that_was_never_sewn_moves_like_a_sewn_one(rough_halves):
         (old, _), (new, _) = seam(before), seam(after)
         assert old.sewn is sewn
         assert sum(t.how == "to tolerance" for t in report.edit.edges) == 2 - sewn
-        assert new.gap <= old.gap + 1e-4 and new.angle <= old.angle + 0.008
+        assert old.gap < 1e-3 and new.gap <= 1e-4 and new.angle <= old.angle + 0.008
         moved.append(after.surfaces[0].net.evaluate(np.stack([halves.waist(y) - 1.0, y], axis=1))[:, 2])
     still = left.evaluate(np.stack([halves.waist(y) - 1.0, y], axis=1))[:, 2]
-    assert np.abs(moved[1] - moved[0]).max() < old.gap < 0.25 * np.abs(moved[0] - still).max()
+    assert np.abs(moved[1] - moved[0]).max() < 0.14 * np.abs(moved[0] - still).max()
 
 
 @pytest.mark.parametrize("keep", ["g1", "g2"])
