@@ -131,7 +131,7 @@ def source(text: str, name: str) -> Source:
         what, given = split(text)
         kind = "outline" if what.lower().endswith(OUTLINES) else "heightmap"
     _known(kind, given, name)
-    sizes = {key: _LENGTH.read(value, f"{name}: {key}") for key, value in given.items() if key != "seed"}
+    sizes = {key: _size(key, value, name) for key, value in given.items() if key != "seed"}
     if kind == "outline":
         return Outline(what, **sizes)
     if kind == "formula":
@@ -148,10 +148,23 @@ def _known(kind: str, given: Mapping[str, str], name: str) -> None:
     keys = _KEYS[kind].split()
     for key in given:
         if key not in keys:
-            raise UsageError(f"{name}: a {kind} takes no {key!r}", f"it takes {', '.join(keys)}")
+            raise UsageError(
+                f"{name}: {'an' if kind == 'outline' else 'a'} {kind} takes no {key!r}", f"it takes {', '.join(keys)}"
+            )
     for key in _NEEDED[kind].split():
         if key not in given:
             raise UsageError(f"{name}: the {key} of the {kind} is missing", f"give it, as {key}:5mm")
+
+
+def _size(key: str, value: str, name: str) -> float:
+    """A length of a source, mm; raises UsageError."""
+    try:
+        return _LENGTH.read(value, f"{name}: {key}")
+    except UsageError as error:
+        hint = f"write {key}:5mm or {key}:0.2in"
+        if key == "height" and value.startswith("-"):
+            hint += ", and turn copies inwards with --height -1"
+        raise UsageError(error.message, hint) from error
 
 
 def _texture(what: str, sizes: Mapping[str, float], seed: str, name: str) -> Texture:

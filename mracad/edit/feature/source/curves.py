@@ -21,6 +21,7 @@ PIECES = 96
 """Chords of a curved segment."""
 
 _PIXEL = 25.4 / 96
+_KINDS = {"svg": "an SVG", "dxf": "a DXF"}
 _CHUNK = 4096
 
 
@@ -53,19 +54,19 @@ class Shape:
         return np.asarray(found % 2 != 0 if self.odd else found != 0)
 
 
-def shapes(file: Path) -> list[Shape]:
-    """The filled shapes of a file; raises FileError."""
+def shapes(file: Path) -> tuple[list[Shape], tuple[str, ...]]:
+    """The filled shapes of a file, and notes on what was assumed about their size; raises FileError."""
     kind = file.suffix.lower()[1:]
     try:
         if file.stat().st_size > MOST_BYTES:
             raise FileError(f"'{file.name}' is larger than {MOST_BYTES // 10**6} MB", "simplify it")
-        found = _svg(file) if kind == "svg" else _dxf(file)
+        found, notes = (_svg(file), ()) if kind == "svg" else _dxf(file)
     except FileError:
         raise
     except OSError as error:
         if error.strerror is None:
             raise _damaged(file, kind) from error
-        raise FileError(f"cannot read '{file}': {error.strerror}", f"give the path of a {kind.upper()} file") from error
+        raise FileError(f"cannot read '{file}': {error.strerror}", f"give the path of {_KINDS[kind]} file") from error
     found = [Shape(loops, each.odd) for each in found if (loops := tuple(filter(_encloses, each.loops)))]
     if not found:
         message = f"'{file.name}' contains no closed outline"
@@ -75,11 +76,11 @@ def shapes(file: Path) -> list[Shape]:
         raise _damaged(file, kind)
     if len(points) > MOST_POINTS:
         raise FileError(f"'{file.name}' has more than {MOST_POINTS} points", "simplify it")
-    return found
+    return found, notes
 
 
 def _damaged(file: Path, kind: str) -> FileError:
-    return FileError(f"'{file.name}' is not a {kind.upper()} file, or damaged", "export it again")
+    return FileError(f"'{file.name}' is not {_KINDS[kind]} file, or damaged", "export it again")
 
 
 def _encloses(loop: Array) -> bool:
@@ -152,15 +153,16 @@ def _loops(drawn: Any) -> Iterator[Array]:
             yield np.concatenate(points) * (_PIXEL, -_PIXEL)
 
 
-def _dxf(file: Path) -> list[Shape]:
-    """The closed curves of a DXF file, by the even-odd rule; lines and arcs that meet are joined."""
+def _dxf(file: Path) -> tuple[list[Shape], tuple[str, ...]]:
+    """The closed curves of a DXF file, by the even-odd rule, and a note if it states no unit; lines and arcs that meet
+    are joined."""
     import ezdxf
     from ezdxf import disassemble, path, units
 
     try:
         document = ezdxf.readfile(file)
-        factor = units.conversion_factor(units.InsertUnits(document.units), units.InsertUnits.Millimeters)
-        factor = factor if document.units else 1.0
+        unit = units.InsertUnits(document.units) or units.InsertUnits.Millimeters
+        factor = units.conversion_factor(unit, units.InsertUnits.Millimeters)
         parts = list(islice(disassemble.recursive_decompose(document.modelspace()), MOST_PARTS + 1))
         if len(parts) > MOST_PARTS:
             raise FileError(f"'{file.name}' has more than {MOST_PARTS} entities", "simplify it")
@@ -172,7 +174,8 @@ def _dxf(file: Path) -> list[Shape]:
         raise
     except (ezdxf.DXFError, UnicodeDecodeError, ValueError, TypeError, KeyError, IndexError, RecursionError) as error:
         raise _damaged(file, "dxf") from error
-    return [Shape(tuple(joined(lines)), True)]
+    notes = () if document.units else ("the file states no unit: its numbers are taken as mm",)
+    return [Shape(tuple(joined(lines)), True)], notes
 
 
 def _curves(path: Any, entity: Any) -> list[Any]:

@@ -61,14 +61,30 @@ def relief(given: Formula, width: float | None) -> Relief:
     window = taper((np.hypot(x, y) - given.radius) / max(width, 1e-9))
     with np.errstate(all="ignore"):
         heights = np.broadcast_to(evaluated(given.text, x, y), x.shape)
-    bad = np.argwhere(~(np.abs(heights) < 1e6) & (window > 0))
+    bad = np.argwhere(~_high(heights) & (window > 0))
     if len(bad):
-        i, j = bad[np.argmin(np.hypot(at[bad[:, 0]], at[bad[:, 1]]))]
-        raise UsageError(
-            f"formula: {given.text!r} has no height at x = {at[i]:.4g}, y = {at[j]:.4g} mm",
-            "give one that has within its radius and taper",
-        )
-    return Relief(np.where(window > 0, heights, 0.0) * window, 2 * side / CELLS, window)
+        raise _nowhere(given.text, at[bad], side)
+    return Relief(np.where(window > 0, heights, 0.0) * window, 2 * side / CELLS, window, disc=side)
+
+
+def _high(heights: Array) -> Array:
+    """Which numbers are heights."""
+    return np.asarray(np.abs(heights) < 1e6)
+
+
+def _nowhere(text: str, places: Array, side: float) -> UsageError:
+    """The error for a formula without heights at some places ``(q, 2)``; names that nearest to the middle."""
+    away = np.hypot(*places.T)
+    place = places[np.argmin(away)]
+    with np.errstate(all="ignore"):
+        for digits in range(4, 18):
+            shown = [f"{number:.{digits}g}" for number in place]
+            if not _high(evaluated(text, *np.array(shown, float)[:, None])).all():
+                break
+    hint = f"give one that has a height everywhere up to {side:.4g} mm from the middle, where its taper ends"
+    if away.min() > side / 20:
+        hint += ", or a smaller radius"
+    return UsageError(f"formula: {text!r} has no height at x = {shown[0]}, y = {shown[1]} mm", hint)
 
 
 def evaluated(text: str, x: Array, y: Array) -> Array:
@@ -105,6 +121,8 @@ def _value(node: ast.expr, names: Mapping[str, Array]) -> Array:
             return names[name]
         case ast.BinOp(left=left, op=op, right=right) if type(op) in _BINARY:
             return _BINARY[type(op)](_value(left, names), _value(right, names))
+        case ast.BinOp(op=ast.BitXor()):
+            raise _Unknown(node, "powers are written with **, not ^")
         case ast.UnaryOp(op=sign, operand=operand) if type(sign) in _UNARY:
             return _UNARY[type(sign)](_value(operand, names))
         case ast.Call(func=ast.Name(id=name), args=args, keywords=[]) if name in FUNCTIONS:

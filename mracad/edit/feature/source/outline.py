@@ -41,7 +41,7 @@ def relief(given: Outline) -> Relief:
     from scipy.ndimage import gaussian_filter
 
     file = Path(given.path)
-    found = shapes(file)
+    found, assumed = shapes(file)
     corners = np.concatenate([loop for shape in found for loop in shape.loops])
     low, high = corners.min(axis=0), corners.max(axis=0)
     scale = 1.0 if given.width is None else given.width / float(high[0] - low[0])
@@ -55,7 +55,7 @@ def relief(given: Outline) -> Relief:
     distance = signed(found, axes, 0.5 * width + 4 * ROUND * width, cell, file.name)
     distance = gaussian_filter(distance, ROUND * width / cell, mode="nearest")
     heights = given.height * (1 - taper(0.5 + distance / width))
-    notes = []
+    notes = list(assumed) if given.width is None else []
     if width > asked:
         notes.append(f"flanks {width:.3g} mm wide, the narrowest that a net of this size can hold")
     if heights.max() < 0.99 * given.height:
@@ -64,7 +64,7 @@ def relief(given: Outline) -> Relief:
         )
     ends = [1 - taper((x - x[0]) / width) for x in axes]
     window = np.outer(*(np.minimum(end, end[::-1]) for end in ends))
-    return Relief(heights, cell, window, notes=tuple(notes))
+    return Relief(heights, cell, window, notes=tuple(notes), called="with its flanks it is")
 
 
 def signed(found: Sequence[Shape], axes: Sequence[Array], band: float, cell: float, name: str) -> Array:

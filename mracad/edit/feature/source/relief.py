@@ -26,6 +26,9 @@ ROUND, SHARP = 0.7, 1.2
 """Standard deviations of the rounding, over the width of a span: at 0.7 a step overshoots by 0.3 %, at 0.5 by 3 %.
 Edges as steep as that cannot be matched across the seams of patches of other parameters; at 1.2 they can."""
 
+BLUR = 3.5
+"""Standard deviations at which the Gaussian of the rounding ends."""
+
 STEEP = 4.0
 """Where rounding takes more than so many times its allowed error, edges are sharp."""
 
@@ -57,6 +60,10 @@ class Relief:
         Error of the heights, root mean square, mm.
     notes : tuple of str
         What was taken for what.
+    disc : float or None
+        Radius outside which the window is 0, mm; None for a rectangle.
+    called : str
+        What a note calls the rectangle.
     """
 
     heights: Array
@@ -64,6 +71,8 @@ class Relief:
     window: Array
     grain: float = 0.0
     notes: tuple[str, ...] = ()
+    disc: float | None = None
+    called: str = "it is"
 
     @property
     def height(self) -> float:
@@ -73,6 +82,11 @@ class Relief:
     def sides(self) -> Array:
         """Its width and depth, mm."""
         return self.cell * np.array(self.heights.shape)
+
+    @property
+    def radius(self) -> float:
+        """Radius of the disc that holds it, mm."""
+        return float(np.linalg.norm(self.sides)) / 2 if self.disc is None else self.disc
 
 
 def bordered(
@@ -122,7 +136,7 @@ def tabulated(relief: Relief, name: str, spacing: float | None = None) -> Featur
     """
     if not relief.height > 1e-7:
         raise EditError(f"feature {name}: nothing stands out in it", "give one with heights")
-    radius = float(np.linalg.norm(relief.sides)) / 2
+    radius = relief.radius
     least = 4 * radius / ((CELLS if spacing is None else MOST_CELLS) - 16)
     spectrum = _Spectrum.of(relief)
     if spacing is not None and not least <= spacing <= radius / FEWEST:
@@ -134,11 +148,26 @@ def tabulated(relief: Relief, name: str, spacing: float | None = None) -> Featur
     loss = spectrum.loss(rounding)
     notes = relief.notes
     if loss > LOSS * relief.height:
-        share = 100 * loss / relief.height
-        notes = (*notes, f"knots {width:.3g} mm apart round its edges: {share:.1f} % of its height (rms)")
-    pad = int(np.ceil(3.5 * rounding / relief.cell)) + 2
-    table = _table(relief, radius + pad * relief.cell, width, rounding, pad)
-    return Feature(radius, radius + pad * relief.cell, width, table, name, notes=notes)
+        coarser = 2 * width if spacing is None and 2 * width <= radius / FEWEST else None
+        notes = (*notes, _rounded(width, loss / relief.height, coarser))
+    if relief.disc is None:
+        wide, deep = relief.sides
+        notes = (*notes, f"{relief.called} {wide:.4g} × {deep:.4g} mm, {2 * radius:.3g} mm from corner to corner")
+    pad = int(np.ceil(BLUR * rounding / relief.cell)) + 2
+    reach = radius + (pad * relief.cell if relief.disc is None else BLUR * rounding)
+    table = _table(relief, reach, width, rounding, pad)
+    return Feature(radius, reach, width, table, name, notes=notes)
+
+
+def _rounded(width: float, share: float, coarser: float | None) -> str:
+    """The note for edges that knots round, and the spacing that makes a smaller file, if there is one."""
+    note = (
+        f"its edges are rounded, because knots are no closer than {width:.3g} mm: "
+        f"it differs from the source by {100 * share:.1f} % of its height (rms)"
+    )
+    return (
+        note if coarser is None else f"{note}; a coarser spacing, such as spacing:{coarser:.2g}mm, makes files smaller"
+    )
 
 
 def _table(relief: Relief, reach: float, width: float, rounding: float, pad: int) -> Array:
@@ -153,7 +182,7 @@ def _table(relief: Relief, reach: float, width: float, rounding: float, pad: int
     for channel, values, order in ((2, relief.heights, 3), (3, relief.window, 1)):
         padded = np.pad(values, pad)
         if channel == 2 and rounding:
-            padded = gaussian_filter(padded, rounding / relief.cell, mode="constant", truncate=3.5)
+            padded = gaussian_filter(padded, rounding / relief.cell, mode="constant", truncate=BLUR)
         table[..., channel] = map_coordinates(padded, at, order=order, mode="constant")
     table[..., 3] = np.clip(table[..., 3], 0.0, 1.0)
     return table

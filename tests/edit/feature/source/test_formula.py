@@ -1,5 +1,7 @@
 """Formulas: closed forms, and texts that are none."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -35,6 +37,27 @@ def test_a_taper_begins_at_the_radius():
     assert build("0.5+0*x").lookup(ring)[:, 2] == pytest.approx([0, 0], abs=2e-3)
 
 
+def test_a_formula_reaches_no_farther_than_its_taper():
+    for feature, end in ((build("0.3*cos(2*pi*x/5)"), 12.5), (build("0.5+0*x", taper=6.0), 16.0)):
+        assert feature.radius == feature.reach == pytest.approx(end)
+    sharp = build("0.3*sign(x)")  # rounding carries heights beyond the window
+    assert sharp.radius == pytest.approx(12.5) and sharp.radius < sharp.reach < 12.5 + 4.5 * sharp.spacing
+
+
+def test_the_place_without_a_height_has_none_by_its_digits():
+    for formula, function in (
+        ("sqrt(25-x**2-y**2)", lambda x, y: 25 - x**2 - y**2),
+        ("log(50-hypot(x,y)**2)", lambda x, y: 50 - np.hypot(x, y) ** 2),
+    ):
+        with pytest.raises(UsageError, match=r"up to 12\.5 mm .* or a smaller radius") as error:
+            build(formula)
+        x, y = re.search(r"x = (\S+), y = (\S+) mm", error.value.message).groups()
+        assert function(float(x), float(y)) < 0
+    with pytest.raises(UsageError) as error:
+        build("1/x")
+    assert "smaller radius" not in str(error.value)
+
+
 @pytest.mark.parametrize(
     ("formula", "said"),
     [
@@ -44,6 +67,7 @@ def test_a_taper_begins_at_the_radius():
         ("[x for x in y]", "character 1"),
         ("sin(x", "not a formula"),
         ("sin(x,y)", "character 1: sin takes 1 argument"),
+        ("1+x^2", "character 1: powers are written with **, not ^"),
         ("2*foo(x)", "character 3: foo(x) is not known"),
         ("x if y else 1", "is not known"),
         ("'a'", "is not known"),

@@ -1,6 +1,7 @@
 """Heightmaps: what comes back from the heights that they were made of, and files that are none."""
 
 import pickle
+import re
 import struct
 import zlib
 
@@ -89,6 +90,17 @@ def test_a_logo_of_1024_pixels_keeps_its_edges_at_a_tenth_of_a_millimetre(logo):
     assert found.min() > -1e-3 * 0.4 and found.max() < 1.001 * 0.4  # nothing rings
     r = np.hypot(*np.meshgrid(*2 * [np.linspace(-15, 15, 1024)]))
     assert np.abs(found[r < 7.0] - 0.4).max() < 1e-4 and np.abs(found[r > 8.0]).max() < 1e-4
+
+
+def test_notes_say_what_rounding_takes_how_to_save_points_and_how_large_it_is(logo):
+    free, given = (build(logo[0], f"width:30mm,height:0.4mm{more}").notes for more in ("", ",spacing:0.1mm"))
+    for notes in (free, given):
+        assert any("edges are rounded" in note and "differs from the source by" in note for note in notes)
+        assert notes[-1] == "it is 30 × 30 mm, 42.4 mm from corner to corner"
+    text = " ".join(free)
+    coarser = float(re.search(r"coarser spacing, such as spacing:(\S+)mm, makes files smaller", text)[1])
+    apart = [build(logo[0], f"width:30mm,height:0.4mm{more}").spacing for more in ("", f",spacing:{coarser}mm")]
+    assert apart[1] > 1.8 * apart[0] and "coarser" not in " ".join(given)
 
 
 def test_a_soft_logo_of_1024_pixels_is_held_to_half_a_per_cent(tmp_path):

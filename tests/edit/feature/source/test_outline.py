@@ -1,5 +1,7 @@
 """Outlines: flat tops, flanks by the distance from curves, rules of filling, units; files without outlines."""
 
+import re
+
 import ezdxf
 import numpy as np
 import pytest
@@ -86,6 +88,27 @@ def test_units_of_svg_and_dxf_and_a_width(tmp_path):
     assert at(build(tmp_path / "inch.dxf"), (12.7, 0.0), (0.0, 0.0)) == pytest.approx([0.5, 1.0], abs=0.02)
 
 
+def test_a_dxf_without_a_unit_is_in_mm_and_a_note_says_so(tmp_path):
+    found = {}
+    for unit in (0, 4):
+        document = ezdxf.new(units=unit)
+        document.modelspace().add_circle((3, 3), 10)
+        document.saveas(tmp_path / f"{unit}.dxf")
+        found[unit] = build(tmp_path / f"{unit}.dxf")
+    assert np.array_equal(found[0].table, found[4].table)
+    assert [any("states no unit" in note for note in found[unit].notes) for unit in (0, 4)] == [True, False]
+    scaled = build(tmp_path / "0.dxf", f"height:{HEIGHT},edge:{EDGE},width:30mm")
+    assert not any("states no unit" in note for note in scaled.notes)
+
+
+def test_a_note_gives_the_sides_with_the_flanks(tmp_path):
+    feature = build(svg(tmp_path / "bar.svg", '<rect width="30" height="10"/>'))
+    sides = re.search(r"with its flanks it is (\S+) × (\S+) mm, (\S+) mm from corner to corner", feature.notes[-1])
+    wide, deep, across = map(float, sides.groups())
+    assert wide == pytest.approx(30 + 2 * WIDTH, abs=0.2) and deep == pytest.approx(10 + 2 * WIDTH, abs=0.2)
+    assert across == pytest.approx(np.hypot(wide, deep), abs=0.1)
+
+
 def test_lines_and_arcs_of_dxf_are_joined_and_holes_stay_open(tmp_path):
     document = ezdxf.new(units=4)
     space = document.modelspace()
@@ -118,8 +141,8 @@ BOMB = (
 )
 BAD = {
     "empty.svg": ("<svg xmlns='http://www.w3.org/2000/svg'/>", "no closed outline"),
-    "text.svg": ("no outline", "not a SVG file"),
-    "blank.svg": ("", "not a SVG file"),
+    "text.svg": ("no outline", "not an SVG file"),
+    "blank.svg": ("", "not an SVG file"),
     "line.svg": ("<svg xmlns='http://www.w3.org/2000/svg'><path d='M0 0 L10 0'/></svg>", "no closed outline"),
     "bad.svg": ("<svg xmlns='http://www.w3.org/2000/svg'><path d='M0 0 Lx y Z'/></svg>", "no closed outline"),
     "bomb.svg": (f"<svg xmlns='http://www.w3.org/2000/svg'>{BOMB}</svg>", "elements"),
@@ -128,7 +151,7 @@ BAD = {
         "<!DOCTYPE s [<!ENTITY a 'aaaaaaaaaa'>"
         + "".join(f"<!ENTITY {b} '{f'&{a};' * 10}'>" for a, b in zip("abcdefghi", "bcdefghij", strict=True))
         + "]><svg xmlns='http://www.w3.org/2000/svg'><text>&j;</text></svg>",
-        "not a SVG file",
+        "not an SVG file",
     ),
     "text.dxf": ("no outline", "not a DXF file"),
     "blank.dxf": ("", "not a DXF file"),
@@ -146,4 +169,5 @@ def test_files_without_an_outline_are_refused_in_one_line(tmp_path, name):
         document.saveas(tmp_path / name)
     with pytest.raises(FileError) as error:
         build(tmp_path / name)
+    assert "a SVG" not in str(error.value)
     assert said in str(error.value) and "\n" not in str(error.value) and error.value.code == Code.FILE
