@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
 
 from mracad.bspline.curve import Curve
 from mracad.bspline.surface import Net
-from mracad.bspline.vectors import cross
+from mracad.bspline.vectors import cross, unit
 from mracad.model.rails import Elementary
 
 Array = np.ndarray
@@ -151,6 +152,13 @@ class Facets:
     ground: Ground
     outward: int
     rims: Mapping[int, Array]
+
+    @cached_property
+    def off(self) -> float:
+        """The largest distance of the middle of a triangle from the surface, along the normal there, mm."""
+        points, uv = (values[self.corners].mean(axis=1) for values in (self.points, self.uv))
+        s, su, sv = self.ground.jets(uv, 1)
+        return float(np.abs(((s - points) * unit(cross(su, sv))).sum(axis=1)).max())
 
 
 @dataclass(frozen=True, eq=False)

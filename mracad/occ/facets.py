@@ -35,6 +35,9 @@ from mracad.occ.topology import box, compound, edge_uses, matrix, nodes, placed
 
 Array = np.ndarray
 
+_FINER = 1.0, 0.4  # of the angle: what is tried in turn
+_OFF = 10.0  # chords: the kernel has left a face unfinished where a triangle is farther off
+
 
 @dataclass(frozen=True, eq=False)
 class _Asked:
@@ -74,20 +77,33 @@ def facets(document: Document, chord: float, angle: float) -> Body:
     size = float(np.linalg.norm(bounds[1] - bounds[0]))
     with quiet():
         whole = compound(part.shape for part in document.parts)
-        BRepTools.Clean_s(whole)
-        BRepMesh_IncrementalMesh(whole, chord * size, False, float(np.radians(angle)))
         grounds = _grounds(document)
-        every = {
-            index: found
-            for part in document.parts
-            for index in part.numbers
-            if (found := _facets(document, part, index, grounds[index]))
-        }
+        every: dict[int, Facets] = {}
+        least = np.inf
+        for share in _FINER:
+            BRepTools.Clean_s(whole)
+            BRepMesh_IncrementalMesh(whole, chord * size, False, float(np.radians(share * angle)))
+            found = _collected(document, grounds)
+            off = max((each.off for each in found.values()), default=0.0)
+            if off < least:
+                every, least = found, off
+            if least <= _OFF * chord * size:
+                break
         BRepTools.Clean_s(whole)
     instances = tuple(_placed(document))
     ends = [_extent(placed(each.points, place.frame)) for place in instances for each in _of(every, place)]
     low, high = np.array(ends).reshape(-1, 2, 3).swapaxes(0, 1) if ends else np.zeros((2, 1, 3))
     return Body(document.name, every, instances, float(np.linalg.norm(high.max(axis=0) - low.min(axis=0))))
+
+
+def _collected(document: Document, grounds: list[Ground]) -> dict[int, Facets]:
+    """The triangles that the kernel keeps with the faces."""
+    return {
+        index: found
+        for part in document.parts
+        for index in part.numbers
+        if (found := _facets(document, part, index, grounds[index]))
+    }
 
 
 def _of(every: dict[int, Facets], place: Placed) -> Iterator[Facets]:

@@ -17,10 +17,12 @@ Array = np.ndarray
 CELLS = 250
 """Largest distance between the samples from which nearest points are sought, as a part of the diagonal."""
 
-_NEIGHBOURS = 64  # samples among which another face is sought
+_NEIGHBOURS = 64  # samples among which other faces are sought
+_STARTS = 8  # of Newton's method, of those, where a foot lies at the end of a face
+_INWARD = 0.1  # of their spacing, to the middle of their triangles: samples are on no seam and at no pole
 _STEPS = 8  # of Newton's method
 _BEYOND = 0.01  # of a face: how far its surface goes on
-_DONE = 1e-10  # of the diagonal: a step that ends it
+_DONE = 1e-10  # of the diagonal: a step that ends it, and the least distance
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,18 +32,22 @@ class Reference:
     Attributes
     ----------
     entries : list of (Placed, Facets)
-    entry : ndarray of int (n,)
-        The face of each sample.
-    uv : ndarray (n, 2)
-    tree : scipy.spatial.cKDTree
-        Of the samples.
+    uv : list of ndarray (n, 2)
+        The samples of each face.
+    trees : list of scipy.spatial.cKDTree
+        Of the samples of each face.
+    thin : scipy.spatial.cKDTree
+        Of some samples, as dense on all faces.
+    owner : ndarray of int (m,)
+        The face of each of these.
     diagonal : float
     """
 
     entries: list[tuple[Placed, Facets]]
-    entry: Array
-    uv: Array
-    tree: Any
+    uv: list[Array]
+    trees: list[Any]
+    thin: Any
+    owner: Array
     diagonal: float
 
     @classmethod
@@ -56,37 +62,59 @@ class Reference:
             mixed = [(shares[:, :, None] * values[corner]).sum(axis=1) for values in (facets.points, facets.uv)]
             points.append(mixed[0] @ place.frame[:3, :3].T + place.frame[:3, 3])
             uv.append(mixed[1])
-        owner = np.repeat(np.arange(len(entries)), [len(each) for each in uv])
-        return cls(entries, owner, np.concatenate(uv), cKDTree(np.concatenate(points)), body.diagonal)
+        some = [each[_thinned(each, 0.5 * body.diagonal / CELLS)] for each in points]
+        owner = np.repeat(np.arange(len(entries)), [len(each) for each in some])
+        return cls(entries, uv, [cKDTree(each) for each in points], cKDTree(np.concatenate(some)), owner, body.diagonal)
 
     def deviation(self, stage: Stage, seen: Seen) -> Array:
         """Distances of places from the nearest point, mm, positive on the outer side of its face."""
         points = seen.point.T
-        near = self.tree.query(points)[1]
-        found, ended = self._off(points, near)
-        if not ended.any():
-            return found
-        rim = np.flatnonzero(ended)  # the nearest point may lie on a face beside it
-        around = self.tree.query(points[rim], min(_NEIGHBOURS, len(self.entry)))[1]
-        owners = self.entry[around]
+        found = np.full(len(points), np.inf)
+        owner = self.owner[self.thin.query(points)[1]]
+        self._approach(points, found, owner)
+        left = np.flatnonzero(np.abs(found) > _DONE * self.diagonal)  # the nearest point may lie on a face beside it
+        near = self.thin.query(points[left], np.arange(1, min(_NEIGHBOURS, len(self.owner)) + 1))[1]
+        owners = self.owner[near]
         for entry in np.unique(owners):
-            beside = np.flatnonzero((owners == entry).any(axis=1) & (self.entry[near[rim]] != entry))
-            own = rim[beside]
-            other, _ = self._off(points[own], around[beside, (owners[beside] == entry).argmax(axis=1)])
-            found[own] = np.where(np.abs(other) < np.abs(found[own]), other, found[own])
-        return found
+            beside = left[(owners == entry).any(axis=1) & (owner[left] != entry)]
+            self._nearer(points, found, beside, entry)
+        return np.where(np.abs(found) > _DONE * self.diagonal, found, 0.0)
 
-    def _off(self, points: Array, near: Array) -> tuple[Array, Array]:
-        """Signed distances of points from the faces of samples, and whether their feet lie at the end of them."""
-        found, ended = np.zeros(len(near)), np.zeros(len(near), bool)
-        owner = self.entry[near]
+    def _approach(self, points: Array, found: Array, owner: Array) -> None:
+        """Find the distances of points from a face each."""
         order = np.argsort(owner, kind="stable")
         for stretch in groups(owner[order]):
             own = order[stretch]
-            place, facets = self.entries[owner[own[0]]]
-            local = (points[own] - place.frame[:3, 3]) @ np.linalg.inv(place.frame[:3, :3]).T
-            found[own], ended[own] = _off(facets, local, self.uv[near[own]], _DONE * self.diagonal)
-        return found, ended
+            self._nearer(points, found, own, owner[own[0]])
+
+    def _nearer(self, points: Array, found: Array, own: Array, entry: int) -> None:
+        """Replace distances of some points by those from a face where these are smaller."""
+        tree = self.trees[entry]
+        far, near = tree.query(points[own])
+        ended = own[self._off(points, found, own, entry, near, far)]
+        if len(ended):
+            count = min(_NEIGHBOURS, tree.n)
+            far, near = tree.query(points[ended], np.arange(1, count + 1))
+            for k in range(0, count, max(count // _STARTS, 1)):
+                self._off(points, found, ended, entry, near[:, k], far[:, 0])
+
+    def _off(self, points: Array, found: Array, own: Array, entry: int, near: Array, far: Array) -> Array:
+        """Replace distances by smaller ones, from starting samples on; where feet lie at the end of the face.
+
+        A surface goes on beyond its face, but no point of that is nearer than its samples are, less their spacing.
+        """
+        place, facets = self.entries[entry]
+        local = (points[own] - place.frame[:3, 3]) @ np.linalg.inv(place.frame[:3, :3]).T
+        off, ended = _off(facets, local, self.uv[entry][near], _DONE * self.diagonal)
+        least = far - self.diagonal / CELLS - 2.0 * facets.off
+        off = np.copysign(np.maximum(np.abs(off), least), off)
+        found[own] = np.where(np.abs(off) < np.abs(found[own]), off, found[own])
+        return np.asarray(ended & (np.abs(found[own]) > _DONE * self.diagonal))
+
+
+def _thinned(points: Array, most: float) -> Array:
+    """One point of each cell of a grid."""
+    return np.asarray(np.unique(np.floor(points / most).astype(int), axis=0, return_index=True)[1])
 
 
 def _spread(facets: Facets, most: float) -> tuple[Array, Array]:
@@ -98,7 +126,8 @@ def _spread(facets: Facets, most: float) -> tuple[Array, Array]:
     line, second = runs(np.arange(len(which)), np.zeros(len(which), int), parts[which] + 1 - first)
     own = which[line]
     a, b = first[line] / parts[own], second / parts[own]
-    return np.stack([1.0 - a - b, a, b], axis=1), facets.corners[own]
+    shares = np.stack([1.0 - a - b, a, b], axis=1)
+    return shares + _INWARD / parts[own, None] * (1.0 / 3.0 - shares), facets.corners[own]
 
 
 def _off(facets: Facets, points: Array, uv: Array, done: float) -> tuple[Array, Array]:

@@ -184,7 +184,7 @@ def look(show: Show, stripes: int, reference: Body | None) -> Look:
         from mracad.view.deviation import Reference
 
         assert reference is not None
-        return Look(Reference.of(reference).deviation)
+        return Look(Reference.of(reference).deviation, 1)  # places on the surface itself, not moved
     if show.kind == "curvature":
         return Look({"max": largest, "mean": mean, "gauss": gauss}[show.of])
     if show.kind in ("zebra", "isophotes"):

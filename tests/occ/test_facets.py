@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from OCP.BRepAdaptor import BRepAdaptor_Surface
 from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeFace, BRepBuilderAPI_Transform
-from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
+from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox, BRepPrimAPI_MakeSphere
 from OCP.Geom import (
     Geom_ConicalSurface,
     Geom_CylindricalSurface,
@@ -109,3 +109,18 @@ def test_edges_are_drawn_once_and_closing_ones_not_at_all():
     assert len({edge for face in can.facets.values() for edge in face.rims}) == 2
     box = facets(shapes.document(BRepPrimAPI_MakeBox(1, 2, 3).Shape()), 1e-3, 20.0)
     assert len({edge for face in box.facets.values() for edge in face.rims}) == 12
+
+
+def test_faces_that_the_kernel_leaves_unfinished_are_meshed_again(monkeypatch):
+    import mracad.occ.facets as module
+
+    kernel = module.BRepMesh_IncrementalMesh
+
+    def careless(shape, chord, relative, angle):
+        return kernel(shape, chord, relative, angle) if angle < 0.3 else kernel(shape, 1e3 * chord, relative, 3.0)
+
+    monkeypatch.setattr(module, "BRepMesh_IncrementalMesh", careless)
+    (found,) = facets(shapes.document(BRepPrimAPI_MakeSphere(10.0).Shape()), 1e-4, 30.0).facets.values()
+    gaps = 10.0 - np.linalg.norm(found.points[found.corners].mean(axis=1), axis=1)
+    assert gaps.max() < 0.01
+    assert found.off == pytest.approx(gaps.max(), rel=0.3)

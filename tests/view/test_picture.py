@@ -84,6 +84,23 @@ def test_deviation_across_sewn_patches_is_that_of_the_whole(samples):
     assert -0.1 < drawn.lowest < 0 < drawn.highest < 0.1, "noise of 0.02 mm, whichever patch is nearest"
 
 
+@pytest.mark.parametrize(
+    ("name", "view"),
+    [
+        ("bottle", "bottom"),
+        ("assembly", "iso"),
+        ("shell", "iso"),
+        ("trimmed", "iso"),
+        ("blade", "iso"),
+        ("panel", "iso"),
+    ],
+)
+def test_a_model_does_not_deviate_from_itself(samples, name, view):
+    model = mracad.read(samples / f"{name}.step")
+    _, drawn = pixels(model, show="deviation", reference=model, view=(view,), size="240x160")
+    assert max(-drawn.lowest, drawn.highest) <= 1e-6
+
+
 def light(picture):
     return picture.mean(axis=-1)
 
