@@ -86,10 +86,16 @@ def _striped(stage: Stage, seen: Seen, pole: Array, stripes: int) -> Array:
     phase = np.arcsin(height) * (stripes / np.pi)
     slope = np.hypot(*(pole @ seen.turning)) / np.sqrt(np.maximum(1.0 - height * height, 1e-12))
     wide = np.clip(slope * (stripes / np.pi), 1e-6, 1e6)
-    light = (_under(phase + 0.5 * wide) - _under(phase - 0.5 * wide)) / wide
+    light = (_folded(phase + 0.5 * wide, 0.5 * stripes) - _folded(phase - 0.5 * wide, 0.5 * stripes)) / wide
     facing = np.clip(stage.camera.toward @ seen.facing, 0.0, 1.0)
     colours = _DARK + light[:, None] * (_WHITE - _DARK)
     return np.asarray(colours * (0.80 + 0.20 * facing)[:, None])
+
+
+def _folded(phase: Array, top: float) -> Array:
+    """The integral of a wave that turns back at the poles, where the angle does."""
+    inner = np.clip(phase, -top, top)
+    return np.asarray(2.0 * _under(inner) - _under(2.0 * inner - phase))
 
 
 def _under(phase: Array) -> Array:

@@ -134,6 +134,12 @@ def test_zebra_stripes_on_a_cylinder_are_straight(view):
         assert max(off) < 0.35
 
 
+def test_the_stripe_around_the_viewer_has_no_dot_in_it():
+    picture, _ = pixels(sphere(10.0), show="isophotes", view=("front",), size="201x201", stripes=6)
+    inside, _ = disc((201, 201), 10.0, 0.9 * np.sin(np.pi / 12))
+    assert np.ptp(light(picture[inside])) < 3.0
+
+
 PACE, RADIUS, STRIPES = 0.002, 500.0, 90
 
 
