@@ -532,7 +532,7 @@ def test_copies_that_are_off_by_a_fifth_of_their_height_are_named():
         return Copy(name, (0.0, 0.0, 0.0), (4,), 9.0, 9.0, 9.0, short, False)
 
     refuse(copies, [copy("one", 0.59), copy("two", 1.19)], clip=True)
-    with pytest.raises(EditError, match=r"two: .* cannot hold the copy: .* by 21 % .* .#5.") as caught:
+    with pytest.raises(EditError, match=r"two \(0,0,0\): .* cannot hold the copy: .* by 21 % .* .#5.") as caught:
         refuse(copies, [copy("one", 0.59), copy("two", 1.26)], clip=True)
     assert caught.value.code == Code.CANNOT_EDIT
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mracad.bspline.fit import SPARE
 from mracad.edit.feature.detail import Feature, taper
 from mracad.errors import EditError, UsageError
 
@@ -156,7 +157,7 @@ def tabulated(relief: Relief, name: str, spacing: float | None = None) -> Featur
     pad = int(np.ceil(BLUR * rounding / relief.cell)) + 2
     reach = radius + (pad * relief.cell if relief.disc is None else BLUR * rounding)
     table = _table(relief, reach, width, rounding, pad)
-    return Feature(radius, reach, width, table, name, notes=notes)
+    return Feature(radius, reach, width if rounding or spacing else width / SPARE, table, name, notes=notes)
 
 
 def _rounded(width: float, share: float, coarser: float | None) -> str:

@@ -35,7 +35,7 @@ def run(*words, code=0):
 
 def test_a_formula_stands_as_high_as_it_says_on_a_sphere(folder):
     net = grounds.above("sphere 60", lambda a, b: 0 * a, 25.0, 16)
-    edit = repeat(sheet(net), Repeat(feature=FORMULA.replace("9mm", "10mm"), at=("0,0,60",)))
+    edit = repeat(sheet(net), Repeat(feature=FORMULA, at=("0,0,60",)))
     after = edit.displacement.applied(sheet(net)).surfaces[0].net
     points = np.asarray(after.grid(*(np.linspace(*k.domain, 150) for k in (after.u, after.v)))).reshape(-1, 3)
     radius = np.linalg.norm(points, axis=1)
