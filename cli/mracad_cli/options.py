@@ -23,6 +23,9 @@ Command = Callable[..., Any]
 SHORT = {LENGTH: "LENGTH", ANGLE: "DEG", TIME: "TIME", MEMORY: "SIZE"}
 """Placeholders of quantities in the help."""
 
+PICTURES = {field: field for field in fields(Picture)} | {"size": "picture_size"}
+"""Options of pictures where models are written, by field: edits have sizes of their own."""
+
 METAVARS = {"faces": "SEL", "instance": "PATH", "hold": "SEL"}
 """Placeholders of other options."""
 
@@ -51,7 +54,11 @@ class Declared(click.ParamType):
 
 
 def of(
-    struct: type[Struct], name: str, without: str = "", arguments: Mapping[str, str] = MappingProxyType({})
+    struct: type[Struct],
+    name: str,
+    without: str = "",
+    arguments: Mapping[str, str] = MappingProxyType({}),
+    called: Mapping[str, str] = MappingProxyType({}),
 ) -> Callable[[Command], Command]:
     """Add one option per field of a struct, its own fields before inherited ones; the command gets the struct.
 
@@ -64,6 +71,8 @@ def of(
         Fields that get no option, separated by blanks.
     arguments : mapping
         Placeholders of the fields that are arguments.
+    called : mapping
+        Names of the options of fields that differ from the fields' own.
     """
     known = {name: field for name, field in fields(struct).items() if name not in without.split()}
     base = struct.__base__
@@ -73,11 +82,12 @@ def of(
     def decorate(command: Command) -> Command:
         @functools.wraps(command)
         def collected(*args: Any, **given: Any) -> Any:
-            values = {field: given.pop(field) for field in known}
+            values = {field: given.pop(called.get(field, field)) for field in known}
             return command(*args, **given, **{name: struct(**{k: v for k, v in values.items() if v is not None})})
 
-        own = [_option(known[field]) for field in known if field not in inherited and field not in arguments]
-        rest = [_option(known[field]) for field in known if field in inherited]
+        every = {field: _option(known[field], called.get(field, field)) for field in known if field not in arguments}
+        own = [option for field, option in every.items() if field not in inherited]
+        rest = [option for field, option in every.items() if field in inherited]
         placed = [click.argument(field, metavar=metavar) for field, metavar in arguments.items()]
         return apply(*placed, *own, *rest)(collected)
 
@@ -98,12 +108,12 @@ def gathered(name: str, kind: type, *options: Callable[[Command], Command]) -> C
     return decorate
 
 
-def _option(field: Field) -> Callable[[Command], Command]:
-    flag, missing = f"--{dashed(field.name)}", field.default is msgspec.NODEFAULT
+def _option(field: Field, name: str) -> Callable[[Command], Command]:
+    flag, missing = f"--{dashed(name)}", field.default is msgspec.NODEFAULT
     default = None if missing else field.default
     if field.type is bool:
         flag = f"{flag}/--no-{dashed(field.name)}" if default else flag
-        return click.option(field.name, flag, is_flag=True, help=field.help, default=default)
+        return click.option(name, flag, is_flag=True, help=field.help, default=default)
     kind: Any = click.Choice(field.choices) if field.choices else Declared(field)
     metavar = SHORT.get(field.quantity) if field.quantity else METAVARS.get(field.name)
     if metavar is None and not field.choices:
@@ -111,7 +121,7 @@ def _option(field: Field) -> Callable[[Command], Command]:
     shown = default not in (None, (), "")
     known: dict[str, Any] = {"required": True} if missing else {"default": default}  # a default of None counts
     return click.option(
-        field.name, flag, help=field.help, metavar=metavar, multiple=field.many, type=kind, show_default=shown, **known
+        name, flag, help=field.help, metavar=metavar, multiple=field.many, type=kind, show_default=shown, **known
     )
 
 
@@ -146,15 +156,9 @@ class Writing:
     angle: float
     ascii_stl: bool
     verify: bool
-    show: str
-    view: tuple[str, ...]
+    picture: Picture
     overwrite: bool
     if_changed: bool
-
-    @property
-    def picture(self) -> Picture:
-        """What pictures show."""
-        return Picture(show=self.show, view=self.view)
 
 
 @dataclass(frozen=True)
@@ -269,21 +273,7 @@ writing = gathered(
         help="Meshes: largest turn of the normal along a triangle's edge (degrees).",
     ),
     click.option("--ascii", "ascii_stl", is_flag=True, help="STL: write text instead of binary."),
-    click.option(
-        "--show",
-        metavar="TEXT",
-        default="shaded",
-        show_default=True,
-        help="Pictures: what they show, as in mracad render; deviation alone is from the input.",
-    ),
-    click.option(
-        "--view",
-        metavar="TEXT",
-        multiple=True,
-        default=("iso",),
-        show_default=True,
-        help="Pictures: where to look from, as in mracad render; repeatable.",
-    ),
+    of(Picture, "picture", called=PICTURES),
     verify,
     overwrite,
     if_changed,

@@ -4,18 +4,30 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import click
+from click.core import ParameterSource
+
 from mracad import note
 from mracad.errors import FileError, UsageError
-from mracad.formats import FORMATS, by_extension
-from mracad_cli.options import Reading, Reports, Writing
+from mracad.formats import FORMATS, Format, by_extension
+from mracad.spec.fields import dashed
+from mracad_cli.options import PICTURES, Reading, Reports, Writing
 from mracad_cli.say import json_text, say
 
 PAGES = ".html", ".htm"
 """Extensions of pages."""
+
+OF = {
+    **dict.fromkeys(PICTURES.values(), ("picture", "OUT.png")),
+    **dict.fromkeys(("chord", "angle"), ("mesh", "OUT.stl")),
+    "ascii_stl": ("stl", "OUT.stl"),
+    "schema": ("step", "OUT.step"),
+}
+"""The kind or name of the formats that options are for, and an output of such a format."""
 
 if TYPE_CHECKING:
     from mracad.job.judge import Judged
@@ -54,7 +66,8 @@ def check_outputs(writing: Writing, beside: Iterable[str | None] = (), *, needed
     Raises
     ------
     UsageError
-        When none is named although one is ``needed``, or a file is named twice or exists.
+        When none is named although one is ``needed``, a file is named twice or exists, or options are given for
+        formats in which nothing is written.
     FileError
         For an unknown file extension, or a folder that cannot be written to.
     """
@@ -66,6 +79,7 @@ def check_outputs(writing: Writing, beside: Iterable[str | None] = (), *, needed
     if paths.count("-") > 1:
         raise UsageError("- is named twice", "give each -o once")
     formats = {path: FORMATS[writing.format] if path == "-" else by_extension(path) for path in paths}
+    _check_options(formats.values(), "-" in paths)
     files = [path for path in paths if path != "-"]
     check_reports(*files, *beside, overwrite=writing.overwrite or writing.if_changed)
     how = (writing.schema or "").upper(), writing.chord, writing.angle, writing.ascii_stl, writing.picture
@@ -73,6 +87,21 @@ def check_outputs(writing: Writing, beside: Iterable[str | None] = (), *, needed
         Target("standard output" if path == "-" else Path(path).name, format.name, *how)
         for path, format in formats.items()
     ]
+
+
+def _check_options(formats: Collection[Format], streamed: bool) -> None:
+    """Refuse options on the command line that would have no effect on outputs of these formats."""
+    context = click.get_current_context()
+    given = [name for name in context.params if context.get_parameter_source(name) is ParameterSource.COMMANDLINE]
+    written = {word for format in formats for word in (format.kind, format.name)}
+    for name in given:
+        kind, output = OF.get(name, ("", ""))
+        if kind and kind not in written:
+            what = kind if kind in ("picture", "mesh") else f"{kind.upper()} file"
+            option = "ascii" if name == "ascii_stl" else dashed(name)
+            raise UsageError(f"{option}: no {what} is written", f"add -o {output}, or leave --{option} out")
+    if "format" in given and not streamed:
+        raise UsageError("format: nothing is written to standard output", "add -o -, or leave --format out")
 
 
 def check_reports(*paths: str | None, overwrite: bool) -> None:

@@ -273,9 +273,10 @@ def _pictured(document: Document, target: Target, original: Original) -> Made:
     from mracad.spec.pictures import show_of
     from mracad.view.picture import render
 
-    show = show_of(target.picture.show)
+    show, before = show_of(target.picture.show), target.picture.before
     reference = (read(show.of) if show.of else original()) if show.kind == "deviation" else None
-    return Made(target, render(document, target.picture, reference=reference).data, Written())
+    shown = render(document, target.picture, before=read(before) if before else None, reference=reference)
+    return Made(target, shown.data, Written())
 
 
 def _is(target: Target, kind: Kind) -> bool:

@@ -30,6 +30,9 @@ VIEWS: dict[str, Direction] = {
 SHOWS = "shaded", "zebra", "isophotes", "curvature", "deviation", "faces"
 """What pictures show."""
 
+STRIPED = "zebra", "isophotes"
+"""Those with stripes."""
+
 CURVATURES = "max", "mean", "gauss"
 """What maps of curvature show; the first by default."""
 
@@ -134,7 +137,7 @@ class Picture(Options, frozen=True, kw_only=True, forbid_unknown_fields=True):
         ShowText,
         Meta(
             description="What to show: shaded, zebra, isophotes, curvature:max (or :mean, :gauss), deviation:REF (from "
-            "another file), faces (their numbers)."
+            "another file; for edits deviation alone, from the input), faces (their numbers)."
         ),
     ] = "shaded"
     view: Annotated[
@@ -159,6 +162,8 @@ class Picture(Options, frozen=True, kw_only=True, forbid_unknown_fields=True):
         super().__post_init__()
         if not 1 <= len(self.views) <= PANELS:
             raise UsageError(f"view: {len(self.views)} views", f"give 1 to {PANELS}")
+        if "stripes" in self.given() and show_of(self.show).kind not in STRIPED:
+            raise UsageError(f"stripes: {self.show} has none", "add --show zebra or --show isophotes")
 
     @property
     def views(self) -> tuple[str, ...]:

@@ -13,16 +13,13 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from mracad.view.colours import INK
+from mracad.view.labels import of_faces, placed
 from mracad.view.looks import Map, Scale, rounded
 from mracad.view.panel import Panel
-from mracad.view.runs import groups
 
 Array = np.ndarray
 Box = tuple[int, int, int, int]
 """Left, top, width and height, pixels."""
-
-LEAST_LABEL = 220
-"""Number of pixels of a face from which its number is drawn on it."""
 
 _SMALL, _LARGE = 9, 20  # heights of letters, pixels
 _TONE = tuple(round(255 * float(each)) for each in INK)
@@ -73,8 +70,8 @@ def png(
     for (left, top, _, _), panel, caption in zip(places, panels, captions, strict=True):
         picture = panel.image(legend[1] if legend else None)
         sheet.paste(Image.fromarray(picture), (left, top))
-        for text, x, y in _numbers(panel) if numbered else ():
-            draw.text((left + x, top + y), text, _TONE, font, "mm", stroke_width=_HALO, stroke_fill="white")
+        if numbered:
+            _numbers(draw, font, panel, (left, top))
         if caption:
             draw.text((left + font.size, top + font.size), caption, _TONE, font, "la")
     if places:
@@ -94,19 +91,27 @@ def _font(height: int) -> ImageFont.FreeTypeFont:
     return ImageFont.truetype(str(Path(home.origin).parent / "mpl-data" / "fonts" / "ttf" / "DejaVuSans.ttf"), height)
 
 
-def _numbers(panel: Panel) -> list[tuple[str, int, int]]:
-    """The numbers of faces and their places: for each face that is seen, the place next to the middle of it."""
-    width = panel.stage.camera.size[0]
-    found: dict[str, tuple[int, int, int]] = {}
-    order = np.argsort(panel.entry, kind="stable")
-    for own in (order[stretch] for stretch in groups(panel.entry[order])):
-        if len(own) < LEAST_LABEL:
-            continue
-        at = np.stack(np.divmod(panel.pixel[own], width)[::-1], axis=1)
-        x, y = at[((at - at.mean(axis=0)) ** 2).sum(axis=1).argmin()].tolist()
-        text = f"#{panel.stage.entries[panel.entry[own[0]]][2].face + 1}"
-        found[text] = max(found.get(text, (0, 0, 0)), (len(own), x, y))
-    return [(text, x, y) for text, (_, x, y) in found.items()]
+def _numbers(draw: ImageDraw.ImageDraw, font: ImageFont.FreeTypeFont, panel: Panel, corner: tuple[int, int]) -> None:
+    """The numbers of faces that have room for them; the others are counted in the lower right corner."""
+    labels, small = of_faces(panel)
+
+    def size(text: str) -> tuple[int, int]:
+        left, top, right, bottom = draw.textbbox((0, 0), text, font, "mm", stroke_width=_HALO)
+        return round(right - left), round(bottom - top)
+
+    texts, crowded = placed(labels, size, panel.stage.camera.size)
+    for text, x, y in texts:
+        _haloed(draw, (corner[0] + x, corner[1] + y), text, font, "mm")
+    if left_out := small + crowded:
+        width, height = panel.stage.camera.size
+        said = f"{left_out} small face{'s' * (left_out > 1)} without number"
+        _haloed(draw, (corner[0] + width - font.size, corner[1] + height - font.size), said, font, "rs")
+
+
+def _haloed(
+    draw: ImageDraw.ImageDraw, at: tuple[float, float], text: str, font: ImageFont.FreeTypeFont, anchor: str
+) -> None:
+    draw.text(at, text, _TONE, font, anchor, stroke_width=_HALO, stroke_fill="white")
 
 
 def _ruler(draw: ImageDraw.ImageDraw, font: ImageFont.FreeTypeFont, box: Box, pixel: float) -> None:

@@ -41,7 +41,14 @@ def options(command: click.Command, without: Container[str] = COVERED_ELSEWHERE)
 
 
 _LEVEL = [(), ("--band", "0mm:8mm"), ("--base", "level", "--band", "0mm:8mm")]
-_DONE = [("-o", "out.step"), ("-o", "out.brep", "-o", "out.stl"), ("-o", "-"), ("--dry-run",)]
+_OUT = "outputs format schema chord angle ascii_stl show view fit picture_size stripes before"
+_DONE = [
+    ("-o", "out.step", "--schema", "AP242"),
+    ("-o", "out.brep", "-o", "out.stl", "--chord", "1mm", "--angle", "30", "--ascii"),
+    ("-o", "-", "--format", "iges"),
+    ("-o", "out.png", "--picture-size", "64x48", "--show", "zebra", "--stripes", "10", "--view", "top", "--fit", "#1"),
+    ("--dry-run",),
+]
 
 _RIMS = (
     "free_edges corners",
@@ -126,7 +133,7 @@ TOGETHER: Mapping[str, Sequence[tuple[str, Sequence[Words]]]] = {
             ],
         )
     ],
-    "convert": [("outputs", _DONE[:-1])],
+    "convert": [(_OUT, _DONE[:-1])],
     "feature extract": [("base band", _LEVEL)],
     "render": [
         ("output size", [("-o", "out.png", "--size", "120x80"), ("-o", "-", "--size", "64x64")]),
@@ -237,7 +244,7 @@ def choices(command: str) -> list[list[Words]]:
     every = options(commands()[command])
     sets = list(TOGETHER.get(command, ()))
     if "dry_run" in every and "outputs" in every:
-        sets.append(("outputs dry_run", _DONE))
+        sets.append((f"{_OUT} dry_run", _DONE))
     for names, _ in sets:
         for name in names.split():
             every.pop(name, None)

@@ -82,6 +82,35 @@ def test_what_cannot_be_drawn(mracad, samples, tmp_path, monkeypatch, words, cod
     assert not list(tmp_path.iterdir())
 
 
+def test_pictures_of_edits_take_what_those_of_models_take(mracad, samples, tmp_path):
+    words = ("--show", "zebra", "--stripes", "12", "--view", "top", "--fit", "#2", "--before", samples / "blade.step")
+    edit = ("--distance", "0.1mm", "-o", tmp_path / "a.png", "-o", tmp_path / "a.step", "--picture-size", "200x90")
+    assert mracad("offset", samples / "blade.step", *edit, *words).code == 0
+    assert mracad("render", tmp_path / "a.step", "-o", tmp_path / "b.png", "--size", "200x90", *words).code == 0
+    one, two = (np.asarray(Image.open(tmp_path / name)).astype(int) for name in ("a.png", "b.png"))
+    assert one.shape == (90, 200, 3) and (np.abs(one - two).max(axis=2) > 8).mean() < 2e-2
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["--show", "zebra", "-o", "a.step"], "show: no picture is written; add -o OUT.png"),
+        (["--picture-size", "90x60", "-o", "a.stl"], "picture-size: no picture"),
+        (["--view", "top", "--dry-run"], "view: no picture"),
+        (["--stripes", "9", "-o", "a.png"], "stripes: shaded has none"),
+        (["--chord", "1mm", "-o", "a.png"], "chord: no mesh is written; add -o OUT.stl"),
+        (["--ascii", "-o", "a.3mf"], "ascii: no STL file"),
+        (["--schema", "AP203", "-o", "a.brep"], "schema: no STEP file"),
+        (["--format", "stl", "-o", "a.stl"], "add -o -"),
+    ],
+)
+def test_options_without_an_output_for_them_are_refused(mracad, samples, tmp_path, monkeypatch, words, says):
+    monkeypatch.chdir(tmp_path)
+    result = mracad("smooth", samples / "panel.step", "--scale", "25mm", *words)
+    one_line(result, 2)
+    assert says in result.err and not list(tmp_path.iterdir())
+
+
 def test_an_edit_refuses_a_picture_before_it_starts(mracad, samples, tmp_path):
     words = ("--scale", "25mm", "-o", tmp_path / "a.png", "--show", "zebras")
     one_line(mracad("smooth", samples / "panel.step", *words), 2)
