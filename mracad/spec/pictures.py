@@ -11,7 +11,7 @@ from msgspec import Meta
 from mracad.errors import UsageError
 from mracad.spec.fields import nearest
 from mracad.spec.files import File, Naming
-from mracad.spec.quantity import NUMBER
+from mracad.spec.quantity import NUMBER, length
 from mracad.spec.steps.base import Options
 
 Direction = tuple[float, float, float]
@@ -27,7 +27,7 @@ VIEWS: dict[str, Direction] = {
 }
 """Where the viewer is, from the model."""
 
-SHOWS = "shaded", "zebra", "isophotes", "curvature", "deviation", "faces"
+SHOWS = "shaded", "zebra", "isophotes", "curvature", "deviation", "roughness", "faces"
 """What pictures show."""
 
 STRIPED = "zebra", "isophotes"
@@ -59,7 +59,7 @@ class Show:
         One of ``SHOWS``.
     of : str
         Of curvature, one of ``CURVATURES``; of deviation, the file from which it is measured (``""`` for the input of
-        an edit).
+        an edit); of roughness, the length of the longest waves that count (``""`` for 5 % of the diagonal).
     """
 
     kind: str
@@ -75,9 +75,11 @@ def show_of(text: str, name: str = "show") -> Show:
         if rest not in CURVATURES and colon:
             raise UsageError(f"{name}: there is no curvature {rest!r}", "use curvature:" + ", ".join(CURVATURES))
         return Show(kind, rest or CURVATURES[0])
-    if colon and kind != "deviation":
+    if colon and kind not in ("deviation", "roughness"):
         raise UsageError(f"{name}: {text!r}: {kind} takes nothing after a colon", f"write {kind}")
-    if colon and not rest:
+    if kind == "roughness" and colon:
+        length(rest, 1.0, name)
+    elif colon and not rest:
         raise UsageError(f"{name}: {text!r} names no file", "write deviation:REF.step")
     return Show(kind, rest)
 
@@ -137,7 +139,8 @@ class Picture(Options, frozen=True, kw_only=True, forbid_unknown_fields=True):
         ShowText,
         Meta(
             description="What to show: shaded, zebra, isophotes, curvature:max (or :mean, :gauss), deviation:REF (from "
-            "another file; for edits deviation alone, from the input), faces (their numbers)."
+            "another file; for edits deviation alone, from the input), roughness (or roughness:10mm, by waves up to a "
+            "length), faces (their numbers)."
         ),
     ] = "shaded"
     view: Annotated[

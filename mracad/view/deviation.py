@@ -10,7 +10,7 @@ import numpy as np
 from mracad.bspline.vectors import cross, unit
 from mracad.model.facets import Body, Facets, Placed
 from mracad.view.runs import groups, runs
-from mracad.view.seen import Seen, Stage
+from mracad.view.spots import Spots
 
 Array = np.ndarray
 
@@ -66,9 +66,9 @@ class Reference:
         owner = np.repeat(np.arange(len(entries)), [len(each) for each in some])
         return cls(entries, uv, [cKDTree(each) for each in points], cKDTree(np.concatenate(some)), owner, body.diagonal)
 
-    def deviation(self, stage: Stage, seen: Seen) -> Array:
+    def deviation(self, spots: Spots) -> Array:
         """Distances of places from the nearest point, mm, positive on the outer side of its face."""
-        points = seen.point.T
+        points = spots.point.T
         found = np.full(len(points), np.inf)
         owner = self.owner[self.thin.query(points)[1]]
         self._approach(points, found, owner)

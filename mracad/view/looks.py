@@ -8,42 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from mracad.bspline.vectors import unit
-from mracad.model.facets import Body
 from mracad.spec.pictures import Show
-from mracad.view.colours import CLAY, diverging, rgb, sequential, several
+from mracad.view.colours import CLAY, rgb, several
+from mracad.view.fields import Field
 from mracad.view.seen import Seen, Stage
 
 Array = np.ndarray
 
-SHARE = 0.98
-"""Share of a picture whose curvature lies within the range of the colours."""
-
 _WHITE, _DARK = np.array([0.97, 0.97, 0.965]), np.array([0.24, 0.27, 0.31])  # of stripes
 _KEY = np.array([-0.42, 0.58, 0.70])  # directions to the lights: right, up, to the viewer
-_STEPS = 1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0
-
-
-@dataclass(frozen=True)
-class Scale:
-    """The range of a map's colours.
-
-    Attributes
-    ----------
-    low, high : float
-    below, above : bool
-        Whether the picture has values beyond.
-    """
-
-    low: float
-    high: float
-    below: bool = False
-    above: bool = False
-
-    def colours(self, values: Array) -> Array:
-        """Colours ``(q, 3)`` of values."""
-        if self.low < 0.0:
-            return diverging(values / self.high)
-        return sequential(values / self.high)
 
 
 def shaded(stage: Stage, seen: Seen) -> Array:
@@ -104,37 +77,6 @@ def _under(phase: Array) -> Array:
     return np.asarray(0.5 * whole + np.minimum(phase - whole, 0.5))
 
 
-def mean(stage: Stage, seen: Seen) -> Array:
-    """Mean curvature, 1/mm, positive where convex."""
-    return np.asarray(seen.bends[0])
-
-
-def gauss(stage: Stage, seen: Seen) -> Array:
-    """Gaussian curvature, 1/mm²."""
-    return np.asarray(seen.bends[1])
-
-
-def largest(stage: Stage, seen: Seen) -> Array:
-    """The larger principal curvature without its sign, 1/mm."""
-    half, product = seen.bends
-    return np.asarray(np.abs(half) + np.sqrt(np.maximum(half * half - product, 0.0)))
-
-
-def scale(values: Array, share: float, signed: bool) -> Scale:
-    """A range with round ends for a share of the values, from 0, or the same to both sides of it."""
-    size = np.sort(np.abs(values))
-    most = float(size[-1]) if len(size) else 0.0
-    bound = float(size[min(int(share * len(size)), len(size) - 1)]) if len(size) else 0.0
-    high = rounded(bound) if bound > 0.0 else (rounded(most) if most > 0.0 else 1.0)
-    return Scale(-high if signed else 0.0, high, signed and bool((values < -high).any()), bool((values > high).any()))
-
-
-def rounded(value: float) -> float:
-    """The next round number from a positive one up."""
-    power = float(10.0 ** np.floor(np.log10(value)))
-    return next(step for step in _STEPS if step * power >= value * (1 - 1e-9)) * power
-
-
 @dataclass(frozen=True)
 class Look:
     """A way to look at a stage.
@@ -154,45 +96,11 @@ class Look:
     coloured: bool = False
 
 
-@dataclass(frozen=True)
-class Map:
-    """A map of numbers: its title, and the share of them within the range of colours.
-
-    Attributes
-    ----------
-    title, unit : str
-    share : float
-    signed : bool
-    """
-
-    title: str
-    unit: str
-    share: float
-    signed: bool
-
-
-MAPS = {
-    ("curvature", "max"): Map("largest curvature", "1/mm", SHARE, False),
-    ("curvature", "mean"): Map("mean curvature", "1/mm", SHARE, True),
-    ("curvature", "gauss"): Map("Gaussian curvature", "1/mm²", SHARE, True),
-    ("deviation", ""): Map("deviation", "mm", 1.0, True),
-}
-
-
-def map_of(show: Show) -> Map | None:
-    """How numbers are mapped to colours; None for pictures that show no numbers."""
-    return MAPS.get((show.kind, "" if show.kind == "deviation" else show.of))
-
-
-def look(show: Show, stripes: int, reference: Body | None) -> Look:
-    """How to look for what ``--show`` asks for; ``reference`` is what deviation is measured from."""
-    if show.kind == "deviation":
-        from mracad.view.deviation import Reference
-
-        assert reference is not None
-        return Look(Reference.of(reference).deviation, 1)  # places on the surface itself, not moved
-    if show.kind == "curvature":
-        return Look({"max": largest, "mean": mean, "gauss": gauss}[show.of])
+def look(show: Show, stripes: int, numbers: Field | None) -> Look:
+    """How to look for what ``--show`` asks for; ``numbers`` are those of a map."""
+    if numbers is not None:
+        order = 2 if show.kind == "curvature" else 1  # others at the places on the surface itself, not moved
+        return Look(lambda stage, seen: numbers(seen), order)
     if show.kind in ("zebra", "isophotes"):
         drawn = {"zebra": zebra, "isophotes": isophotes}[show.kind]
         return Look(lambda stage, seen: drawn(stage, seen, stripes))

@@ -9,8 +9,9 @@ import numpy as np
 
 from mracad.model.facets import Placed
 from mracad.view.colours import INK, PAPER, opacity
+from mracad.view.fields import Scale
 from mracad.view.lines import REACH, Dots
-from mracad.view.looks import Look, Scale
+from mracad.view.looks import Look
 from mracad.view.seen import FINE, Seen, Stage, layers, seen
 
 Array = np.ndarray

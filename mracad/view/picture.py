@@ -15,7 +15,8 @@ from mracad.occ.facets import facets
 from mracad.spec.pictures import Picture, show_of, size_of
 from mracad.spec.select import select
 from mracad.view.camera import Camera, axes, fitted
-from mracad.view.looks import look, map_of, scale
+from mracad.view.fields import map_of, numbers_of
+from mracad.view.looks import look
 from mracad.view.panel import panel
 from mracad.view.seen import Stage
 from mracad.view.sheet import boxes, grid, png
@@ -89,16 +90,17 @@ def render(
     wanted, closer = _wanted(document, picture.fit)
     mesh = partial(_meshed, chord=CHORD / max(size) / closer)
     bodies = [mesh(each) for each in (before, document) if each]
-    eye = look(show, picture.stripes, mesh(reference) if show.kind == "deviation" and reference else None)
-    legend = map_of(show)
+    base = mesh(reference) if show.kind == "deviation" and reference else None
+    eyes = [look(show, picture.stripes, numbers_of(show, bodies[-1].diagonal, body.facets, base)) for body in bodies]
+    legend = map_of(show, bodies[-1].diagonal)
     rows, columns = (len(picture.views), 2) if before else grid(len(picture.views), size)
     places = boxes(size, rows, columns, legend is not None)
     points = np.concatenate([_points(body, wanted) for body in (bodies if wanted is None else bodies[-1:])])
     cameras = _cameras(picture.views, points, places[:: len(bodies)])
-    pairs = [(body, camera) for camera in cameras for body in bodies]
-    panels = [panel(Stage.of(body, camera), eye) for body, camera in pairs]
+    pairs = [(body, eye, camera) for camera in cameras for body, eye in zip(bodies, eyes, strict=True)]
+    panels = [panel(Stage.of(body, camera), eye) for body, eye, camera in pairs]
     shown = np.concatenate([each.shown for each in panels])
-    key = (legend, scale(shown, legend.share, legend.signed)) if legend else None
+    key = (legend, legend.scale(shown)) if legend else None
     names = [body.name for body in bodies] if before else [""]
     views = picture.views if len(picture.views) > 1 else [""]
     captions = ["  ".join(filter(None, [name, view])) for view in views for name in names]

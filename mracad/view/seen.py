@@ -12,6 +12,7 @@ from mracad.model.facets import Body, Facets, Placed
 from mracad.view.camera import Camera
 from mracad.view.raster import Triangles, rasterised
 from mracad.view.runs import groups
+from mracad.view.spots import Spots, bends, cross, dot, shape, steady, unit
 
 Array = np.ndarray
 
@@ -19,8 +20,6 @@ FINE = 2
 """Samples per pixel along each axis."""
 
 _OFF = 2.0  # pixels: depths that differ by more within a pixel are two places of a face
-_NUDGE = 1e-4  # share of the way to the middle of the triangles, away from where a surface is degenerate
-_THIN = 1e-8  # sine of the angle between S_u and S_v at which it is
 _TURN = 0.9  # cosine of the angle of a normal by which it turns when moved, beyond which the place is not moved
 _CLOSE, _STEP, _NEAR = 0.1, 8.0, 2.0  # pixels: nearer and farther places are not sought again; length of a step
 _ROUNDS = 4
@@ -88,7 +87,7 @@ class Stage:
 
 
 @dataclass(frozen=True, eq=False)
-class Seen:
+class Seen(Spots):
     """Places that are seen, each in one pixel.
 
     Attributes
@@ -98,12 +97,8 @@ class Seen:
     weight : ndarray (q,)
         Share of the pixel.
     entry : ndarray of int (q,)
-    point, normal : ndarray (3, q)
-        Normals are outward.
     turning : ndarray (2, 3, q)
         How the normal turns from a pixel to the next, to the right and up.
-    bends : ndarray (2, q)
-        Mean and Gaussian curvature, 1/mm and 1/mm²; mean curvature is positive where the face is convex.
     front : ndarray of bool (q,)
         Whether the outer side is seen.
     """
@@ -111,10 +106,7 @@ class Seen:
     pixel: Array
     weight: Array
     entry: Array
-    point: Array
-    normal: Array
     turning: Array
-    bends: Array
     front: Array
 
     @cached_property
@@ -193,10 +185,15 @@ def _evaluated(stage: Stage, which: Array, at: Array, pixel: Array, weight: Arra
     entry = stage.entry[which]
     uv = np.stack([stage.triangles.at(plane, which, *at.T) for plane in (1, 2)], axis=1)
     np.clip(uv, *stage.bounds[:, entry], out=uv)
-    outward = np.array([facets.outward for _, _, facets in stage.entries])[entry]
+    outward, face = np.array([(facets.outward, facets.face) for _, _, facets in stage.entries])[entry].T
     jets = _jets(stage, which, uv, order)
+    shown = pixel, weight, entry
     if order == 1:
-        return Seen(pixel, weight, entry, *_flat(jets, outward), stage.triangles.front[which])
+        s, su, sv = jets
+        nothing = np.zeros((2, 3, 0))  # no curvatures are known
+        return Seen(
+            face, uv, s, outward * unit(cross(su, sv)), nothing[:, 0], *shown, nothing, stage.triangles.front[which]
+        )
     at = at.T / FINE
     far = np.arange(len(entry))
     for _ in range(_ROUNDS):
@@ -207,7 +204,8 @@ def _evaluated(stage: Stage, which: Array, at: Array, pixel: Array, weight: Arra
             break
         uv[far] = np.clip(uv[far] + step.T[wrong], *stage.bounds[:, entry[far]])
         jets[..., far] = _jets(stage, which[far], uv[far], order)
-    return Seen(pixel, weight, entry, *_bent(stage.camera, jets, outward, at), stage.triangles.front[which])
+    point, normal, turning, curved = _bent(stage.camera, jets, outward, at)
+    return Seen(face, uv, point, normal, curved, *shown, turning, stage.triangles.front[which])
 
 
 def _jets(stage: Stage, which: Array, uv: Array, order: int) -> Array:
@@ -222,46 +220,33 @@ def _jets(stage: Stage, which: Array, uv: Array, order: int) -> Array:
 def _jet(stage: Stage, entry: tuple[Placed, int, Facets], which: Array, uv: Array, order: int) -> Array:
     """The jet of a face as placed, ``(orders, 3, q)``; a little inside its triangles where it is degenerate."""
     place, _, facets = entry
-    jet = np.array(facets.ground.jets(uv, order))
-    for nudge in (_NUDGE, 100 * _NUDGE):
-        su, sv = jet[1].T, jet[2].T
-        cut = _cross(su, sv)
-        flat = np.flatnonzero(~(_dot(cut, cut) > _THIN**2 * _dot(su, su) * _dot(sv, sv)))
-        if not len(flat):
-            break
-        middle = stage.triangles.corners[which[flat]].mean(axis=1).T
-        inner = np.stack([stage.triangles.at(plane, which[flat], *middle) for plane in (1, 2)], axis=1)
-        jet[:, flat] = facets.ground.jets(uv[flat] + nudge * (inner - uv[flat]), order)
-    turned = jet @ place.frame[:3, :3].T
+
+    def inner(some: Array) -> Array:
+        middle = stage.triangles.corners[which[some]].mean(axis=1).T
+        return np.stack([stage.triangles.at(plane, which[some], *middle) for plane in (1, 2)], axis=1)
+
+    turned = steady(facets.ground, uv, order, inner) @ place.frame[:3, :3].T
     turned[0] += place.frame[:3, 3]
     return np.asarray(turned.swapaxes(1, 2))
-
-
-def _flat(jets: Array, outward: Array) -> tuple[Array, Array, Array, Array]:
-    """Points and outward normals; no curvatures are known."""
-    s, su, sv = jets
-    nothing = np.zeros((2, 3, 0))
-    return s, outward * _unit(_cross(su, sv)), nothing, nothing[:, 0]
 
 
 def _bent(camera: Camera, jets: Array, outward: Array, at: Array) -> tuple[Array, Array, Array, Array]:
     """Points, outward normals, their turning from pixel to pixel, and curvatures, moved into their pixels."""
     s, su, sv, suu, suv, svv = jets
-    ee, ff, gg = _dot(su, su), _dot(su, sv), _dot(sv, sv)
-    cut = _cross(su, sv)
-    area2, normal = np.maximum(_dot(cut, cut), 1e-300), _unit(cut)
-    e, f, g = _dot(normal, suu), _dot(normal, suv), _dot(normal, svv)
-    mean, gauss = 0.5 * (e * gg - 2.0 * f * ff + g * ee) / area2, (e * g - f * f) / area2
+    ee, ff, gg = dot(su, su), dot(su, sv), dot(sv, sv)
+    normal, curved = shape(jets)
+    cut = cross(su, sv)
+    area2 = np.maximum(dot(cut, cut), 1e-300)
+    e, f, g = dot(normal, suu), dot(normal, suv), dot(normal, svv)
     nu = (f * ff - e * gg) / area2 * su + (e * ff - f * ee) / area2 * sv  # Weingarten
     nv = (g * ff - f * gg) / area2 * su + (f * ff - g * ee) / area2 * sv
     (du, dv), _, (right, up) = _aim(camera, jets[:3], at)
     turning = np.stack([each[0] * nu + each[1] * nv for each in (right, up)])
-    near = _unit(normal + du * nu + dv * nv)
+    near = unit(normal + du * nu + dv * nv)
     moved = s + du * su + dv * sv + 0.5 * du * du * suu + du * dv * suv + 0.5 * dv * dv * svv
-    sane = _dot(near, normal) > _TURN
+    sane = dot(near, normal) > _TURN
     return (
-        np.where(sane, moved, s), outward * np.where(sane, near, normal), outward * turning,
-        np.stack([-outward * mean, gauss]),
+        np.where(sane, moved, s), outward * np.where(sane, near, normal), outward * turning, bends(curved, outward)
     )  # fmt: skip
 
 
@@ -271,23 +256,10 @@ def _aim(camera: Camera, jets: Array, at: Array) -> tuple[Array, Array, tuple[Ar
     s, su, sv = jets
     a, b = (camera.axes[:2] @ each / camera.pixel for each in (su, sv))  # steps on the picture
     determinant = a[0] * b[1] - a[1] * b[0]
-    least = 1e-9 * np.sqrt(_dot(a, a) * _dot(b, b))
+    least = 1e-9 * np.sqrt(dot(a, a) * dot(b, b))
     inverse = 1.0 / np.where(np.abs(determinant) > least, determinant, np.inf)
     right, up = np.stack([b[1], -a[1]]) * inverse, np.stack([-b[0], a[0]]) * inverse
     off = (at - camera.project(s.T).T[:2]) * [[1.0], [-1.0]]
     length = np.hypot(*off)
     off *= np.minimum(1.0, _NEAR / np.maximum(length, 1e-300))
     return right * off[0] + up * off[1], length, (right, up)
-
-
-def _dot(a: Array, b: Array) -> Array:
-    """Scalar products of vectors ``(2 or 3, q)``."""
-    return np.asarray(sum(x * y for x, y in zip(a, b, strict=True)))
-
-
-def _cross(a: Array, b: Array) -> Array:
-    return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
-
-
-def _unit(a: Array) -> Array:
-    return np.asarray(a / np.maximum(np.sqrt(_dot(a, a)), 1e-300))

@@ -13,8 +13,8 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from mracad.view.colours import INK
+from mracad.view.fields import Map, Scale, rounded
 from mracad.view.labels import of_faces, placed
-from mracad.view.looks import Map, Scale, rounded
 from mracad.view.panel import Panel
 
 Array = np.ndarray

@@ -1,4 +1,4 @@
-"""Draw a model: shaded, or with zebra stripes, isophotes, curvature, deviation or the numbers of its faces.
+"""Draw a model: shaded, or with zebra stripes, isophotes, curvature, roughness, deviation or numbered faces.
 
 Every pixel is evaluated on the surface itself. No display is needed.
 """
