@@ -188,7 +188,8 @@ def deliver_verdict(judged: Judged, command: str, reports: Reports, document: Do
         from mracad_cli.render import pages
 
         files[reports.report_html] = pages.judged(document, other, judged, command)
-    deliver(files, [json_text(json.verdict(*found))] if reports.as_json else text.verdict_lines(*found))
+    wrote = [f"wrote {reports.report_html}"] if reports.report_html else []
+    deliver(files, [json_text(json.verdict(*found))] if reports.as_json else [*text.verdict_lines(*found), *wrote])
     return 0 if judged.passed else 1
 
 

@@ -8,7 +8,6 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import click
-from msgspec import structs
 
 from mracad.spec.steps import STEPS, Options, Selection
 from mracad_cli import options
@@ -84,7 +83,8 @@ def run_steps(
     records = {place: record_of(steps, place) for place in places}
     text = load(reading.file)
     document, done = produced(reading, text, writing, [] if editing.dry_run else targets, steps, title(steps))
-    body = _body(document.name, steps, done, recipe) | {"warnings": document.warnings, **json.written(done.made)}
+    body = json.steps(document.name, steps, done, single=recipe is None)
+    body |= {"warnings": document.warnings, **json.written(done.made)}
     files: dict[str, str | bytes | None] = {editing.report: json_text(body, 1) + "\n"} if editing.report else {}
     if done.made:
         files |= records
@@ -97,7 +97,7 @@ def run_steps(
         before = read_silently(reading, text)
         files[editing.report_html] = pages.edited(before, None if editing.dry_run else done.document, steps, done, body)
     seconds = None if editing.dry_run else time.perf_counter() - start
-    lines = [json_text(body)] if editing.as_json else _lines(steps, done, recipe, seconds)
+    lines = [json_text(body)] if editing.as_json else _lines(steps, done, recipe, seconds, editing.report_html)
     deliver_models(writing, done.made, files, lines)
     return 0 if done.passed else 1
 
@@ -122,30 +122,20 @@ def produced(
         )
 
 
-def _lines(steps: Sequence[Step], done: Production, recipe: Recipe | None, seconds: float | None) -> list[str]:
+def _lines(
+    steps: Sequence[Step], done: Production, recipe: Recipe | None, seconds: float | None, page: str | None
+) -> list[str]:
     """The lines to print after steps; ``seconds`` is None for a dry run."""
     from mracad_cli.render import text
 
-    end = f"wrote {text.sizes(done.made)}" if done.made else "dry run, nothing written"
-    if seconds is not None:
-        end = f"{end if done.made else 'nothing written'}, {seconds:.1f} s"
+    end = f"wrote {text.sizes(done.made)}" if done.made else f"{'no model' if page else 'nothing'} written"
+    end += f", report {page}" if page else ""
+    end = f"dry run, {end}" if seconds is None else f"{end}, {seconds:.1f} s"
     found = text.found(done.made)
     if not recipe:
         return text.edit_lines(done.results[0], steps[0].options, end, found)  # type: ignore[arg-type]  # it is an edit
     told = [line for step, result in zip(steps, done.results, strict=False) for line in text.step_lines(step, result)]
     return [*(plan(steps) if seconds is None else []), *told, f"valid: {found.words}; {end}" if found else end]
-
-
-def _body(name: str, steps: Sequence[Step], done: Production, recipe: Recipe | None) -> dict[str, Any]:
-    """The full report: of the edit, or with a recipe of each step."""
-    from mracad_cli.render import json
-
-    each = list(zip(steps, done.results, strict=False))
-    parts = [{**json.result(result), "options": structs.asdict(step.options)} for step, result in each]
-    if not recipe:
-        return parts[0]
-    named = [{"step": step.id, "use": step.use, **part} for (step, _), part in zip(each, parts, strict=True)]
-    return {"file": name, "steps": named}
 
 
 def plan(steps: Sequence[Step]) -> list[str]:

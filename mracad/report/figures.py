@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import base64
+import io
+
+from PIL import Image
+
 from mracad.occ.document import Document
 from mracad.report.page import Figure
 from mracad.spec.pictures import Picture
@@ -12,6 +17,9 @@ SIZE = "960x640"
 
 PAIR = "1440x600"
 """Of two models side by side, pixels."""
+
+THUMBNAIL, QUALITY = 96, 70
+"""Height of small pictures, pixels, and their quality as JPEG."""
 
 ALONE = {
     "zebra": "Zebra stripes: they break at creases, and kink at tangent joints whose curvatures differ",
@@ -46,6 +54,15 @@ def both(document: Document, before: Document) -> list[Figure]:
         Figure(f"Zebra stripes: {names}", stripes.data, wide=True),
         Figure(f"Deviation from {'before' if same else before.name}, {_range(moved)}, positive outside", moved.data),
     ]
+
+
+def thumbnail(figure: Figure) -> str:
+    """A small copy of a picture, as an address that holds it."""
+    whole = Image.open(io.BytesIO(figure.data)).convert("RGB")
+    small = whole.resize((round(whole.width * THUMBNAIL / whole.height), THUMBNAIL), Image.Resampling.LANCZOS)
+    packed = io.BytesIO()
+    small.save(packed, "JPEG", quality=QUALITY, optimize=True)
+    return f"data:image/jpeg;base64,{base64.b64encode(packed.getvalue()).decode()}"
 
 
 def _range(drawn: Rendered) -> str:

@@ -3,24 +3,29 @@
 from __future__ import annotations
 
 import base64
+import json
 import re
 import zlib
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cache
 from importlib.resources import files
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from mracad.report.mesh import Mesh
 from mracad.report.table import Table
 from mracad.spec.pictures import VIEWS
 
 if TYPE_CHECKING:
     from jinja2 import Environment
 
+    from mracad.report.mesh import Mesh
+
 PNG, SVG = "image/png", "image/svg+xml"
 """Kinds of pictures."""
 
+_ROW = re.compile(rb'<script type="application/json" id="row">(.*?)</script>')
+_HEAD = 1 << 17  # bytes of a page that hold its row
 _UNSEEN = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028\u2029\ud800-\udfff]")
 
 
@@ -86,6 +91,8 @@ class Page:
         The model to turn.
     figures : sequence of Figure
     tables : sequence of Table
+    row : mapping
+        What an index says of the page, JSON-ready; empty for pages in no index.
     """
 
     title: str
@@ -97,23 +104,36 @@ class Page:
     mesh: Mesh
     figures: Sequence[Figure] = ()
     tables: Sequence[Table] = ()
+    row: Mapping[str, Any] = field(default_factory=dict)
 
 
 def html(page: Page) -> bytes:
     """A page as one HTML file that needs nothing else; the same bytes for the same content."""
-    text = (
-        _environment()
-        .get_template("page.html")
-        .render(
-            page=page,
-            mesh=_base64(page.mesh.data),
-            three=_base64(_three()),
-            **{name.partition(".")[0]: _data(name) for name in ("style.css", "tables.js", "model.js")},
-            licence=_data("three.LICENSE"),
-            views={name: ",".join(f"{x:g}" for x in VIEWS[name]) for name in ("iso", "front", "right", "top")},
-        )
+    return rendered(
+        "page.html",
+        page,
+        mesh=_base64(page.mesh.data),
+        three=_base64(_three()),
+        model=_data("model.js"),
+        licence=_data("three.LICENSE"),
+        views={name: ",".join(f"{x:g}" for x in VIEWS[name]) for name in ("iso", "front", "right", "top")},
     )
-    return text.encode()
+
+
+def rendered(name: str, page: object, **more: object) -> bytes:
+    """A template filled in, with the style and the script of tables."""
+    common = {each.partition(".")[0]: _data(each) for each in ("style.css", "tables.js")}
+    return _environment().get_template(name).render(page=page, **common, **more).encode()
+
+
+def row_of(path: Path) -> dict[str, Any]:
+    """What an index says of a page that was written; empty where there is none."""
+    try:
+        with path.open("rb") as file:
+            found = _ROW.search(file.read(_HEAD))
+        return dict(json.loads(found[1])) if found else {}
+    except (OSError, ValueError):
+        return {}
 
 
 @cache

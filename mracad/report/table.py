@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -26,19 +26,28 @@ class Column:
         Where its values are in the records; keys and positions in what these hold follow after dots.
     sign : str
         What stands before numbers: ``"#"`` of faces.
+    link : str
+        Where the addresses are that its cells lead to.
+    height : int
+        Of its values where they are lists of pictures, pixels; 0 for text.
     """
 
     title: str
     key: str
     sign: str = ""
+    link: str = ""
+    height: int = 0
 
 
 @dataclass(frozen=True)
 class Cell:
-    """What stands in a cell, and the exact value where it is a number, else None."""
+    """What stands in a cell, the exact value where it is a number, where it leads to, and its pictures."""
 
     text: str
     value: int | float | None = None
+    link: str = ""
+    pictures: Sequence[str] = ()
+    height: int = 0
 
     @property
     def exact(self) -> str:
@@ -69,13 +78,13 @@ class Table:
     def shown(self) -> list[Column]:
         """The columns that hold anything."""
         return [
-            each for each in self.columns if any(_at(record, each.key) not in (None, "") for record in self.records)
+            each for each in self.columns if any(_at(record, each.key) not in (None, "", []) for record in self.records)
         ]
 
     @cached_property
     def rows(self) -> list[list[Cell]]:
         """The cells of the first rows."""
-        return [[cell(_at(record, each.key), each.sign) for each in self.shown] for record in self.records[:MOST]]
+        return [[_cell(record, each) for each in self.shown] for record in self.records[:MOST]]
 
     @cached_property
     def heads(self) -> list[tuple[Column, bool]]:
@@ -89,6 +98,13 @@ class Table:
     def left_out(self) -> int:
         """The number of records that have no row."""
         return max(len(self.records) - MOST, 0)
+
+
+def _cell(record: Mapping[str, Any], column: Column) -> Cell:
+    value, link = _at(record, column.key), (_at(record, column.link) or "") if column.link else ""
+    if column.height:
+        return Cell("", None, link, value or (), column.height)
+    return replace(cell(value, column.sign), link=link)
 
 
 def cell(value: Any, sign: str = "") -> Cell:

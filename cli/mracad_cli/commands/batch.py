@@ -24,7 +24,7 @@ from mracad.job.batch.settings import Limits, Settings
 from mracad.spec.quantity import MEMORY, TIME
 from mracad_cli import options
 from mracad_cli.command import Unguarded
-from mracad_cli.outputs import check_reports, deliver, depfile_text
+from mracad_cli.outputs import check_page, check_reports, deliver, depfile_text
 from mracad_cli.progress import Progress
 from mracad_cli.say import json_text, say
 from mracad_cli.steps import needed, plan
@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from mracad.job.batch.find import Item
     from mracad.job.batch.run import Outcome, Workers
     from mracad.spec.recipe import Recipe
+    from mracad_cli.render.batch import Pages
 
 
 @dataclass(frozen=True)
@@ -52,6 +53,7 @@ class Reports:
     """What is printed, and what is written beside the outputs."""
 
     report: str | None
+    report_html: str | None
     junit: str | None
     depfile: str | None
     dry_run: bool
@@ -114,6 +116,12 @@ _reports = options.gathered(
     "reports",
     Reports,
     click.option("--report", metavar="F.json", type=options.path, help="Write the summary as JSON."),
+    click.option(
+        "--report-html",
+        metavar="F.html",
+        type=options.path,
+        help="Write an index with pictures, and a page for each file into the folder F_files (HTML).",
+    ),
     click.option("--junit", metavar="F.xml", type=options.path, help="Write the summary as JUnit XML, for CI."),
     options.depfile,
     click.option("--dry-run", is_flag=True, help="List the steps and the files; do nothing."),
@@ -133,7 +141,8 @@ def command(
 
     steps = load(recipe).with_values(assignments)
     steps.steps("model.step")  # errors in it are reported before anything is read
-    check_reports(reports.report, reports.junit, reports.depfile, overwrite=True)
+    check_page(reports.report_html)
+    check_reports(reports.report, reports.report_html, reports.junit, reports.depfile, overwrite=True)
     words = [word for given in sources for word in (_listed() if given == "-" else [given])]
     items = find(words, Path(place.folder), place.format or "")
     if not reports.dry_run:
@@ -152,28 +161,35 @@ def _listed() -> list[str]:
 
 def _run(recipe: Recipe, items: Sequence[Item], place: Place, settings: Settings, reports: Reports) -> int:
     """Do a batch, and print the outcome of each file and a summary."""
-    from mracad_cli.render import json, junit, text
+    from mracad_cli.render import batch, json, junit, text
 
     start = time.perf_counter()
-    outcomes = _outcomes(recipe, items, place, settings, reports.as_json)
+    pages = batch.Pages.beside(reports.report_html) if reports.report_html else None
+    outcomes = _outcomes(recipe, items, place, (settings, pages), reports.as_json)
     seconds = time.perf_counter() - start
     order = {item.output: number for number, item in enumerate(items)}
     outcomes.sort(key=lambda outcome: order[outcome.output])
     counts: Counter[str] = Counter(outcome.status for outcome in outcomes)
     body: dict[str, Any] = {"recipe": recipe.name, "files": len(items), **counts, "seconds": seconds}
-    files: dict[str, str] = {}
+    files: dict[str, str | bytes | None] = {}
     if reports.report:
         files[reports.report] = json_text({**body, "each": json.plain(outcomes)}, 1) + "\n"
     if reports.junit:
         files[reports.junit] = junit.batch(recipe.name, outcomes, seconds)
     if reports.depfile:
         files[reports.depfile] = _depfile(recipe, items, Path(place.folder))
-    said = [json_text({"summary": body})] if reports.as_json else text.batch_lines(outcomes, seconds)
-    deliver(files, said)
+    told = text.batch_lines(outcomes, seconds)
+    if reports.report_html:
+        planned = plan(recipe.steps(items[0].source))
+        files[reports.report_html] = batch.index(recipe.name, planned, outcomes, told, Path(reports.report_html).parent)
+        told.append(f"wrote {reports.report_html}")
+    deliver(files, [json_text({"summary": body})] if reports.as_json else told)
     return 1 if counts["failed"] else 0
 
 
-def _outcomes(recipe: Recipe, items: Sequence[Item], place: Place, settings: Settings, as_json: bool) -> list[Outcome]:
+def _outcomes(
+    recipe: Recipe, items: Sequence[Item], place: Place, how: tuple[Settings, Pages | None], as_json: bool
+) -> list[Outcome]:
     """The outcomes of the files, in the order in which they were done."""
     from mracad.job.batch.manifest import Manifest
     from mracad.job.batch.run import run
@@ -184,7 +200,7 @@ def _outcomes(recipe: Recipe, items: Sequence[Item], place: Place, settings: Set
     with (
         Manifest(Path(place.folder)) as manifest,
         _workers(place, len(items)) as executor,
-        closing(run(recipe, items, manifest, executor, settings)) as results,
+        closing(run(recipe, items, manifest, executor, *how)) as results,
         Progress(rate=True) as progress,
     ):
         try:

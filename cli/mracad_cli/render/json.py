@@ -8,6 +8,7 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import msgspec
+from msgspec import structs
 
 from mracad.inspect.verdict import Figure, Finding, Layer, Verdict
 from mracad.job.words import notes, of_finding
@@ -18,9 +19,10 @@ if TYPE_CHECKING:
     from mracad.inspect.seams import SeamMeasure
     from mracad.job.document import Report
     from mracad.job.judge import Judged
-    from mracad.job.produce import Made
+    from mracad.job.produce import Made, Production
     from mracad.model.facts import Validity
     from mracad.seam.natural import Treatment
+    from mracad.spec.recipe import Step
 
 
 def plain(value: Any) -> Any:
@@ -47,6 +49,16 @@ def seam(value: SeamMeasure) -> dict[str, Any]:
         "faces": [i + 1 for i in value.faces],
         "smooth": value.smooth,
     }
+
+
+def steps(name: str, each: Sequence[Step], done: Production, *, single: bool) -> dict[str, Any]:
+    """The full report of the steps of a recipe, or of a single edit."""
+    pairs = list(zip(each, done.results, strict=False))
+    parts = [{**result(found), "options": structs.asdict(step.options)} for step, found in pairs]
+    if single:
+        return parts[0]
+    named = [{"step": step.id, "use": step.use, **part} for (step, _), part in zip(pairs, parts, strict=True)]
+    return {"file": name, "steps": named}
 
 
 def result(value: Report | Judged) -> dict[str, Any]:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from mracad.report.figures import alone, both, still
+from mracad.report.figures import alone, both, still, thumbnail
 from mracad.report.mesh import mesh
 from mracad.report.page import Figure, Page, Verdict, html
 from mracad.report.table import Column, Table
@@ -63,9 +64,17 @@ COPIES = (
 
 
 def edited(
-    before: Document, after: Document | None, steps: Sequence[Step], done: Production, body: Mapping[str, Any]
+    before: Document,
+    after: Document | None,
+    steps: Sequence[Step],
+    done: Production,
+    body: Mapping[str, Any],
+    key: str = "",
 ) -> bytes:
-    """The page of steps; without a document after them, on a dry run, its pictures are those before."""
+    """The page of steps; without a document after them, on a dry run, its pictures are those before.
+
+    With the ``key`` of what was done it can be found by an index.
+    """
     from mracad.job.document import Report
 
     parts = body.get("steps", [body])
@@ -90,7 +99,23 @@ def edited(
         said.append(f"wrote {', '.join(made.target.name for made in done.made)}")
     else:
         said.append("nothing written" if after else "dry run, nothing written")
-    return html(_page("Edit report", shown, asked, said, verdicts, figures, tables))
+    page = _page("Edit report", shown, asked, said, verdicts, figures, tables)
+    return html(replace(page, row=_row(page, done, key)) if key else page)
+
+
+def _row(page: Page, done: Production, key: str) -> dict[str, Any]:
+    """What an index says of the page of steps."""
+    from mracad.job.document import Report
+
+    edits = [each for each in done.results if isinstance(each, Report)]
+    return {
+        "key": key,
+        "valid": page.verdicts[0].answer,
+        "edited": len({o.face for each in edits for o in each.edit.faces("edited")}),
+        "faces": len({o.face for each in edits for o in each.edit.outcomes}),
+        "deviation": max((d.largest for each in edits for d in each.deviations), default=0.0),
+        "pictures": [thumbnail(page.still), thumbnail(page.figures[0])],
+    }
 
 
 def judged(document: Document, other: Document | None, found: Judged, command: str) -> bytes:

@@ -95,7 +95,7 @@ class Manifest:
             A hash of everything that the output depends on.
         data : bytes
         beside : mapping
-            Contents of files that belong to it, by their names relative to the folder.
+            Contents of files that belong to it, by their paths, absolute or relative to the folder.
         if_changed : bool
             Do not touch a file that already has this content.
         """
@@ -103,16 +103,14 @@ class Manifest:
             self._note(output, key, data)
         except OSError as error:
             raise FileError(f"cannot write '{self._file.name}': {error.strerror}", "free some disk space") from error
-        with contextlib.suppress(OSError):  # writing reports it better
-            (self.folder / output).parent.mkdir(parents=True, exist_ok=True)
-        self._put({output: data, **beside}, if_changed)
+        self.put({output: data, **beside}, if_changed=if_changed)
 
-    def restore(self, beside: Mapping[str, bytes]) -> None:
-        """Write those files belonging to a finished output that are missing."""
-        self._put(beside, True)
-
-    def _put(self, contents: Mapping[str, bytes], if_changed: bool) -> None:
+    def put(self, contents: Mapping[str, bytes], *, if_changed: bool = False) -> None:
+        """Write files that belong to outputs, by their paths, absolute or relative to the folder."""
         places = {self.folder / name: content for name, content in contents.items()}
+        for place in places:
+            with contextlib.suppress(OSError):  # writing reports it better
+                place.parent.mkdir(parents=True, exist_ok=True)
         put_all({p: c for p, c in places.items() if not (if_changed and holds(p, c))}, prefix=UNFINISHED)
 
     def _note(self, output: str, key: str, data: bytes) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import time
 from collections.abc import Generator, Iterable, Iterator
@@ -11,15 +10,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, Protocol
 
-from msgspec import structs
-
 from mracad.errors import Code, FileError, MracadError, UsageError
 from mracad.inspect.faults import ReadBack
 from mracad.job.batch.cluster import lost
 from mracad.job.batch.find import Item
-from mracad.job.batch.manifest import Manifest, digest
+from mracad.job.batch.manifest import Manifest
 from mracad.job.batch.settings import Settings
-from mracad.job.batch.work import Product, Work, do
+from mracad.job.batch.work import Pages, Product, Work, do
 from mracad.spec.recipe import Recipe, record_of
 
 AHEAD = 2
@@ -53,6 +50,8 @@ class Outcome:
         What had to be guessed or was lost.
     read_back : ReadBack or None
         The output as read back; None where it was not read back.
+    page : str
+        The file with the page about it, if there is one.
     """
 
     file: str
@@ -66,6 +65,7 @@ class Outcome:
     steps: tuple[dict[str, Any], ...] = ()
     warnings: tuple[str, ...] = ()
     read_back: ReadBack | None = None
+    page: str = ""
 
 
 class Workers(Protocol):
@@ -80,7 +80,12 @@ class Workers(Protocol):
 
 
 def run(
-    recipe: Recipe, items: Iterable[Item], manifest: Manifest, executor: Workers, settings: Settings
+    recipe: Recipe,
+    items: Iterable[Item],
+    manifest: Manifest,
+    executor: Workers,
+    settings: Settings,
+    pages: Pages | None = None,
 ) -> Generator[Outcome, None, None]:
     """Take files through a recipe; yields outcomes as they come.
 
@@ -94,8 +99,10 @@ def run(
     executor : Workers
         It is shut down when the batch stops early.
     settings : Settings
+    pages : Pages, optional
+        Makes a page about each file.
     """
-    batch = _Batch(recipe, manifest, executor, settings)
+    batch = _Batch(recipe, manifest, executor, settings, pages)
     waiting = iter(items)
     stopped = False
     try:
@@ -125,7 +132,6 @@ class _Task:
 
     item: Item
     work: Work
-    key: str
     attempts: int
     start: float
 
@@ -133,8 +139,11 @@ class _Task:
 class _Batch:
     """The tasks that are under way."""
 
-    def __init__(self, recipe: Recipe, manifest: Manifest, executor: Workers, settings: Settings) -> None:
+    def __init__(
+        self, recipe: Recipe, manifest: Manifest, executor: Workers, settings: Settings, pages: Pages | None
+    ) -> None:
         self.recipe, self.manifest, self.executor, self.settings = recipe, manifest, executor, settings
+        self.pages = pages
         self.pending: dict[Future[Any], _Task] = {}
         self._epoch = os.environ.get("SOURCE_DATE_EPOCH")
 
@@ -147,16 +156,17 @@ class _Batch:
             self._check_target(item)
         except MracadError as error:
             return _failed(item, error)
-        work = Work(Path(item.source).name, data, steps, self.settings, item.format, files, self._epoch)
-        key = self._key(work)
+        name = Path(item.source).name
+        work = Work(name, data, steps, self.settings, item.format, files, self._epoch, pages=self.pages)
         try:
             beside = self._record(item, work)
-            if self.manifest.done(item.output, key):
-                self.manifest.restore(beside)
-                return Outcome(item.source, item.output, "unchanged")
+            paged = self.pages is None or self.pages.made(item.output, work.key)
+            if paged and self.manifest.done(item.output, work.key):
+                self.manifest.put(beside, if_changed=True)
+                return Outcome(item.source, item.output, "unchanged", page=self._page(item))
         except MracadError as error:
             return _failed(item, error)
-        self._submit(_Task(item, work, key, 0, 0.0))
+        self._submit(_Task(item, work, 0, 0.0))
         return None
 
     def finished(self) -> Iterator[Outcome]:
@@ -190,32 +200,32 @@ class _Batch:
         if target.exists() and not (self.settings.overwrite or self.manifest.made(item.output)):
             raise UsageError(f"'{target}' exists and was not made by a batch", "give --overwrite to replace it")
 
-    def _key(self, work: Work) -> str:
-        """A hash of everything that the output depends on."""
-        files = {Path(name).name: digest(data) for name, data in work.files.items()}
-        steps = [[step.use, step.id, structs.asdict(step.options)] for step in work.steps]
-        how = work.settings
-        parts = [work.name, digest(work.data), steps, dict(work.versions), files]
-        return digest(
-            json.dumps(
-                [*parts, how.input_unit, how.encoding, work.format, how.schema or "", how.verify, work.epoch],
-                sort_keys=True,
-            ).encode()
-        )
+    def _page(self, item: Item) -> str:
+        return str(self.pages.place(item.output)) if self.pages else ""
 
     def _written(self, task: _Task, product: Product) -> Outcome:
-        output = task.item.output
-        beside = self._record(task.item, task.work)
-        self.manifest.write(output, task.key, product.data, beside, if_changed=self.settings.if_changed)
+        """The outcome of a task, once what it made is in place."""
+        output, key = task.item.output, task.work.key
+        page = self._page(task.item)
+        beside = {str(Path(page).resolve()): product.page} if page else {}
+        if product.failed:
+            self.manifest.put(beside)
+        else:
+            beside |= self._record(task.item, task.work)
+            same = self.settings.if_changed or self.manifest.done(output, key)
+            self.manifest.write(output, key, product.data, beside, if_changed=same)
         return Outcome(
             task.item.source,
             output,
-            "done",
+            "failed" if product.failed else "done",
+            code=int(Code.FAILED_CHECK) if product.failed else 0,
+            message=product.failed,
             seconds=product.seconds,
             attempts=task.attempts,
             steps=product.steps,
             warnings=product.warnings,
             read_back=product.read_back,
+            page=page,
         )
 
 

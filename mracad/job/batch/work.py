@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 import importlib
+import json
 import os
 import tempfile
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
+
+from msgspec import structs
 
 from mracad import memo, note
-from mracad.errors import Code, MracadError
+from mracad.errors import MracadError
 from mracad.inspect.faults import ReadBack
+from mracad.job.batch.manifest import digest
 from mracad.job.batch.settings import Settings
 from mracad.spec.recipe import Step, title, versions
 from mracad.spec.steps import STEPS
@@ -21,7 +26,21 @@ from mracad.spec.steps import STEPS
 if TYPE_CHECKING:
     from mracad.job.document import Report
     from mracad.job.judge import Judged
+    from mracad.job.produce import Production
     from mracad.occ.document import Document
+
+
+class Pages(Protocol):
+    """What makes a page about each file; sent to the workers, which draw."""
+
+    def place(self, output: str) -> Path:
+        """The file for the page about an output."""
+
+    def made(self, output: str, key: str) -> bool:
+        """Whether there is a page of the work with this key."""
+
+    def draw(self, before: Document, steps: Sequence[Step], done: Production, key: str) -> bytes:
+        """The page about a file that was taken through steps."""
 
 
 @dataclass(frozen=True)
@@ -44,6 +63,8 @@ class Work:
         ``SOURCE_DATE_EPOCH``.
     versions : mapping
         Versions at the client of the packages that affect the result.
+    pages : Pages or None
+        What makes a page about the file, if one is wanted.
     """
 
     name: str
@@ -54,18 +75,50 @@ class Work:
     files: Mapping[str, bytes] = field(default_factory=dict, repr=False)
     epoch: str | None = None
     versions: Mapping[str, str] = field(default_factory=versions)
+    pages: Pages | None = field(default=None, repr=False)
+
+    @cached_property
+    def key(self) -> str:
+        """A hash of everything that the output depends on."""
+        files = {Path(name).name: digest(data) for name, data in self.files.items()}
+        steps = [[step.use, step.id, structs.asdict(step.options)] for step in self.steps]
+        how = self.settings
+        parts = [self.name, digest(self.data), steps, dict(self.versions), files]
+        return digest(
+            json.dumps(
+                [*parts, how.input_unit, how.encoding, self.format, how.schema or "", how.verify, self.epoch],
+                sort_keys=True,
+            ).encode()
+        )
 
 
 @dataclass(frozen=True)
 class Product:
-    """The output, a summary of each step, warnings, the seconds taken, and the output as read back (None where it was
-    not)."""
+    """What became of a file.
+
+    Attributes
+    ----------
+    data : bytes
+        The output; empty where a check failed.
+    steps : tuple of dict
+        A summary of each step.
+    warnings : tuple of str
+    seconds : float
+    read_back : ReadBack or None
+        The output as read back; None where it was not.
+    page : bytes
+        The page about it, if one was wanted.
+    failed : str
+        The check that failed, and why; empty where all passed.
+    """
 
     data: bytes = field(repr=False)
     steps: tuple[dict[str, Any], ...]
     warnings: tuple[str, ...]
     seconds: float
     read_back: ReadBack | None = None
+    page: bytes = field(default=b"", repr=False)
+    failed: str = ""
 
 
 def warm() -> None:
@@ -81,9 +134,8 @@ def do(work: Work) -> Product:
     Raises
     ------
     MracadError
-        When a step cannot be done or a check fails.
+        When a step cannot be done, or the page cannot be made.
     """
-    from mracad.job.judge import Judged
     from mracad.job.produce import Target, produce
 
     start = time.perf_counter()
@@ -104,15 +156,28 @@ def do(work: Work) -> Product:
         done = produce(
             document, lambda: _read(work), steps, [target], title=title(work.steps), verify=work.settings.verify
         )
-    last = done.results[-1]
-    if isinstance(last, Judged) and not last.passed:
-        more = f" (and {len(last.failures) - 1} more)" if len(last.failures) > 1 else ""
-        raise MracadError(f"{work.steps[len(done.results) - 1].id}: {last.failures[0]}{more}", code=Code.FAILED_CHECK)
+    page = b""
+    if work.pages:
+        note.doing("drawing the page")
+        page = work.pages.draw(_read(work), work.steps, done, work.key)
+    short = tuple({"step": step.id, **_short(result)} for step, result in zip(work.steps, done.results, strict=False))
+    seconds = time.perf_counter() - start
+    if not done.made:
+        return Product(b"", short, tuple(document.warnings), seconds, page=page, failed=_failure(work, done))
     made = done.made[0]
-    short = ({"step": step.id, **_short(result)} for step, result in zip(work.steps, done.results, strict=True))
     lost = (f"the output lacks {what}" for what in made.written.lost)
     warnings = (*document.warnings, *lost, *(f"the output has {cut}" for cut in made.written.cut))
-    return Product(made.data, tuple(short), warnings, time.perf_counter() - start, made.read_back)
+    return Product(made.data, short, warnings, seconds, made.read_back, page)
+
+
+def _failure(work: Work, done: Production) -> str:
+    """The check that failed, and why."""
+    from mracad.job.judge import Judged
+
+    last = done.results[-1]
+    assert isinstance(last, Judged)
+    more = f" (and {len(last.failures) - 1} more)" if len(last.failures) > 1 else ""
+    return f"{work.steps[len(done.results) - 1].id}: {last.failures[0]}{more}"
 
 
 def _read(work: Work) -> Document:

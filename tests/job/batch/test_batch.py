@@ -18,6 +18,7 @@ from mracad.job.batch.find import find
 from mracad.job.batch.manifest import NAME, Manifest
 from mracad.spec.recipe import load
 from tests.job.batch.runs import RECIPE, batch, environment, kills, models, outputs, recipe, shams, start
+from tests.report.test_page import Read
 
 
 def test_five_bad_files_of_a_hundred_cost_five(tmp_path):
@@ -197,6 +198,31 @@ def test_records_are_there_whenever_asked_for(tmp_path):
     code, out, _ = batch(*words, "--record", sham=0.0)
     assert code == 0 and "2 unchanged" in out
     assert load(tmp_path / "out" / "part000.step.toml").steps("-") == load(words[0]).steps("-")
+
+
+def test_pages_come_from_the_workers_and_a_missing_one_is_made_again(tmp_path):
+    folder = shams(tmp_path / "in", 3)
+    (folder / "part002.step").write_text("/* crash */")
+    words = (recipe(tmp_path), folder, "-O", tmp_path / "out", "--report-html", tmp_path / "all.html", "--json")
+
+    def done() -> tuple[list[str], list[list[str]]]:
+        lines = [json.loads(line) for line in batch(*words, sham=0.0)[1].splitlines()]
+        table = Read((tmp_path / "all.html").read_text(encoding="utf-8")).tables["files"]
+        statuses = [line["status"] for line in sorted(lines[:-1], key=lambda line: line["file"])]
+        return statuses, [[text for _, text in row] for row in table["rows"] if row]
+
+    statuses, rows = done()
+    assert statuses == ["done", "done", "failed"]
+    assert ["crashed (SIGSEGV)" in row[-1] for row in rows] == [True, False, False]
+    assert [("0.5" in row) for row in rows] == [False, True, True]
+    (tmp_path / "all_files" / "part001.step.html").unlink()
+    stamp = (tmp_path / "out" / "part001.step").stat().st_mtime_ns
+    assert done()[0] == ["unchanged", "done", "failed"]
+    assert (tmp_path / "out" / "part001.step").stat().st_mtime_ns == stamp, "the output is not touched"
+    assert done()[0] == ["unchanged", "unchanged", "failed"]
+    (folder / "part000.step").write_text("other")
+    assert batch(*words[:-3], sham=0.0)[0] == 1
+    assert done()[0] == ["done", "unchanged", "failed"], "a page that is older than its output is made again"
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="names are Unicode elsewhere")

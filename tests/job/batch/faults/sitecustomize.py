@@ -1,6 +1,7 @@
 """On the path of a process, this makes files whose text says so crash, hang or eat memory; or all work a mere sham."""
 
 import hashlib
+import json
 import os
 import signal
 import time
@@ -24,7 +25,11 @@ def do(task) -> work.Product:
     if not os.environ.get("SHAM"):
         return real(task)
     time.sleep(float(os.environ["SHAM"]))
-    return work.Product(hashlib.sha256(task.data).hexdigest().encode() * 2000, (), (), 0.0)
+    page = b""
+    if task.pages:
+        row = json.dumps({"key": task.key, "deviation": 0.5, "pictures": ["data:,"]})
+        page = f'<script type="application/json" id="row">{row}</script>'.encode()
+    return work.Product(hashlib.sha256(task.data).hexdigest().encode() * 2000, (), (), 0.0, page=page)
 
 
 work.do = do
