@@ -10,6 +10,8 @@ from typing import NamedTuple
 import mracad_cli  # noqa: F401  # before numpy: it keeps linear algebra to one thread
 import pytest
 
+os.environ["MRACAD_CACHE"] = "off"
+
 SAMPLES = Path(__file__).parents[1] / "samples"
 CORPUS = Path(os.environ["MRACAD_CORPUS"]) if os.environ.get("MRACAD_CORPUS") else None
 

@@ -12,6 +12,7 @@ from typing import Any, BinaryIO
 from mracad.errors import EditError, FileError, UsageError
 from mracad.formats import FORMATS, by_content, by_extension
 from mracad.occ.document import Document, named_labels, nested_colours
+from mracad.occ.healed import through_cache
 from mracad.occ.labels import label_name
 from mracad.occ.literals import known
 from mracad.occ.load import load
@@ -90,11 +91,11 @@ def read(source: str | os.PathLike | BinaryIO, input_unit: str | None = None, en
         if format == "step":
             from mracad.occ.step import read_step
 
-            return read_step(file, input_unit, encoding)
+            return through_cache(file, (input_unit, encoding), lambda: read_step(file, input_unit, encoding))
         if format == "iges":
             from mracad.occ.iges import read_iges
 
-            return read_iges(file, input_unit, encoding)
+            return through_cache(file, (input_unit, encoding), lambda: read_iges(file, input_unit, encoding))
         from mracad.occ.brep import read_brep
 
         return read_brep(file, input_unit)
