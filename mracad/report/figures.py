@@ -21,6 +21,9 @@ PAIR = "1440x600"
 THUMBNAIL, QUALITY = 96, 70
 """Height of small pictures, pixels, and their quality as JPEG."""
 
+BEFORE = "before"
+"""What a reference with the model's own name is called."""
+
 ALONE = {
     "zebra": "Zebra stripes: they break at creases, and kink at tangent joints whose curvatures differ",
     "curvature:max": "Larger principal curvature, without its sign",
@@ -48,12 +51,19 @@ def both(document: Document, before: Document) -> list[Figure]:
     """Pictures of a model beside another, and of its deviation from that."""
     stripes = render(document, Picture(show="zebra", size=PAIR), before=before)
     moved = render(document, Picture(show="deviation", size=SIZE), reference=before)
-    same = before.name == document.name
-    names = "before and after" if same else f"{before.name} and {document.name}"
+    name = reference_name(document, before)
+    names = "before and after" if name == BEFORE else f"{name} and {document.name}"
     return [
         Figure(f"Zebra stripes: {names}", stripes.data, wide=True),
-        Figure(f"Deviation from {'before' if same else before.name}, {_range(moved)}, positive outside", moved.data),
+        Figure(f"Deviation from {name}, {_range(moved)}, positive outside", moved.data),
     ]
+
+
+def reference_name(document: Document, reference: Document | None) -> str:
+    """What is said of a reference; ``""`` if there is none."""
+    if reference is None:
+        return ""
+    return BEFORE if reference.name == document.name else reference.name
 
 
 def thumbnail(figure: Figure) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -14,6 +14,7 @@ from mracad.errors import FileError
 from mracad.model.facets import Body, Facets
 from mracad.occ.document import Document
 from mracad.occ.facets import facets
+from mracad.report.shades import Shades, shades
 from mracad.view.colours import CLAY, rgb
 
 Array = np.ndarray
@@ -45,15 +46,18 @@ class Mesh:
         Number of triangles, each face once.
     chord : float
         Largest distance of triangles from the surface, mm.
+    shades : Shades or None
+        Deviation as colours, from a reference if there is one.
     """
 
     head: Mapping[str, Any]
     data: bytes
     triangles: int
     chord: float
+    shades: Shades | None = None
 
 
-def mesh(document: Document, names: Mapping[int, str]) -> Mesh:
+def mesh(document: Document, names: Mapping[int, str], reference: Document | None = None) -> Mesh:
     """The mesh of a document.
 
     Parameters
@@ -61,6 +65,8 @@ def mesh(document: Document, names: Mapping[int, str]) -> Mesh:
     document : Document
     names : mapping of int to str
         What faces are called, by index.
+    reference : Document, optional
+        What deviation is measured from.
 
     Raises
     ------
@@ -74,7 +80,9 @@ def mesh(document: Document, names: Mapping[int, str]) -> Mesh:
         if not count:
             raise FileError(f"'{document.name}' cannot be meshed", "check its geometry")
         if count <= MOST:
-            return _packed(body, names, count, chord * body.diagonal)
+            other = facets(reference, chord, angle) if reference else None
+            shown = shades(body, sorted(body.facets), other) if other and other.facets else None
+            return replace(_packed(body, names, count, chord * body.diagonal), shades=shown)
         chord, angle = chord * _COARSER, min(angle * _COARSER, 90.0)
     raise FileError(f"'{document.name}' has too many faces to turn in a browser: {count} triangles", "take fewer parts")
 

@@ -91,6 +91,8 @@ class Page:
         The model to turn.
     figures : sequence of Figure
     tables : sequence of Table
+    reference : str
+        What deviation is measured from.
     row : mapping
         What an index says of the page, JSON-ready; empty for pages in no index.
     """
@@ -104,6 +106,7 @@ class Page:
     mesh: Mesh
     figures: Sequence[Figure] = ()
     tables: Sequence[Table] = ()
+    reference: str = ""
     row: Mapping[str, Any] = field(default_factory=dict)
 
 
@@ -113,6 +116,7 @@ def html(page: Page) -> bytes:
         "page.html",
         page,
         mesh=_base64(page.mesh.data),
+        shades=_base64(page.mesh.shades.data) if page.mesh.shades else "",
         three=_base64(_three()),
         model=_data("model.js"),
         licence=_data("three.LICENSE"),

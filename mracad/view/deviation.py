@@ -22,6 +22,7 @@ _STARTS = 8  # of Newton's method, of those, where a foot lies at the end of a f
 _INWARD = 0.1  # of their spacing, to the middle of their triangles: samples are on no seam and at no pole
 _STEPS = 8  # of Newton's method
 _BEYOND = 0.01  # of a face: how far its surface goes on
+_INSIDE = 1e-4  # of a face: how far from its ends normals are taken
 _DONE = 1e-10  # of the diagonal: a step that ends it, and the least distance
 
 
@@ -67,8 +68,11 @@ class Reference:
         return cls(entries, uv, [cKDTree(each) for each in points], cKDTree(np.concatenate(some)), owner, body.diagonal)
 
     def deviation(self, spots: Spots) -> Array:
-        """Distances of places from the nearest point, mm, positive on the outer side of its face."""
-        points = spots.point.T
+        """Distances of places; see :meth:`distances`."""
+        return self.distances(spots.point.T)
+
+    def distances(self, points: Array) -> Array:
+        """Distances of points ``(q, 3)`` from the nearest point, mm, positive on the outer side of its face."""
         found = np.full(len(points), np.inf)
         owner = self.owner[self.thin.query(points)[1]]
         self._approach(points, found, owner)
@@ -153,7 +157,10 @@ def _off(facets: Facets, points: Array, uv: Array, done: float) -> tuple[Array, 
         if not len(left):
             break
     s, su, sv = facets.ground.jets(uv, 1)
+    ended = ((uv <= low) | (uv >= high)).any(axis=1)
+    if ended.any():  # beyond a pole a surface goes on inside out
+        inner = _INSIDE * (high - low)
+        _, su[ended], sv[ended] = facets.ground.jets(np.clip(uv[ended], low + inner, high - inner), 1)
     r = points - s
     side = (r * (facets.outward * unit(cross(su, sv)))).sum(axis=1)
-    ended = ((uv <= low) | (uv >= high)).any(axis=1)
     return np.where(side < 0.0, -1.0, 1.0) * np.linalg.norm(r, axis=1), ended

@@ -1,5 +1,6 @@
 """mracad report: what it says, and what it refuses."""
 
+import base64
 import json
 
 import pytest
@@ -52,6 +53,10 @@ def test_an_edit_makes_a_report_of_what_it_did(mracad, samples, tmp_path, small_
     said = " ".join(page.texts)
     assert "smooth --scale 25mm" in said and "valid: yes, as read back" in said and "wrote a.step" in said
     assert "Deviation from before, −0.0" in said and "Zebra stripes: before and after" in said
+    assert "Height of waves by wavelength before and after, 6 faces that moved" in said
+    plot = next(each for each in page.addresses if each.startswith("data:image/svg+xml;base64,"))
+    drawn = base64.b64decode(plot.partition(",")[2]).decode()
+    assert all(f">{word}</text>" in drawn for word in ("before", "after", "noise", "smooth at 25 mm"))
     assert agree(page.tables["faces"], told["faces"]) > 6 * 7
     assert agree(page.tables["seams"], told["seams"]["each"]) >= 7 * 7
     assert agree(page.tables["deviation"], told["deviation"]) == 6 * 5

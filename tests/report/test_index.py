@@ -47,7 +47,7 @@ def batched(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         for name in ("SIZE", "PAIR"):
             patch.setattr(f"mracad.report.figures.{name}", "96x64")
-        face = shapes.face_on(shapes.bspline(shapes.wavy_poles(9, 8)))
+        face = shapes.face_on(shapes.bspline(shapes.wavy_poles(14, 12)))
         package.write(shapes.document(face, names={0: HOSTILE}), folder / "in" / NAMES[0])
         (folder / "in" / NAMES[1]).write_bytes((folder / "in" / NAMES[0]).read_bytes())
         package.write(shapes.document(*halves()), folder / "in" / NAMES[2])
@@ -145,4 +145,12 @@ def test_an_index_in_a_browser(batched, tmp_path):
         browser.ask(f"{shown}[0].cells[1].querySelector('a').click()")
         browser._until(lambda: browser.ask("document.querySelector('#stage.live canvas') !== null"))
         assert NAMES[1] in browser.ask("document.querySelector('h1').textContent")
+        assert browser.ask("document.querySelector('.bar').hidden")
+        plain = browser.seen("canvas")
+        browser.ask("document.querySelector('[data-show=deviation]').click()")
+        browser._until(lambda: not browser.ask("document.querySelector('.bar').hidden"))
+        mapped = browser.seen("canvas")
+        assert (np.ptp(mapped, axis=2) > 60).mean() > 0.02 > (np.ptp(plain, axis=2) > 60).mean(), "red and blue"
+        browser.ask("document.querySelector('[data-show=shaded]').click()")
+        assert np.abs(browser.seen("canvas") - plain).max() <= 1
         assert browser.complaints() == []

@@ -6,12 +6,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from mracad.report.figures import alone, both, still, thumbnail
+from mracad.report.figures import alone, both, reference_name, still, thumbnail
 from mracad.report.mesh import mesh
-from mracad.report.page import Figure, Page, Verdict, html
+from mracad.report.page import SVG, Figure, Page, Verdict, html
 from mracad.report.table import Column, Table
+from mracad.spec.quantity import length
 from mracad.spec.recipe import versions
 from mracad_cli.render import json, text
+from mracad_cli.render.text import mm
 
 if TYPE_CHECKING:
     from mracad.job.document import Report
@@ -94,13 +96,42 @@ def edited(
     said = [line for step, result in pairs for line in _lines(step, result, found)]
     shown = after or before
     figures = [*(both(after, before) if after else []), *alone(shown, "zebra" if after else "")]
+    figures += _plots(before.name, pairs) if after else []
     asked = [(f"Step {k}" if len(steps) > 1 else "Step", step.text()) for k, step in enumerate(steps, 1)]
     if done.made:
         said.append(f"wrote {', '.join(made.target.name for made in done.made)}")
     else:
         said.append("nothing written" if after else "dry run, nothing written")
-    page = _page("Edit report", shown, asked, said, verdicts, figures, tables)
+    page = _page("Edit report", (shown, before if after else None), asked, said, verdicts, figures, tables)
     return html(replace(page, row=_row(page, done, key)) if key else page)
+
+
+def _plots(name: str, pairs: Sequence[tuple[Step, Report | Judged]]) -> list[Figure]:
+    """Heights of waves on the faces that edits moved, before and after all of them."""
+    from mracad.inspect.spectrum import spectra
+    from mracad.job.document import Report
+    from mracad_cli.render.plot import compared
+
+    edits = [(step, result) for step, result in pairs if isinstance(result, Report)]
+    moved = sorted({o.face for _, each in edits for o in each.edit.faces("edited")})
+    if not moved:
+        return []
+    first, last = edits[0][1], edits[-1][1]
+    before, after = spectra(first.model, moved), spectra(last.edit.displacement.applied(last.model), moved)
+    common = {each.faces for each in before} & {each.faces for each in after}
+    before, after = ([each for each in some if each.faces in common] for some in (before, after))
+    if not common:
+        return []
+    scales = {f"{step.id} at {mm(scale)}": scale for step, each in edits for scale in _scales(step, each)}
+    caption = f"Height of waves by wavelength before and after, {text.plural(len(common), 'face')} that moved"
+    return [Figure(caption, compared(name, before, after, scales), SVG, wide=True)]
+
+
+def _scales(step: Step, result: Report) -> list[float]:
+    """The scale of an edit, mm, if it has one."""
+    asked = getattr(step.options, "scale", None)
+    own = length(asked, result.model.diagonal, "scale") if asked else result.edit.scale
+    return [own] if own else []
 
 
 def _row(page: Page, done: Production, key: str) -> dict[str, Any]:
@@ -125,19 +156,27 @@ def judged(document: Document, other: Document | None, found: Judged, command: s
     figures = [*(both(document, other) if other else []), *alone(document, "zebra" if other else "")]
     verdict = _judged(command, body)
     return html(
-        _page(f"{command} report", document, asked, text.verdict_lines(found.verdict, found.failed), [verdict], figures)
+        _page(
+            f"{command} report",
+            (document, other),
+            asked,
+            text.verdict_lines(found.verdict, found.failed),
+            [verdict],
+            figures,
+        )
     )
 
 
 def _page(
     kind: str,
-    document: Document,
+    compared: tuple[Document, Document | None],
     asked: Sequence[tuple[str, str]],
     said: Sequence[str],
     verdicts: Sequence[Verdict],
     figures: Sequence[Figure],
     tables: Sequence[Table] = (),
 ) -> Page:
+    document, reference = compared
     return Page(
         title=document.name,
         kind=kind,
@@ -145,7 +184,8 @@ def _page(
         lines=[*said, *(f"warning: {each}" for each in document.warnings)],
         verdicts=verdicts,
         still=still(document),
-        mesh=mesh(document, {}),
+        mesh=mesh(document, {}, reference),
+        reference=reference_name(document, reference),
         figures=figures,
         tables=tables,
     )

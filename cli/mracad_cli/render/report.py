@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from mracad.report.figures import alone, both, still
+from mracad.report.figures import alone, both, reference_name, still
 from mracad.report.mesh import mesh
 from mracad.report.page import SVG, Figure, Page, Verdict
 from mracad.report.table import Column, Table
@@ -122,7 +122,8 @@ def page(report: Told) -> Page:
         lines=[*report.lines, *(f"warning: {each}" for each in body["warnings"])],
         verdicts=verdicts,
         still=still(document),
-        mesh=mesh(document, {face["face"] - 1: _called(face) for face in body["faces"]}),
+        mesh=mesh(document, {face["face"] - 1: _called(face) for face in body["faces"]}, reference),
+        reference=reference_name(document, reference),
         figures=figures,
         tables=[Table("faces", "Faces", columns, body["faces"]), Table("seams", "Seams", SEAMS, body["seams"]["each"])],
     )

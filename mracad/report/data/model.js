@@ -39,7 +39,7 @@ const VERTEX = `
 attribute vec4 tint; attribute float face; varying vec3 n; varying vec4 colour; flat varying float own;
 void main() { n = normalMatrix * normal; colour = tint; own = face; gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.0); }`;
 const FRAGMENT = `
-uniform bool zebra; uniform float chosen; varying vec3 n; varying vec4 colour; flat varying float own;
+uniform bool zebra, mapped; uniform float chosen; varying vec3 n; varying vec4 colour; flat varying float own;
 float under(float x) { float whole = floor(x); return 0.5 * whole + min(x - whole, 0.5); }
 void main() {
   vec3 m = normalize(n) * (gl_FrontFacing ? 1.0 : -1.0);
@@ -51,6 +51,8 @@ void main() {
     float light = (under(phase + 0.5 * wide) - under(phase - 0.5 * wide)) / wide;
     vec3 white = abs(own - chosen) < 0.5 ? base : vec3(0.97, 0.97, 0.965);
     shown = mix(vec3(0.13, 0.15, 0.18), white, light) * (0.80 + 0.20 * clamp(m.z, 0.0, 1.0));
+  } else if (mapped) {
+    shown = colour.rgb * (0.82 + 0.18 * clamp(m.z, 0.0, 1.0));
   } else {
     float soft = 0.46 + 0.14 * m.y + 0.34 * max(dot(key, m), 0.0) + 0.16 * max(m.z, 0.0);
     shown = base * soft * (gl_FrontFacing ? 1.0 : 0.86) + 0.10 * pow(max(dot(between, m), 0.0), 24.0);
@@ -92,6 +94,52 @@ function geometries(THREE, head, faces, body) {
   return { surface, edges, clear: out.tint.some((value, k) => k % 4 === 3 && value < 255) };
 }
 
+/* For each instance the geometry in the colours of deviation: triangles are divided as many times as is said. */
+function shaded(THREE, head, faces, data, table) {
+  const triangles = faces.map((face) => face.corners.length / 3), starts = [];
+  let next = triangles.reduce((sum, count, k) => (starts[k] = sum) + count, 0);
+  return head.placed.map(({ body }) => {
+    const position = [], normal = [], tint = [], own = [], corners = [];
+    for (const k of head.bodies[body].faces) {
+      const { position: points, normal: normals, corners: of } = faces[k], first = position.length / 3;
+      const put = (weights, three) => {
+        for (let c = 0; c < 3; c++) {
+          position.push(weights.reduce((sum, w, i) => sum + w * points[3 * three[i] + c], 0));
+          normal.push(weights.reduce((sum, w, i) => sum + w * normals[3 * three[i] + c], 0));
+        }
+        const shade = 3 * data[next++];
+        tint.push(table[shade], table[shade + 1], table[shade + 2], 255);
+        own.push(head.faces[k][0]);
+      };
+      for (let i = 0; i < points.length / 3; i++) put([1], [i]);
+      for (let t = 0; t < triangles[k]; t++) {
+        const count = data[starts[k] + t], three = of.subarray(3 * t, 3 * t + 3);
+        if (count === 1) {
+          corners.push(first + three[0], first + three[1], first + three[2]);
+          continue;
+        }
+        let at = position.length / 3;
+        for (let i = 0; i <= count; i++) {
+          const row = count + 1 - i;
+          for (let j = 0; j < row; j++) {
+            put([(count - i - j) / count, i / count, j / count], three);
+            if (j + 1 < row) corners.push(at + j, at + row + j, at + j + 1);
+            if (j + 2 < row) corners.push(at + row + j, at + row + j + 1, at + j + 1);
+          }
+          at += row;
+        }
+      }
+    }
+    const made = new THREE.BufferGeometry();
+    made.setAttribute("position", new THREE.Float32BufferAttribute(position, 3));
+    made.setAttribute("normal", new THREE.Float32BufferAttribute(normal, 3));
+    made.setAttribute("tint", new THREE.BufferAttribute(new Uint8Array(tint), 4, true));
+    made.setAttribute("face", new THREE.Float32BufferAttribute(own, 1));
+    made.setIndex(corners);
+    return made;
+  });
+}
+
 async function begin() {
   const canvas = document.createElement("canvas");
   const context = canvas.getContext("webgl2", { antialias: true });
@@ -104,7 +152,7 @@ async function begin() {
   const renderer = new THREE.WebGLRenderer({ canvas, context });
   renderer.setClearColor(0xffffff, 1);
   renderer.outputColorSpace = THREE.LinearSRGBColorSpace;
-  const uniforms = { zebra: { value: false }, chosen: { value: -1 } };
+  const uniforms = { zebra: { value: false }, mapped: { value: false }, chosen: { value: -1 } };
   const shade = { uniforms, vertexShader: VERTEX, fragmentShader: FRAGMENT, side: THREE.DoubleSide, polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1 };
   const solid = new THREE.ShaderMaterial(shade);
   const glass = new THREE.ShaderMaterial({ ...shade, transparent: true });
@@ -231,11 +279,21 @@ async function begin() {
   }, { passive: false });
   canvas.addEventListener("dblclick", () => look(1, -1, 1));
   for (const button of stage.querySelectorAll("[data-view]")) button.addEventListener("click", () => look(...button.dataset.view.split(",").map(Number)));
-  const shows = [...stage.querySelectorAll("[data-show]")];
+  const shows = [...stage.querySelectorAll("[data-show]")], bar = stage.querySelector(".bar");
+  const plain = surfaces.map((each) => each.geometry);
+  let coloured = null;
   for (const button of shows) {
-    button.addEventListener("click", () => {
+    button.addEventListener("click", async () => {
+      const show = button.dataset.show;
+      if (show === "deviation" && !coloured) {
+        const table = Uint8Array.from(atob(JSON.parse(text("table")).table), (c) => c.charCodeAt(0));
+        coloured = shaded(THREE, head, faces, new Uint8Array(await inflated("shades")), table);
+      }
       for (const each of shows) each.setAttribute("aria-pressed", String(each === button));
-      uniforms.zebra.value = button.dataset.show === "zebra";
+      uniforms.zebra.value = show === "zebra";
+      uniforms.mapped.value = show === "deviation";
+      surfaces.forEach((each, k) => { each.geometry = (show === "deviation" ? coloured : plain)[k]; });
+      if (bar) bar.hidden = show !== "deviation";
       draw();
     });
   }
