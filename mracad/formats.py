@@ -46,6 +46,8 @@ FORMATS = {
         Format("gltf", (".gltf",), "mesh"),
         Format("glb", (".glb",), "mesh"),
         Format("png", (".png",), "picture"),
+        Format("gif", (".gif",), "picture"),
+        Format("mp4", (".mp4",), "picture"),
     )
 }
 

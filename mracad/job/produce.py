@@ -21,6 +21,7 @@ from mracad.job.words import of_fault
 from mracad.model.facts import Facts
 from mracad.spec.pictures import Picture
 from mracad.spec.quantity import length
+from mracad.spec.steps import Selection
 
 if TYPE_CHECKING:
     from mracad.occ.document import Document
@@ -133,7 +134,7 @@ def produce(
             return done
         tell(progress, "writing")
         made = tuple(
-            _pictured(document, target, original) if _is(target, "picture") else _made(document, target, title)
+            _pictured(done, target, original, steps) if _is(target, "picture") else _made(document, target, title)
             for target in targets
         )
         if verify:
@@ -267,15 +268,24 @@ def _made(document: Document, target: Target, title: str) -> Made:
     return Made(target, stream.getvalue(), written)
 
 
-def _pictured(document: Document, target: Target, original: Original) -> Made:
-    """A picture of a document; deviation is measured from the document as it was, if from nothing else."""
+def _pictured(done: Production, target: Target, original: Original, steps: Sequence[Step]) -> Made:
+    """A picture of a document after its steps; what it is compared with is the document as it was, unless a file is
+    named, and what was done to it is what the last edit did."""
+    from mracad.job import treated
     from mracad.occ.files import Written, read
     from mracad.spec.pictures import show_of
     from mracad.view.picture import render
 
-    show, before = show_of(target.picture.show), target.picture.before
+    picture, show = target.picture, show_of(target.picture.show)
+    before = read(picture.before) if picture.before else original() if picture.wipe else None
     reference = (read(show.of) if show.of else original()) if show.kind == "deviation" else None
-    shown = render(document, target.picture, before=read(before) if before else None, reference=reference)
+    told = rings = None
+    for step, result in zip(steps, done.results, strict=False):
+        if isinstance(result, Report) and isinstance(step.options, Selection):
+            told, rings = treated.told(result, step.options), treated.rings(result)
+    shown = render(
+        done.document, picture, before=before, reference=reference, told=told, rings=rings, format=target.format
+    )
     return Made(target, shown.data, Written())
 
 

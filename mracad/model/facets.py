@@ -189,11 +189,16 @@ class Body:
     facets : mapping of int to Facets
         By face; a face that the kernel cannot mesh has none.
     placed : tuple of Placed
-    diagonal : float
-        Of the box of all points as placed, mm.
+    extent : ndarray (2, 3)
+        Least and largest coordinates of all points as placed, mm.
     """
 
     name: str
     facets: Mapping[int, Facets]
     placed: tuple[Placed, ...]
-    diagonal: float
+    extent: Array
+
+    @property
+    def diagonal(self) -> float:
+        """Of the box of all points, mm."""
+        return float(np.linalg.norm(self.extent[1] - self.extent[0]))

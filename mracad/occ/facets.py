@@ -93,7 +93,7 @@ def facets(document: Document, chord: float, angle: float) -> Body:
     instances = tuple(_placed(document))
     ends = [_extent(placed(each.points, place.frame)) for place in instances for each in _of(every, place)]
     low, high = np.array(ends).reshape(-1, 2, 3).swapaxes(0, 1) if ends else np.zeros((2, 1, 3))
-    return Body(document.name, every, instances, float(np.linalg.norm(high.max(axis=0) - low.min(axis=0))))
+    return Body(document.name, every, instances, np.array([low.min(axis=0), high.max(axis=0)]))
 
 
 def _collected(document: Document, grounds: list[Ground]) -> dict[int, Facets]:

@@ -11,7 +11,7 @@ from msgspec import Meta
 from mracad.errors import UsageError
 from mracad.spec.fields import nearest
 from mracad.spec.files import File, Naming
-from mracad.spec.quantity import NUMBER, length
+from mracad.spec.quantity import NUMBER, PLACE, length
 from mracad.spec.steps.base import Options
 
 Direction = tuple[float, float, float]
@@ -27,14 +27,20 @@ VIEWS: dict[str, Direction] = {
 }
 """Where the viewer is, from the model."""
 
-SHOWS = "shaded", "zebra", "isophotes", "curvature", "deviation", "roughness", "faces"
+SHOWS = "shaded", "zebra", "isophotes", "curvature", "deviation", "roughness", "faces", "features", "treatment"
 """What pictures show."""
+
+ALONE = "features", "treatment"
+"""Those that show no model beside another."""
 
 STRIPED = "zebra", "isophotes"
 """Those with stripes."""
 
 CURVATURES = "max", "mean", "gauss"
 """What maps of curvature show; the first by default."""
+
+AXES = "xyz"
+"""Axes on which planes of sections stand."""
 
 LEAST, MOST = 16, 8192
 """Least and largest width and height, pixels."""
@@ -120,11 +126,22 @@ def size_of(text: str, name: str = "size") -> tuple[int, int]:
     return width, height
 
 
+def section_of(text: str, name: str = "section") -> tuple[int, float]:
+    """The axis (0 to 2) and the position on it, mm, of a plane such as ``"z=120mm"``; raises UsageError."""
+    axis, equals, place = text.partition("=")
+    if not equals or axis.strip() not in AXES:
+        raise UsageError(f"{name}: {text!r} is not a plane", "write z=120mm; x and y are the other axes")
+    return AXES.index(axis.strip()), PLACE.read(place, name)
+
+
 ShowText = Annotated[str, Naming(prefix="deviation:"), show_of]
 """The type of a field that tells what a picture shows."""
 
 ViewText = Annotated[str, views_of]
 """The type of a field that holds views."""
+
+SectionText = Annotated[str, section_of]
+"""The type of a field that is a plane."""
 
 SizeText = Annotated[str, size_of]
 """The type of a field that is the size of a picture."""
@@ -140,7 +157,8 @@ class Picture(Options, frozen=True, kw_only=True, forbid_unknown_fields=True):
         Meta(
             description="What to show: shaded, zebra, isophotes, curvature:max (or :mean, :gauss), deviation:REF (from "
             "another file; for edits deviation alone, from the input), roughness (or roughness:10mm, by waves up to a "
-            "length), faces (their numbers)."
+            "length), faces (their numbers), features (as mracad feature list finds them; of edits that copy some, the "
+            "copies), treatment (of edits: what became of faces and edges)."
         ),
     ] = "shaded"
     view: Annotated[
@@ -160,11 +178,33 @@ class Picture(Options, frozen=True, kw_only=True, forbid_unknown_fields=True):
         Meta(description="Zebra and isophotes: number of dark stripes in half a turn of the normal.", ge=1, le=2000),
     ] = 36
     before: Annotated[File | None, Meta(description="Another file to show on the left, from the same place.")] = None
+    wipe: Annotated[
+        bool,
+        Meta(
+            description="One picture: its left half of the file of --before (for edits alone, of the input), its right "
+            "half of the model."
+        ),
+    ] = False
+    section: Annotated[
+        tuple[SectionText, ...],
+        Meta(description="Draw the curve in which a plane cuts the model: z=120mm, x=0 …; repeatable."),
+    ] = ()
+    comb: Annotated[
+        bool,
+        Meta(
+            description="Draw the curvature of sections as a comb: teeth on the outer side of the bend, as long as "
+            "the curvature, to the scale that is stated."
+        ),
+    ] = False
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if not 1 <= len(self.views) <= PANELS:
             raise UsageError(f"view: {len(self.views)} views", f"give 1 to {PANELS}")
+        if (self.before or self.wipe) and show_of(self.show).kind in ALONE:
+            raise UsageError(f"show: {self.show} is of one model", "leave out before and wipe")
+        if self.comb and not self.section:
+            raise UsageError("comb: there is no section", "add --section z=120mm")
         if "stripes" in self.given() and show_of(self.show).kind not in STRIPED:
             raise UsageError(f"stripes: {self.show} has none", "add --show zebra or --show isophotes")
 

@@ -93,6 +93,8 @@ MEMORY = Kind(
 """In bytes."""
 ANGLE = Kind("an angle", "0.5 or 0.5deg", {"": 1.0, "deg": 1.0, "°": 1.0, "rad": math.degrees(1.0)}, positive=False)
 """In degrees."""
+PLACE = Kind("a position", "120mm or -2in", {"": 1.0, **MILLIMETRES}, positive=False)
+"""In millimetres."""
 SHARE = Kind("a percentage", "1%", {"": 1.0, "%": 1.0}, positive=False)
 """In hundredths."""
 

@@ -60,10 +60,20 @@ def axes(view: str) -> Array:
     return np.stack([right, np.cross(toward, right), toward])
 
 
-def fitted(axes: Array, points: Array, size: tuple[int, int]) -> Camera:
-    """A camera that shows all points ``(n, 3)``."""
+def round_about(axes: Array, share: float) -> Array:
+    """Axes after a share of a turn about the vertical: the model turns anticlockwise, seen from above."""
+    angle = -2.0 * np.pi * share
+    cos, sin = np.cos(angle), np.sin(angle)
+    return np.asarray(axes @ np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]]))
+
+
+def fitted(
+    axes: Array, points: Array, size: tuple[int, int], margin: float = MARGIN, middle: Array | None = None
+) -> Camera:
+    """A camera that shows all points ``(n, 3)``, around a ``middle`` (3,) or as large as possible."""
     seen = points @ axes[:2].T
     low, high = seen.min(axis=0), seen.max(axis=0)
-    free = (1.0 - 2.0 * MARGIN) * np.array(size)
-    pixel = float(((high - low) / free).max())
-    return Camera(axes, 0.5 * (low + high), pixel or 1.0, size)
+    centre = 0.5 * (low + high) if middle is None else axes[:2] @ middle
+    reach = 2.0 * np.maximum(high - centre, centre - low)
+    pixel = float((reach / ((1.0 - 2.0 * margin) * np.array(size))).max())
+    return Camera(axes, centre, pixel or 1.0, size)

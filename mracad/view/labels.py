@@ -46,7 +46,7 @@ def of_faces(panel: Panel) -> tuple[list[Label], int]:
 
 
 def placed(
-    labels: Sequence[Label], size: Callable[[str], tuple[int, int]], panel: tuple[int, int]
+    labels: Sequence[Label], size: Callable[[str], tuple[int, int]], window: Array
 ) -> tuple[list[tuple[str, int, int]], int]:
     """Texts with their middles, and how many found no place.
 
@@ -56,14 +56,14 @@ def placed(
         Those that matter most first.
     size : callable
         Width and height of a text, pixels.
-    panel : (int, int)
-        Width and height of the panel.
+    window : ndarray (2, 2)
+        Least and largest x and y that texts may take.
     """
     taken = np.empty((0, 2, 2))
     found = []
     for label in labels:
         half = 0.5 * np.array(size(label.text)) + _GAP
-        for spot in _within(label.spots, half, panel):
+        for spot in _within(label.spots, half, window):
             box = np.array([spot - half, spot + half])
             if ((box[1] <= taken[:, 0]) | (box[0] >= taken[:, 1])).any(axis=1).all():
                 taken = np.concatenate([taken, box[None]])
@@ -72,6 +72,6 @@ def placed(
     return found, len(labels) - len(found)
 
 
-def _within(spots: Array, half: Array, panel: tuple[int, int]) -> Iterable[Array]:
-    """The places whose text is inside the panel."""
-    return spots[((spots >= half) & (spots <= panel - half)).all(axis=1)]
+def _within(spots: Array, half: Array, window: Array) -> Iterable[Array]:
+    """The places whose text is inside a window."""
+    return np.asarray(spots[((spots >= window[0] + half) & (spots <= window[1] - half)).all(axis=1)])

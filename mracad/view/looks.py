@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from mracad.bspline.vectors import unit
 from mracad.spec.pictures import Show
 from mracad.view.colours import CLAY, rgb, several
 from mracad.view.fields import Field
+from mracad.view.lines import Stroke
 from mracad.view.seen import Seen, Stage
 
 Array = np.ndarray
@@ -29,8 +30,13 @@ def faces(stage: Stage, seen: Seen) -> Array:
     """Every face in a colour of its own."""
     table = several(max(facets.face for _, _, facets in stage.entries) + 1)
     own = np.array([facets.face for _, _, facets in stage.entries])
+    return tinted(stage, seen, table[own[seen.entry]])
+
+
+def tinted(stage: Stage, seen: Seen, colours: Array) -> Array:
+    """Colours ``(q, 3)``, a little darker where faces turn away."""
     facing = np.clip(stage.camera.toward @ seen.facing, 0.0, 1.0)
-    return np.asarray(table[own[seen.entry]] * (0.74 + 0.26 * facing)[:, None])
+    return np.asarray(colours * (0.74 + 0.26 * facing)[:, None])
 
 
 def _lit(stage: Stage, seen: Seen, colours: Array) -> Array:
@@ -89,11 +95,14 @@ class Look:
         The derivatives of surfaces that it needs.
     coloured : bool
         Whether it shows the document's colours, and through transparent ones.
+    strokes : mapping of int to Stroke
+        Of edges that are not drawn as usual.
     """
 
     at: Callable[[Stage, Seen], Array]
     order: int = 2
     coloured: bool = False
+    strokes: Mapping[int, Stroke] = field(default_factory=dict)
 
 
 def look(show: Show, stripes: int, numbers: Field | None) -> Look:

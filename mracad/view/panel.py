@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from mracad.model.facets import Placed
-from mracad.view.colours import INK, PAPER, opacity
+from mracad.view.colours import PAPER, opacity
 from mracad.view.fields import Scale
-from mracad.view.lines import REACH, Dots
+from mracad.view.lines import REACH, Dots, Lines, Stroke, edges
 from mracad.view.looks import Look
 from mracad.view.seen import FINE, Seen, Stage, layers, seen
 
@@ -18,9 +18,6 @@ Array = np.ndarray
 
 AT_ONCE = 1 << 17
 """Number of pixels that are worked on together."""
-
-EDGES = 0.85
-"""Opacity of lines."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,8 +34,8 @@ class Panel:
     shown : ndarray (q, 3) or (q,)
         Colours, or numbers of a map.
     entry : ndarray of int (q,)
-    ink : ndarray (height, width)
-        How much lines cover.
+    inks : list of (Stroke, ndarray (height, width))
+        How much lines cover, the lowest first.
     """
 
     stage: Stage
@@ -46,43 +43,44 @@ class Panel:
     weight: Array
     shown: Array
     entry: Array
-    ink: Array
+    inks: list[tuple[Stroke, Array]]
 
     def image(self, scale: Scale | None) -> Array:
         """The picture, ``(height, width, 3)`` bytes."""
         width, height = self.stage.camera.size
         colours = scale.colours(self.shown) if scale else self.shown
         paper = np.maximum(1.0 - np.bincount(self.pixel, self.weight, width * height), 0.0)
-        lined = np.flatnonzero(self.ink)
-        cover = EDGES * self.ink.ravel()[lined]
+        lined = [np.flatnonzero(ink) for _, ink in self.inks]
         picture = np.empty((height, width, 3), np.uint8)
         for k in range(3):
             light = np.bincount(self.pixel, self.weight * colours[:, k], width * height) + PAPER[k] * paper
-            light[lined] += cover * (INK[k] - light[lined])
+            for (stroke, ink), at in zip(self.inks, lined, strict=True):
+                light[at] += stroke.opacity * ink.ravel()[at] * (stroke.colour[k] - light[at])
             picture[..., k] = (255.0 * light + 0.5).reshape(height, width)
         return picture
 
 
-def panel(stage: Stage, look: Look) -> Panel:
-    """Look at a model."""
+def panel(stage: Stage, look: Look, lines: Sequence[Lines] = ()) -> Panel:
+    """Look at a model, and at lines on it."""
     width, height = stage.camera.size
-    dots = Dots.of(stage)
+    dots = [*edges(stage, look.strokes), *(each.dots(stage.camera) for each in lines)]
     tall = max(1, AT_ONCE // width)
     found = [_rows(stage, look, dots, (y, min(y + tall, height))) for y in range(0, height, tall)]
-    parts, inks = [part for each, _ in found for part in each], [ink for _, ink in found]
+    parts = [part for each, _ in found for part in each]
+    inks = [(each.stroke, np.concatenate([ink[k] for _, ink in found])) for k, each in enumerate(dots)]
     pixel, weight, shown, entry = (np.concatenate([part[k] for part in parts]) for k in range(4))
-    return Panel(stage, pixel, weight, shown, entry, np.concatenate(inks))
+    return Panel(stage, pixel, weight, shown, entry, inks)
 
 
 Part = tuple[Array, Array, Array, Array]
 
 
-def _rows(stage: Stage, look: Look, dots: Dots, rows: tuple[int, int]) -> tuple[list[Part], Array]:
+def _rows(stage: Stage, look: Look, dots: Sequence[Dots], rows: tuple[int, int]) -> tuple[list[Part], list[Array]]:
     """What is seen in some rows, and their lines."""
     around = max(rows[0] - REACH, 0), min(rows[1] + REACH, stage.camera.size[1])
     own = slice((rows[0] - around[0]) * FINE, (rows[1] - around[0]) * FINE)
     solid, deep, glass, near = layers(stage, around, lambda place, k: look.coloured and _opacity(place, k) < 1.0)
-    ink = dots.drawn(rows, near, around, stage.camera.pixel)
+    inks = [each.drawn(rows, near, around, stage.camera.pixel) for each in dots]
     behind = seen(stage, solid[own], deep[own], rows, look.order)
     parts = [(behind, np.ones(len(behind.pixel)))]
     if (glass[own] >= 0).any():
@@ -93,7 +91,7 @@ def _rows(stage: Stage, look: Look, dots: Dots, rows: tuple[int, int]) -> tuple[
         (each.pixel.astype(np.int32), (each.weight * share).astype(np.float32),
          look.at(stage, each).astype(np.float32), each.entry.astype(np.int32))
         for each, share in parts
-    ], ink  # fmt: skip
+    ], inks  # fmt: skip
 
 
 def _opacity(place: Placed, position: int) -> float:

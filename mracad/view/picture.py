@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -12,14 +12,17 @@ import numpy as np
 from mracad.errors import FileError, UsageError
 from mracad.model.facets import Body
 from mracad.occ.facets import facets
-from mracad.spec.pictures import Picture, show_of, size_of
-from mracad.spec.select import select
-from mracad.view.camera import Camera, axes, fitted
+from mracad.spec.pictures import Picture, Show, show_of, size_of
+from mracad.spec.select import every_nurbs, select
 from mracad.view.fields import map_of, numbers_of
-from mracad.view.looks import look
-from mracad.view.panel import panel
-from mracad.view.seen import Stage
-from mracad.view.sheet import boxes, grid, png
+from mracad.view.film import packed
+from mracad.view.labels import of_faces
+from mracad.view.legend import Legend, strip
+from mracad.view.looks import Look, look
+from mracad.view.rings import Ring, Rings
+from mracad.view.scene import TURNS, Scene
+from mracad.view.sheet import Numbers, Pane, drawn
+from mracad.view.treatment import Told
 
 if TYPE_CHECKING:
     from mracad.occ.document import Document
@@ -44,11 +47,13 @@ class Rendered:
     Attributes
     ----------
     data : bytes
-        PNG.
+        PNG, GIF or MP4.
     title, unit : str
         What a map shows, and in which unit; ``""`` for pictures that show no numbers.
     lowest, highest : float
         The extreme numbers in the picture.
+    rings : int, optional
+        Number of features, where these are shown.
     """
 
     data: bytes = field(repr=False)
@@ -56,6 +61,7 @@ class Rendered:
     unit: str = ""
     lowest: float = 0.0
     highest: float = 0.0
+    rings: int | None = None
 
 
 def render(
@@ -64,6 +70,9 @@ def render(
     *,
     before: Document | None = None,
     reference: Document | None = None,
+    told: Told | None = None,
+    rings: Sequence[Ring] | None = None,
+    format: str = "png",
 ) -> Rendered:
     """A picture of a document.
 
@@ -75,39 +84,84 @@ def render(
         Shown on the left, from the same place.
     reference : Document, optional
         What ``show="deviation"`` is measured from.
+    told : Told, optional
+        What ``show="treatment"`` shows.
+    rings : sequence of Ring, optional
+        What ``show="features"`` shows, unless features are to be found.
+    format : {"png", "gif", "mp4"}
+        The last two turn the model.
 
     Raises
     ------
     UsageError
-        When faces to fit in do not exist, or deviation has no reference.
+        When faces to fit in do not exist, a section does not meet the model, or what is to be shown is not given.
     FileError
         When nothing can be drawn.
     """
     picture = picture or Picture()
     show, size = show_of(picture.show), size_of(picture.size)
+    show = show_of(picture.show)
     if show.kind == "deviation" and reference is None:
         raise UsageError("show: deviation needs what it is measured from", "write deviation:REF.step")
+    if show.kind == "treatment" and told is None:
+        raise UsageError("show: treatment is what an edit did", "give it with -o OUT.png to an edit, such as smooth")
+    if picture.wipe and before is None:
+        raise UsageError("wipe: there is no other model", "add --before REF.step")
+    told = told if show.kind == "treatment" else None
+    rings = (_proposed(document) if rings is None else rings) if show.kind == "features" else None
     wanted, closer = _wanted(document, picture.fit)
     mesh = partial(_meshed, chord=CHORD / max(size) / closer)
     bodies = [mesh(each) for each in (before, document) if each]
     base = mesh(reference) if show.kind == "deviation" and reference else None
-    eyes = [look(show, picture.stripes, numbers_of(show, bodies[-1].diagonal, body.facets, base)) for body in bodies]
-    legend = map_of(show, bodies[-1].diagonal)
-    rows, columns = (len(picture.views), 2) if before else grid(len(picture.views), size)
-    places = boxes(size, rows, columns, legend is not None)
+    marked = Rings.of(rings, bodies[-1]) if rings is not None else None
+    looks = [_look(show, picture, body, base, told or marked) for body in bodies]
+    legend = Legend(map_of(show, bodies[-1].diagonal), key=told.key if told else ())
     points = np.concatenate([_points(body, wanted) for body in (bodies if wanted is None else bodies[-1:])])
-    cameras = _cameras(picture.views, points, places[:: len(bodies)])
-    pairs = [(body, eye, camera) for camera in cameras for body, eye in zip(bodies, eyes, strict=True)]
-    panels = [panel(Stage.of(body, camera), eye) for body, eye, camera in pairs]
-    shown = np.concatenate([each.shown for each in panels])
-    key = (legend, legend.scale(shown)) if legend else None
-    names = [body.name for body in bodies] if before else [""]
-    views = picture.views if len(picture.views) > 1 else [""]
-    captions = ["  ".join(filter(None, [name, view])) for view in views for name in names]
-    data = png(size, places[: len(panels)], panels, captions, key, show.kind == "faces")
-    if legend is None or not len(shown):
-        return Rendered(data)
-    return Rendered(data, legend.title, legend.unit, float(shown.min()), float(shown.max()))
+    turns = 1 if format == "png" else TURNS
+    scene = Scene.of(picture, bodies, looks, points, strip(legend, size), turns)
+    return _drawn(scene, replace(legend, comb=scene.comb), marked, turns, format)
+
+
+def _look(show: Show, picture: Picture, body: Body, base: Body | None, marks: Told | Rings | None) -> Look:
+    """How to look at a body."""
+    if isinstance(marks, Told):
+        return marks.look()
+    if isinstance(marks, Rings):
+        return Look(marks.look, 1)
+    return look(show, picture.stripes, numbers_of(show, body.diagonal, body.facets, base))
+
+
+def _drawn(scene: Scene, legend: Legend, rings: Rings | None, turns: int, format: str) -> Rendered:
+    """The file of a scene; a map has one range of colours for all turns."""
+    size, kind = size_of(scene.picture.size), show_of(scene.picture.show).kind
+    numbers: Numbers | None = of_faces if kind == "faces" else rings.labels if rings else None
+    noun = "feature" if rings else "small face"
+    first = scene.panes(0)
+    span = (0.0, 0.0)
+    if legend.map:
+        seen = [_values(first), *(_values(scene.panes(k)) for k in range(1, turns))]
+        values = np.concatenate(seen)
+        legend = replace(legend, scale=legend.map.scale(values))
+        span = (float(values.min()), float(values.max())) if len(values) else span
+    frames = [drawn(size, scene.panes(k) if k else first, legend, numbers, noun) for k in range(turns)]
+    data = packed(frames, format)
+    if rings:
+        return Rendered(data, rings=int(rings.number.max(initial=0)))
+    return Rendered(data, legend.map.title, legend.map.unit, *span) if legend.map else Rendered(data)
+
+
+def _values(panes: Sequence[Pane]) -> Array:
+    """The numbers on a sheet."""
+    return np.concatenate([panel.shown for pane in panes for panel in pane.panels])
+
+
+def _proposed(document: Document) -> list[Ring]:
+    """The features of all NURBS faces, the highest first."""
+    from mracad.edit.feature.find import found
+    from mracad.occ.view import view
+
+    model = view(document)
+    return [Ring(each.face, each.place, 0.5 * each.size) for each in found(model, every_nurbs(model))]
 
 
 def _meshed(document: Document, chord: float) -> Body:
@@ -144,10 +198,3 @@ def _points(body: Body, wanted: frozenset[int] | None) -> Array:
     if not found:
         raise FileError(f"'{body.name}': the faces to fit in cannot be meshed", "choose others")
     return np.concatenate(found)
-
-
-def _cameras(views: Sequence[str], points: Array, places: Sequence[tuple[int, int, int, int]]) -> list[Camera]:
-    """A camera for each view; all at the same scale."""
-    found = [fitted(axes(view), points, place[2:]) for view, place in zip(views, places, strict=False)]
-    pixel = max(camera.pixel for camera in found)
-    return [Camera(each.axes, each.centre, pixel, each.size) for each in found]

@@ -41,12 +41,14 @@ def options(command: click.Command, without: Container[str] = COVERED_ELSEWHERE)
 
 
 _LEVEL = [(), ("--band", "0mm:8mm"), ("--base", "level", "--band", "0mm:8mm")]
-_OUT = "outputs format schema chord angle ascii_stl show view fit picture_size stripes before"
+_OUT = "outputs format schema chord angle ascii_stl show view fit picture_size stripes before wipe section comb"
 _DONE = [
     ("-o", "out.step", "--schema", "AP242"),
     ("-o", "out.brep", "-o", "out.stl", "--chord", "1mm", "--angle", "30", "--ascii"),
     ("-o", "-", "--format", "iges"),
     ("-o", "out.png", "--picture-size", "64x48", "--show", "zebra", "--stripes", "10", "--view", "top", "--fit", "#1"),
+    ("-o", "out.png", "--picture-size", "96x48", "--show", "treatment", "--section", "x=5mm", "--comb"),
+    ("-o", "out.png", "--picture-size", "64x48", "--wipe"),
     ("--dry-run",),
 ]
 
@@ -133,7 +135,7 @@ TOGETHER: Mapping[str, Sequence[tuple[str, Sequence[Words]]]] = {
             ],
         )
     ],
-    "convert": [(_OUT, _DONE[:-1])],
+    "convert": [(_OUT, [*_DONE[:4], _DONE[5]])],
     "feature extract": [("base band", _LEVEL)],
     "render": [
         ("output size", [("-o", "out.png", "--size", "120x80"), ("-o", "-", "--size", "64x64")]),
@@ -141,7 +143,8 @@ TOGETHER: Mapping[str, Sequence[tuple[str, Sequence[Words]]]] = {
             "show stripes",
             [(), ("--show", "zebra", "--stripes", "10"), ("--show", "isophotes"), ("--show", "curvature:gauss")],
         ),
-        ("before", [()]),
+        ("before wipe", [()]),
+        ("section comb", [(), ("--section", "x=5mm"), ("--section", "x=5mm", "--section", "y=5mm", "--comb")]),
     ],
 }
 """By command, options that need or exclude each other, and ways to give them."""

@@ -28,10 +28,11 @@ def test_deviation_from_another_file_is_told_with_its_range(mracad, samples, tmp
 def test_an_edit_writes_pictures_as_it_writes_models(mracad, samples, tmp_path):
     out = tmp_path / "after.png", tmp_path / "after.step"
     words = ("--scale", "25mm", "-o", out[0], "-o", out[1], "--show", "deviation", "--view", "top,front")
-    result = mracad("smooth", samples / "panel.step", *words)
+    result = mracad("smooth", samples / "panel.step", *words, "--picture-size", "360x240")
     assert result.code == 0 and "valid: yes, as read back" in result.out and "after.png" in result.out
     show = f"deviation:{samples / 'panel.step'}"
-    direct = mracad("render", out[1], "-o", tmp_path / "b.png", "--show", show, "--view", "top", "--view", "front")
+    again = ("--show", show, "--view", "top", "--view", "front", "--size", "360x240")
+    direct = mracad("render", out[1], "-o", tmp_path / "b.png", *again)
     assert direct.code == 0
     one, two = (np.asarray(Image.open(path)).astype(int) for path in (out[0], tmp_path / "b.png"))
     assert (np.abs(one - two).max(axis=2) > 8).mean() < 2e-3, "the picture is of the result"
@@ -39,7 +40,7 @@ def test_an_edit_writes_pictures_as_it_writes_models(mracad, samples, tmp_path):
 
 def test_what_a_picture_is_measured_from_is_a_need_of_it(mracad, samples, tmp_path):
     show = f"deviation:{samples / 'panel_clean.step'}"
-    words = ("-o", tmp_path / "a.png", "--show", show, "--depfile", tmp_path / "a.d")
+    words = ("-o", tmp_path / "a.png", "--show", show, "--depfile", tmp_path / "a.d", "--picture-size", "90x60")
     assert mracad("offset", samples / "panel.step", "--distance", "1mm", *words).code == 0
     assert "panel_clean.step" in (tmp_path / "a.d").read_text()
 
@@ -47,6 +48,40 @@ def test_what_a_picture_is_measured_from_is_a_need_of_it(mracad, samples, tmp_pa
 def test_convert_draws_too(mracad, samples, tmp_path):
     assert mracad("convert", samples / "blade.step", "-o", tmp_path / "a.png", "--show", "faces").code == 0
     assert Image.open(io.BytesIO((tmp_path / "a.png").read_bytes())).size == (1200, 800)
+
+
+def test_what_an_edit_did_is_drawn_as_its_report_says(mracad, samples, tmp_path):
+    from mracad.view.colours import rgb
+    from mracad.view.treatment import EDGES, FACES
+
+    out, report = tmp_path / "a.png", tmp_path / "a.json"
+    words = ("--faces", "#1", "--hold", "#4", "--scale", "25mm", "--show", "treatment", "--view", "top")
+    edit = mracad("smooth", samples / "panel.step", *words, "-o", out, "--picture-size", "500x300", "--report", report)
+    assert edit.code == 0
+    told, picture = json.loads(report.read_text()), np.asarray(Image.open(out).convert("RGB")).astype(int)
+
+    def area(colour):
+        return (np.abs(picture - 255 * rgb(colour)).max(axis=2) <= 12).sum()
+
+    assert {each["status"] for each in told["faces"]} == {"edited", "held", "unselected"}
+    assert {name for name, colour in FACES.items() if area(colour) > 2000} == {"edited", "held", "unselected"}
+    assert {each["how"] for each in told["edges"]} == {"frozen"} and area(EDGES["frozen"]) > 200
+    assert not area(EDGES["coupled"])
+
+
+def test_copies_of_an_edit_are_drawn_with_their_rings(mracad, small, tmp_path):
+    from mracad.view.rings import COLOUR
+
+    out, report = tmp_path / "a.png", tmp_path / "a.json"
+    words = ("--feature", "near:5,5,0,radius:1.5", "--at", "14,5,0", "--size", "1.5", "--report", report)
+    shown = ("-o", out, "--show", "features", "--view", "top", "--picture-size", "400x220")
+    assert mracad("repeat", small[0], *words, *shown).code == 0
+    (copy,) = json.loads(report.read_text())["copies"]
+    assert copy["radius"] == pytest.approx(1.5 * 1.5)
+    y, x = np.nonzero(np.abs(np.asarray(Image.open(out).convert("RGB")) - 255 * COLOUR).sum(axis=2) < 90)
+    pixel = 20 / (0.9 * 400)
+    assert [np.ptp(x) * pixel, np.ptp(y) * pixel] == pytest.approx([4.5, 4.5], abs=4 * pixel)
+    assert [x.mean() * pixel, y.mean() * pixel] == pytest.approx([200 * pixel + 4, 110 * pixel], abs=3 * pixel)
 
 
 @pytest.mark.parametrize(
@@ -70,7 +105,13 @@ def test_convert_draws_too(mracad, samples, tmp_path):
         (["--stripes", "0"], 2, "between 1 and 2000"),
         (["--fit", "#99"], 2, "#1 to #"),
         (["--fit", "edge#1"], 2, "no face is selected"),
-        (["-o", "a.jpg"], 2, "pictures are PNG"),
+        (["-o", "a.jpg"], 3, "unknown extension"),
+        (["-o", "a.step"], 2, "pictures are .png, .gif or .mp4"),
+        (["--show", "treatment"], 2, "give it to an edit"),
+        (["--wipe"], 2, "add --before"),
+        (["--comb"], 2, "add --section"),
+        (["--section", "z=9m"], 2, "the model is between z="),
+        (["--section", "z"], 2, "write z=120mm"),
         (["-o", "nowhere/a.png"], 3, "no folder"),
     ],
 )

@@ -15,7 +15,7 @@ from tests.occ import shapes
 def test_texts_take_the_next_place_that_is_free_or_none():
     at = np.array([[50, 50]])
     labels = [Label("a", at), Label("b", np.array([[55, 52], [50, 70]])), Label("c", at + 3), Label("d", at * 0 + 2)]
-    found, left_out = placed(labels, lambda text: (20, 10), (100, 100))
+    found, left_out = placed(labels, lambda text: (20, 10), np.array([[0, 0], [100, 100]]))
     assert found == [("a", 50, 50), ("b", 50, 70)]
     assert left_out == 2, "one has no room, one would leave the picture"
 

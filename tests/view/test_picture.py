@@ -1,6 +1,7 @@
 """Pictures, measured in their pixels: colours, stripes, lines, outlines."""
 
 import io
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
@@ -15,10 +16,11 @@ from PIL import Image
 
 import mracad
 from mracad.occ.facets import facets
-from mracad.spec.pictures import VIEWS
+from mracad.spec.pictures import VIEWS, Show
 from mracad.view.camera import axes, fitted
+from mracad.view.fields import map_of
+from mracad.view.legend import Legend, strip
 from mracad.view.picture import ANGLE, CHORD
-from mracad.view.sheet import boxes
 from tests.occ import shapes
 
 
@@ -27,6 +29,11 @@ def pixels(document, **options):
     others = {name: options.pop(name) for name in ("before", "reference") if name in options}
     drawn = mracad.render(document, mracad.Picture(**options), **others)
     return np.asarray(Image.open(io.BytesIO(drawn.data)).convert("RGB")).astype(float), drawn
+
+
+def beside_bar(size):
+    """Width of a panel beside a bar of colours."""
+    return size[0] - strip(Legend(map_of(Show("deviation"), 1.0)), size)
 
 
 @cache
@@ -46,7 +53,7 @@ def disc(size, radius, share):
 def test_the_curvature_of_a_sphere_is_one_colour(what, value):
     picture, drawn = pixels(sphere(10.0), show=f"curvature:{what}", view=("0.3,-1,0.2",), size="300x200")
     assert (drawn.lowest, drawn.highest) == pytest.approx((value, value), rel=1e-5)
-    wide = boxes((300, 200), 1, 1, bar=True)[0][2]
+    wide = beside_bar((300, 200))
     inside, _ = disc((wide, 200), 10.0, 0.97)
     colours = picture[:, :wide][inside]
     assert np.ptp(colours, axis=0).max() <= 2.55
@@ -56,7 +63,7 @@ def test_the_curvature_of_a_sphere_is_one_colour(what, value):
 
 def test_an_outline_covers_pixels_by_their_share():
     picture, _ = pixels(sphere(10.0), show="curvature", view=("front",), size="376x300")
-    assert boxes((376, 300), 1, 1, bar=True)[0][2] == 300
+    assert beside_bar((376, 300)) == 300
     seen = picture[:, :300]
     ground, colour = 255.0, np.median(seen[140:160, 140:160].reshape(-1, 3), axis=0)
     share = ((ground - seen) / (ground - colour)).mean(axis=2)[:270]
@@ -298,3 +305,31 @@ def test_the_same_bytes_again(show, samples):
         for _ in range(2)
     )
     assert first == second
+
+
+@dataclass(frozen=True)
+class Shaken:
+    """A surface whose points and derivatives are rounded otherwise."""
+
+    ground: object
+    rng: object
+
+    def jets(self, uv, order):
+        return tuple(each * (1 + 1e-12 * self.rng.standard_normal(each.shape)) for each in self.ground.jets(uv, order))
+
+
+def shaken(*asked):
+    body, rng = facets(*asked), np.random.default_rng(1)
+    found = {
+        k: replace(f, points=f.points * (1 + 1e-12 * rng.standard_normal(f.points.shape)), ground=Shaken(f.ground, rng))
+        for k, f in body.facets.items()
+    }
+    return replace(body, facets=found)
+
+
+@pytest.mark.parametrize(("name", "show"), [("blade", "zebra"), ("assembly", "shaded"), ("trimmed", "curvature")])
+def test_rounding_changes_no_pixel_by_more_than_one(name, show, samples, monkeypatch):
+    document = mracad.read(samples / f"{name}.step")
+    plain, _ = pixels(document, show=show, size="300x200")
+    monkeypatch.setattr("mracad.view.picture.facets", shaken)
+    assert np.abs(pixels(document, show=show, size="300x200")[0] - plain).max() <= 1

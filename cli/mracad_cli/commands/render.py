@@ -1,4 +1,4 @@
-"""Draw a model: shaded, or with zebra stripes, isophotes, curvature, roughness, deviation or numbered faces.
+"""Draw a model: shaded, or with zebra stripes, isophotes, maps of numbers, features or numbered faces.
 
 Every pixel is evaluated on the surface itself. No display is needed.
 """
@@ -10,7 +10,7 @@ from dataclasses import replace
 import click
 
 from mracad.errors import UsageError
-from mracad.formats import FORMATS
+from mracad.formats import FORMATS, by_extension
 from mracad.spec.pictures import Picture, show_of
 from mracad_cli import options
 from mracad_cli.command import Command
@@ -29,7 +29,7 @@ from mracad_cli.say import json_text
         metavar="OUT.png",
         required=True,
         type=click.Path(allow_dash=True),
-        help="Picture to write (PNG); - for standard output.",
+        help="Picture to write: .png, or .gif or .mp4, in which the model turns; - for PNG on standard output.",
     ),
     options.of(Picture, "picture"),
     options.overwrite,
@@ -44,8 +44,13 @@ def command(reading: Reading, output: str, picture: Picture, overwrite: bool, as
     show = show_of(picture.show)
     if show.kind == "deviation" and not show.of:
         raise UsageError("show: deviation needs a file from which it is measured", "write deviation:REF.step")
-    if output != "-" and not output.lower().endswith(FORMATS["png"].extensions):
-        raise UsageError(f"cannot draw {output}: pictures are PNG", "name a file that ends in .png")
+    if show.kind == "treatment":
+        raise UsageError("show: treatment is what an edit did", "give it to an edit, such as smooth, with -o OUT.png")
+    if picture.wipe and not picture.before:
+        raise UsageError("wipe: there is no other model", "add --before REF.step")
+    format = FORMATS["png"] if output == "-" else by_extension(output)
+    if format.kind != "picture":
+        raise UsageError(f"cannot draw {output}: pictures are .png, .gif or .mp4", "name a file that ends in .png")
     check_reports(None if output == "-" else output, overwrite=overwrite)
     with Progress() as progress:
         progress("reading", 0, 1)
@@ -55,7 +60,7 @@ def command(reading: Reading, output: str, picture: Picture, overwrite: bool, as
         progress("drawing", 0, 1)
         from mracad.view.picture import render
 
-        drawn = render(document, picture, before=before, reference=reference)
+        drawn = render(document, picture, before=before, reference=reference, format=format.name)
     if as_json:
         line = json_text(words.body(document.name, document.warnings, picture, drawn, output))
     else:

@@ -17,6 +17,8 @@ def line(name: str, picture: Picture, drawn: Rendered, output: str, seconds: flo
     what = picture.show
     if drawn.title:
         what = f"{drawn.title} {drawn.lowest:.3g} to {drawn.highest:.3g} {drawn.unit}".replace(" -", " −")
+    if drawn.rings is not None:
+        what = f"{drawn.rings or 'no'} feature{'s' * (drawn.rings != 1)}"
     views = ", ".join(picture.views)
     where = "standard output" if output == "-" else output
     return f"{name}: {what}; {views}, {width} × {height}; wrote {where}, {size(len(drawn.data))}, {seconds:.1f} s"
@@ -30,6 +32,7 @@ def body(name: str, warnings: tuple[str, ...], picture: Picture, drawn: Rendered
         "file": name,
         "show": picture.show,
         "views": list(picture.views),
+        "features": drawn.rings,
         "size": [width, height],
         "map": span if drawn.title else None,
         "written": output,

@@ -45,6 +45,8 @@ class Copy:
         Between the ideal copy and the surface under it, whatever its sign, mm³.
     taken : float
         Share of its volume, 0 to 1, that edges and holes that stay take away, or that lies beyond them.
+    radius : float
+        Of the feature in its size, mm.
     """
 
     place: str
@@ -58,6 +60,7 @@ class Copy:
     base: float = 0.0
     volume: float = 0.0
     taken: float = 0.0
+    radius: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,9 +93,13 @@ def compared(copies: Copies, wanted: Mapping[int, Wanted], done: Mapping[int, Ar
             left = done[i] - (each.offset - each.alone)
             for k, figures in _figures(copies, copies.ground.patches[i], each, left):
                 found[k].append(figures)
-    points = copies.feet.points
+    points, feature = copies.feet.points, copies.feature
     return [
-        replace(copied(each.label, points[k], found[k], bool(exact[k])), base=copies.feature.base * abs(each.height))
+        replace(
+            copied(each.label, points[k], found[k], bool(exact[k])),
+            base=feature.base * abs(each.height),
+            radius=feature.radius * each.size,
+        )
         for k, each in enumerate(copies.places)
     ]
 

@@ -1,0 +1,16 @@
+"""What edits did, in the words of their reports."""
+
+import mracad
+from mracad.job.treated import rings, told
+
+
+def test_faces_and_edges_are_counted_as_in_the_report(samples):
+    options = mracad.Smooth(scale="25mm", faces=("#1", "#2"), hold=("#4",))
+    report = mracad.run(mracad.read(samples / "panel.step"), mracad.smooth, options)
+    found = told(report, options)
+    assert found.faces == {0: "edited", 1: "edited", 3: "held"} | dict.fromkeys((2, 4, 5), "unselected")
+    assert found.words["edited"] == "2 faces smoothed at 25mm" and found.words["held"] == "1 face held by --hold"
+    assert found.words["coupled"] == "1 edge moved with both faces"
+    stay = [edge for edge in report.edit.edges if edge.reason]
+    assert found.words["frozen"].startswith(f"{len(stay)} edges stayed: ")
+    assert found.edges == {edge.edge: edge.how for edge in report.edit.edges} and rings(report) is None
