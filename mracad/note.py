@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import mmap
+from collections.abc import Callable
 
 
 class Note:
@@ -33,6 +34,7 @@ class Note:
 
 
 _note: Note | None = None  # of this process, when it is a child
+_watcher: Callable[[str], object] = bool
 
 
 def set_note(note: Note) -> None:
@@ -53,6 +55,14 @@ def doing(stage: str = "", subject: str = "") -> None:
     """
     if _note:
         _note.write(stage or _note.stage, subject or _note.subject)
+    if stage:
+        _watcher(stage)
+
+
+def watch(watcher: Callable[[str], object] = bool) -> None:
+    """Have a function called with the name of each stage that begins in this process; by default none."""
+    global _watcher
+    _watcher = watcher
 
 
 def now() -> str:

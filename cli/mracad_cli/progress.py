@@ -29,13 +29,20 @@ class Progress:
         self._task: Any = None
 
     def __enter__(self) -> Progress:
+        note.watch(self._begun)
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
     ) -> None:
+        note.watch()
         if self._bar is not None:
             self._bar.stop()
+
+    def _begun(self, stage: str) -> None:
+        """Show a stage that begins within the one that was told."""
+        if self._bar is not None:
+            self._bar.update(self._task, description=stage)
 
     def __call__(self, stage: str, done: int, total: int) -> None:
         note.doing(stage)

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
+import math
 import os
 import select
 import signal
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, TypeVar
 
 from mracad.errors import CrashError, LimitError, UsageError
@@ -19,6 +20,7 @@ from mracad.note import Note, set_note
 Result = TypeVar("Result")
 
 _GRACE = 1.0  # seconds for a child to clean up once its time is over
+_SOON, _TICK = 5.0, 0.5  # seconds for a child that was asked to end, and between looks whether it was
 _ENDING = 10.0  # seconds more for a child that is already moving its outputs into place
 _DEATH_SIGNAL = 1  # PR_SET_PDEATHSIG
 
@@ -70,7 +72,7 @@ def run(
     os.close(writer)
     try:
         with _passing_on(child) as asked:
-            data, finished = _received(reader, seconds, note)
+            data, finished = _received(reader, seconds, note, asked)
     except BaseException:
         _end(child)
         raise
@@ -78,6 +80,8 @@ def run(
         os.close(reader)
     if not finished:
         _end(child)
+        if asked:
+            _terminated()
         raise TimeLimitError(f"time limit of {seconds:g} s exceeded{note}", "raise --time-limit")
     _, status, usage = os.wait4(child, 0)
     if asked and not data.startswith(wire.DONE):
@@ -160,14 +164,17 @@ def _terminated(*_: object) -> None:
     raise SystemExit(128 + signal.SIGTERM)
 
 
-def _received(reader: int, seconds: float | None, note: Note) -> tuple[bytes, bool]:
-    """Everything that the child sends, and whether it ended in time."""
+def _received(reader: int, seconds: float | None, note: Note, asked: Sequence[float]) -> tuple[bytes, bool]:
+    """Everything that the child sends, and whether it ended in time: before a limit, and soon when it was asked to."""
     late = False
-    end = None if seconds is None else time.monotonic() + seconds
+    end = math.inf if seconds is None else time.monotonic() + seconds
     pieces: list[bytes] = []
     while True:
-        rest = None if end is None else max(end - time.monotonic(), 0.0)
-        if not select.select([reader], [], [], rest)[0]:
+        end = min(end, asked[0] + _SOON) if asked and not late else end
+        rest = max(end - time.monotonic(), 0.0)
+        if not select.select([reader], [], [], min(rest, _TICK))[0]:
+            if rest > _TICK:
+                continue
             if late or not note.ending:
                 return b"", False
             late, end = True, time.monotonic() + _ENDING
@@ -179,12 +186,12 @@ def _received(reader: int, seconds: float | None, note: Note) -> tuple[bytes, bo
 
 
 @contextlib.contextmanager
-def _passing_on(child: int) -> Iterator[list[int]]:
-    """Pass requests to end on to the child; yields the list of those that came."""
-    asked: list[int] = []
+def _passing_on(child: int) -> Iterator[list[float]]:
+    """Pass requests to end on to the child; yields the list of the times when they came."""
+    asked: list[float] = []
 
-    def end(number: int, _: object) -> None:
-        asked.append(number)
+    def end(*_: object) -> None:
+        asked.append(time.monotonic())
         os.kill(child, signal.SIGTERM)
 
     try:

@@ -6,14 +6,16 @@ import numpy as np
 from OCP.BRep import BRep_Tool
 from OCP.BRepAdaptor import BRepAdaptor_Surface
 from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeVertex
+from OCP.BRepClass import BRepClass_FaceClassifier
 from OCP.BRepExtrema import BRepExtrema_DistShapeShape, BRepExtrema_IsInFace
 from OCP.BRepLProp import BRepLProp_SLProps
 from OCP.BRepTools import BRepTools
-from OCP.gp import gp_Dir, gp_Pnt
+from OCP.gp import gp_Dir, gp_Pnt, gp_Pnt2d
 from OCP.ShapeAnalysis import ShapeAnalysis_Surface
-from OCP.TopAbs import TopAbs_REVERSED
+from OCP.TopAbs import TopAbs_IN, TopAbs_ON, TopAbs_REVERSED
 from OCP.TopoDS import TopoDS_Face
 
+from mracad.errors import EditError
 from mracad.model.brep import Model
 from mracad.model.facts import Spot
 from mracad.occ.document import Document
@@ -43,6 +45,17 @@ def nearest(document: Document, model: Model, point: Array) -> Spot:
             if search.IsDone() and search.NbSolution() and search.Value() < best - CONFUSION:
                 best, found = search.Value(), (index, _parameters(face, search))
     return spot(document, *found, point)
+
+
+def on_face(document: Document, index: int, uv: Array) -> Spot:
+    """The place on a face at parameters ``(2,)``; raises EditError outside the face."""
+    face = document.faces[index]
+    if BRepClass_FaceClassifier(face, gp_Pnt2d(*uv.tolist()), CONFUSION).State() not in (TopAbs_IN, TopAbs_ON):
+        low_u, high_u, low_v, high_v = BRepTools.UVBounds_s(face)
+        text = f"#{index + 1}@{uv[0]:g},{uv[1]:g} is outside the face"
+        within = f"its parameters lie within u {low_u:.6g} to {high_u:.6g}, v {low_v:.6g} to {high_v:.6g}"
+        raise EditError(text, within)
+    return spot(document, index, uv)
 
 
 def _parameters(face: TopoDS_Face, search: BRepExtrema_DistShapeShape) -> Array:

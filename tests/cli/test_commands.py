@@ -136,8 +136,10 @@ def test_info(mracad, samples):
 
 
 def test_info_at_a_place(mracad, samples):
-    result = mracad("info", samples / "panel_clean.step", "--at", "150,100,60", "--at", "-40,0,0")
-    *_, first, frame, second, _ = result.out.splitlines()
+    places = ("--at", "150,100,60", "--at", "-40,0,0", "--at", "#1@50,40")
+    result = mracad("info", samples / "panel_clean.step", *places)
+    *_, first, frame, second, _, third, _ = result.out.splitlines()
+    assert re.match(r"#1 \(bspline\) at u 50, v 40: [\d.,]+, 0 mm away", third), third
     assert re.match(r"#\d \(bspline\) at u [\d.]+, v [\d.]+: [\d.,]+, [\d.]+ mm away", first), first
     assert "normal" in frame and "u runs along" in frame and "1/mm along" in frame
     assert re.search(r"[4-9]\d(\.\d+)? mm away", second), second
@@ -146,6 +148,8 @@ def test_info_at_a_place(mracad, samples):
     assert abs(np.linalg.norm(np.subtract(place["point"], (150, 100, 60))) - place["distance"]) < 1e-9
     assert sum(face["area"] for face in body["faces"]) > 300 * 200
     assert mracad("info", samples / "panel.step", "--at", "1,2").code == 2
+    outside = mracad("info", samples / "panel_clean.step", "--at", "#1@500,40")
+    assert outside.code == 4 and "u 0 to 100" in outside.err
 
 
 def test_info_lists_everything_on_request(mracad, samples):

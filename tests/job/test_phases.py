@@ -7,7 +7,11 @@ from importlib import import_module
 import pytest
 
 from mracad import note
+from mracad.edit.feature.edits import repeat
+from mracad.job.document import run
+from mracad.occ.files import read
 from mracad.occ.step import write_step
+from mracad.spec.steps import Repeat
 from tests.edit import panels
 
 
@@ -57,3 +61,16 @@ def test_every_phase_of_info_is_noted_in_its_turn(mracad, panel, monkeypatch):
     monkeypatch.setattr(note, "doing", lambda stage="", subject="": stage in noted or noted.append(stage))
     assert mracad("info", panel).code == 0
     assert noted == ["reading", "looking at faces", "looking at scales", "measuring seams", "checking"]
+
+
+def test_copies_of_features_note_their_phases_also_for_a_bar(mracad, panel, tmp_path):
+    noted = []
+    note.watch(noted.append)
+    try:
+        options = Repeat(feature="formula:0.5*cos(x/9)**2,radius:12mm", fill="hexagons,spacing:90mm")
+        run(read(panel), repeat, options)
+    finally:
+        note.watch()
+    phases = ["finding places", "laying copies", "fitting seams under copies", "comparing copies with the feature",
+              "measuring what edges take of copies"]  # fmt: skip
+    assert [stage for stage in noted if stage in phases] == phases

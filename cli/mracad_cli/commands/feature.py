@@ -86,21 +86,26 @@ def extract(reading: Reading, chosen: Extract, output: str, overwrite: bool, as_
 )
 def make(given: Make, output: str, overwrite: bool, as_json: bool) -> None:
     from mracad.edit.feature.detail import save
-    from mracad.edit.feature.source import made
+    from mracad.edit.feature.source import heights
+    from mracad.edit.feature.source.relief import tabulated
     from mracad_cli.render.text import mm
 
     path = _target(output, overwrite)
     width = None if given.taper is None else LENGTH.read(given.taper, "taper")
-    found = made(source(given.source, "source"), given.source, width)
+    asked = source(given.source, "source")
+    relief = heights(asked, width)
+    found = tabulated(relief, given.source, asked.spacing)
     body = {
         "radius": found.radius,
         "reach": found.reach,
+        "sides": None if relief.disc else relief.sides.tolist(),
         "height": found.height,
         "spacing": found.spacing,
         "notes": found.notes,
         "written": path.name,
     }
-    across, apart = mm(2 * found.radius), mm(found.spacing)
+    sides = " × ".join(f"{side:.3g}" for side in relief.sides)
+    across, apart = mm(2 * found.radius) if relief.disc else f"{sides} mm", mm(found.spacing)
     said = [f"{mm(found.height)} high, {across} across, knots {apart} apart; wrote {path.name}"]
     said += [f"note: {note}" for note in found.notes]
     deliver({output: save(found)}, [json_text(body)] if as_json else said)

@@ -40,20 +40,19 @@ from mracad_cli.say import json_text, say
     click.option(
         "--at",
         "places",
-        metavar="X,Y,Z",
+        metavar="PLACE",
         multiple=True,
-        help="Also tell the face nearest to a point (mm), with its parameters, frame and curvature there; repeatable.",
+        help="Also tell the face nearest to X,Y,Z (mm), or #3@u,v, with its parameters, frame and curvature there; "
+        "repeatable.",
     ),
     options.printing,
 )
 def command(reading: Reading, scale: str, keep: Any, everything: bool, places: tuple[str, ...], as_json: bool) -> None:
-    import numpy as np
-
-    from mracad.spec.places import vector
+    from mracad.spec.places import spot
     from mracad_cli.outputs import read
     from mracad_cli.render import info
 
-    points = [np.array(vector(text, "at")) for text in places]
+    points = [spot(text, "at") for text in places]
     with Progress() as progress:
         progress("reading", 0, 1)
         document = read(reading)

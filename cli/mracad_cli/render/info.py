@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from mracad.model.brep import Face, Model
     from mracad.model.facts import Mass, Spot, Validity
     from mracad.occ.document import Document
+    from mracad.spec.places import OnFace, Point
 
 
 @dataclass(frozen=True)
@@ -45,16 +46,20 @@ class Seen:
         keep: str,
         *,
         sized: bool,
-        places: Sequence[np.ndarray] = (),
+        places: Sequence[Point | OnFace] = (),
         progress: Callable[[str, int, int], None],
     ) -> Seen:
         """Look at a document; with ``sized`` also at the sizes of its faces."""
+        import numpy as np
+
+        from mracad.edit.feature.locate import face_number
         from mracad.inspect.scales import scales
         from mracad.inspect.seams import seams
         from mracad.occ.check import check
         from mracad.occ.measure import face_masses
-        from mracad.occ.probe import middles, nearest
+        from mracad.occ.probe import middles, nearest, on_face
         from mracad.occ.view import view
+        from mracad.spec.places import PLACE, OnFace
         from mracad.spec.quantity import length
 
         progress("looking at faces", 0, 1)
@@ -66,7 +71,13 @@ class Seen:
         progress("checking", 0, 1)
         valid = check(document)
         sizes = list(zip(face_masses(document), middles(document), strict=True)) if sized else []
-        spots = [nearest(document, model, point) for point in places] if model.faces else []
+        spots = [
+            on_face(document, face_number(model, each.face, "at", PLACE), np.array(each.uv))
+            if isinstance(each, OnFace)
+            else nearest(document, model, np.array(each.xyz))
+            for each in places
+            if model.faces
+        ]
         return cls(document, model, width, keep, found, measures, valid, sizes, spots)
 
 

@@ -62,6 +62,8 @@ COPIES = (
     Column("Deviation, mm", "deviation"),
     Column("rms, mm", "rms"),
     Column("Cut off, mm", "lost"),
+    Column("Not held, mm", "short"),
+    Column("Height, mm", "height"),
 )
 
 

@@ -12,6 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from mracad import note
 from mracad.edit.feature.detail import Feature
 from mracad.edit.feature.extract import feature_of
 from mracad.edit.feature.fit import NARROWEST
@@ -20,6 +21,7 @@ from mracad.edit.feature.ideal import copies
 from mracad.edit.feature.lay import Laid, laid
 from mracad.edit.feature.locate import Place, place, standing
 from mracad.edit.feature.pattern import places
+from mracad.edit.feature.score import lumpy
 from mracad.edit.result import Edit, FaceOutcome, Reason, untouched
 from mracad.errors import EditError
 from mracad.model.brep import Face, Model
@@ -73,9 +75,10 @@ def repeat(
     chosen = scope.movable(model)
     feature = feature_of(model, options, chosen, options.feature)
     ground = Ground.of(model, chosen).without(feature.origin.offsets if feature.origin else {})
+    note.doing("finding places")
     found, skipped = places(ground, feature, options, _wishes(options, scope))
     edit = _edit(model, scope, _laid(ground, feature, found, options, scope, {}))
-    return replace(edit, notes=(*feature.notes, *skipped))
+    return replace(edit, notes=(*feature.notes, *skipped, *edit.notes))
 
 
 def transferred(model: Model, options: Transfer, source: Model, scope: Scope) -> Edit:
@@ -86,7 +89,8 @@ def transferred(model: Model, options: Transfer, source: Model, scope: Scope) ->
     feature = replace(feature_of(source, options, every, options.from_), origin=None)
     ground = Ground.of(model, scope.movable(model))
     found = [_target(ground, options.to, options)]
-    return replace(_edit(model, scope, _laid(ground, feature, found, options, scope, {})), notes=feature.notes)
+    edit = _edit(model, scope, _laid(ground, feature, found, options, scope, {}))
+    return replace(edit, notes=(*feature.notes, *edit.notes))
 
 
 def _refuse_held(model: Model, offsets: Mapping[int, Array], scope: Scope) -> None:
@@ -120,6 +124,7 @@ def _laid(
             "make it larger with --size",
         )
     overlap = options.overlap if isinstance(options, Repeat) else "add"
+    note.doing("laying copies")
     every = copies(ground, feature, found, standing(ground, found, feature.reach), overlap, options.mirror)
     return laid(every, _wishes(options, scope), options.edges == "coupled", options.clip, removed)
 
@@ -141,7 +146,7 @@ def _edit(model: Model, scope: Scope, laid: Laid) -> Edit:
         Treatment(e, tuple(s.face for s in model.edges[e].sides), how, laid.frozen[e] if how == "frozen" else None)
         for e, how in sorted(ways.items())
     )
-    return Edit(Displacement(laid.offsets), outcomes, edges=edges, copies=laid.copies)
+    return Edit(Displacement(laid.offsets), outcomes, edges=edges, copies=laid.copies, notes=lumpy(laid.copies))
 
 
 def _outcome(model: Model, face: Face, laid: Laid, touched: Collection[int]) -> FaceOutcome:

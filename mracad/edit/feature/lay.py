@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from mracad import note
 from mracad.bspline.surface import Net
 from mracad.edit.feature.exact import Shifts, shifted
 from mracad.edit.feature.fit import MISSED, holding, over_knots
@@ -133,14 +134,17 @@ def laid(copies: Copies, wishes: Wishes, coupled: bool, clip: bool, removed: Map
     """
     shifts = shifted(copies)
     task = _task(copies, shifts, wishes, removed)
+    note.doing("fitting seams under copies")
     attempt, moving, given_up = _settled(task, _crossings(task, copies) if coupled else [])
+    note.doing("comparing copies with the feature")
     found = compared(copies, attempt.wanted, attempt.done, shifts.matched)
-    refuse(copies, found, clip)
+    refuse(found, clip)
     exact, loose = (
         frozenset(edge for each in moving if isinstance(each.seam, kind) for edge in each.edges)
         for kind in (Seam, TrimmedSeam)
     )
     frozen = {**task.joints.frozen, **given_up}
+    note.doing("measuring what edges take of copies")
     found = clipped(copies, found, attempt.wanted, attempt.done, frozen)
     return Laid(attempt.offsets, tuple(found), frozen, exact - loose, loose)
 

@@ -20,6 +20,10 @@ SHORT = 0.2
 """Share of its height by which a copy may deviate from the ideal if nothing is held."""
 
 
+NOTED = 0.05
+"""The same share beyond which a note says so."""
+
+
 @dataclass(frozen=True)
 class Copy:
     """The result for one copy.
@@ -39,6 +43,8 @@ class Copy:
         Largest part of it that the control points there cannot hold, mm.
     exact : bool
         Whether it is an exact shift of control points.
+    height : float
+        Its largest displacement, mm; 0 if not known.
     base : float
         Error of the surface that the feature was separated from, root mean square, in the copy, mm.
     volume : float
@@ -57,6 +63,7 @@ class Copy:
     lost: float
     short: float
     exact: bool
+    height: float = 0.0
     base: float = 0.0
     volume: float = 0.0
     taken: float = 0.0
@@ -97,6 +104,7 @@ def compared(copies: Copies, wanted: Mapping[int, Wanted], done: Mapping[int, Ar
     return [
         replace(
             copied(each.label, points[k], found[k], bool(exact[k])),
+            height=feature.height * abs(each.height),
             base=feature.base * abs(each.height),
             radius=feature.radius * each.size,
         )
@@ -147,24 +155,34 @@ def _figures(copies: Copies, patch: Patch, wanted: Wanted, done: Array) -> Itera
                 yield k, Figures(missed[hit], lost[hit], short[hit], on[hit])
 
 
-def refuse(copies: Copies, found: Sequence[Copy], clip: bool) -> None:
+def lumpy(found: Sequence[Copy]) -> tuple[str, ...]:
+    """A note on the copies that the ground holds badly, if there are any."""
+    bad = [copy for copy in found if copy.short > NOTED * copy.height > 0.0]
+    if not bad:
+        return ()
+    worst = max(bad, key=lambda copy: copy.short / copy.height)
+    some = f"{len(bad)} of {len(found)} copies deviate" if len(found) > 1 else "the copy deviates"
+    most = f"{_at(worst)} by {100 * worst.short / worst.height:.0f} %"
+    return (f"{some} by more than {100 * NOTED:.0f} % of the height, because the surface is not smooth there: {most}",)
+
+
+def refuse(found: Sequence[Copy], clip: bool) -> None:
     """Raise EditError for a copy that the ground cannot hold, or that loses too much to held control points.
 
     ``clip`` allows the latter.
     """
-    heights = [copies.feature.height * abs(place.height) for place in copies.places]
-    for copy, height in zip(found, heights, strict=True):
-        if copy.short > SHORT * height:
+    for copy in found:
+        if copy.short > SHORT * copy.height:
             raise EditError(
                 f"{_at(copy)}: the faces there cannot hold the copy: it would deviate by "
-                f"{100 * copy.short / height:.0f} % of its height ({_numbers(copy)})",
+                f"{100 * copy.short / copy.height:.0f} % of its height ({_numbers(copy)})",
                 "make it smaller with --size, or choose other places",
             )
-    for copy, height in zip(found, heights, strict=True):
-        if copy.lost > LOST * height and not clip:
+    for copy in found:
+        if copy.lost > LOST * copy.height and not clip:
             raise EditError(
-                f"{_at(copy)}: edges or holes that stay in place cut off {100 * min(copy.lost / height, 1):.0f} % of "
-                f"the copy's height ({_numbers(copy)})",
+                f"{_at(copy)}: edges or holes that stay in place cut off "
+                f"{100 * min(copy.lost / copy.height, 1):.0f} % of the copy's height ({_numbers(copy)})",
                 "move it away from them, make it smaller with --size, or allow that with --clip",
             )
 

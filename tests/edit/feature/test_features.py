@@ -1,7 +1,6 @@
 """Features through the command line: closed forms of a bump on grounds of known geometry, read back from the file."""
 
 import json
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,7 +14,7 @@ from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
 from mracad.edit.feature.edits import repeat
 from mracad.edit.feature.extract import feature_of
-from mracad.edit.feature.score import Copy, refuse
+from mracad.edit.feature.score import Copy, lumpy, refuse
 from mracad.errors import Code, EditError
 from mracad.inspect.seams import seams
 from mracad.occ.step import read_step, write_step
@@ -525,15 +524,18 @@ def test_a_copy_larger_than_its_ground_allows_is_refused(size, short):
 
 
 def test_copies_that_are_off_by_a_fifth_of_their_height_are_named():
-    places = [SimpleNamespace(height=height) for height in (1.0, -2.0)]
-    copies = SimpleNamespace(places=places, feature=SimpleNamespace(height=3.0))
+    def copy(name, short, height):
+        return Copy(name, (0.0, 0.0, 0.0), (4,), 9.0, 9.0, 9.0, short, False, height)
 
-    def copy(name, short):
-        return Copy(name, (0.0, 0.0, 0.0), (4,), 9.0, 9.0, 9.0, short, False)
-
-    refuse(copies, [copy("one", 0.59), copy("two", 1.19)], clip=True)
+    good = [copy("one", 0.14, 3.0), copy("two", 0.29, 6.0)]
+    refuse(good, clip=True)
+    assert lumpy(good) == ()
+    bad = [copy("one", 0.59, 3.0), copy("two", 0.84, 6.0), *good]
+    refuse(bad, clip=True)
+    (note,) = lumpy(bad)
+    assert note.startswith("2 of 4 copies deviate by more than 5 %") and note.endswith("one (0,0,0) by 20 %")
     with pytest.raises(EditError, match=r"two \(0,0,0\): .* cannot hold the copy: .* by 21 % .* .#5.") as caught:
-        refuse(copies, [copy("one", 0.59), copy("two", 1.26)], clip=True)
+        refuse([copy("one", 0.59, 3.0), copy("two", 1.26, 6.0)], clip=True)
     assert caught.value.code == Code.CANNOT_EDIT
 
 

@@ -29,10 +29,11 @@ def made(given: Source, name: str, taper: float | None = None) -> Feature:
     EditError
         If nothing stands out.
     """
-    return tabulated(_relief(given, taper), name, given.spacing)
+    return tabulated(heights(given, taper), name, given.spacing)
 
 
-def _relief(given: Source, taper: float | None) -> Relief:
+def heights(given: Source, taper: float | None = None) -> Relief:
+    """The heights of a source; parameters and errors as for :func:`made`."""
     if isinstance(given, Heightmap):
         return grid.heightmap(given, taper)
     if isinstance(given, Outline):

@@ -88,6 +88,15 @@ def test_a_feature_file_is_the_same_as_its_source(folder, tmp_path, monkeypatch)
     assert abs(one - two) < 0.01 * one
 
 
+def test_images_are_told_by_their_sides_and_discs_by_their_diameter(folder, tmp_path, capfd, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    np.save("wide.npy", np.add.outer(np.hanning(20), np.hanning(40)))
+    run("feature", "make", "wide.npy,width:40mm,height:1mm", "-o", "a.feature")
+    run("feature", "make", "formula:0.2*cos(x)*cos(y),radius:3mm", "-o", "b.feature")
+    image, *_, disc = [line for line in capfd.readouterr().out.splitlines() if "across" in line]
+    assert ", 40 × 20 mm across, " in image and ", 7.5 mm across, " in disc
+
+
 def test_recipes_and_transfers_take_sources_and_find_files_beside_them(folder, tmp_path, monkeypatch):
     recipe = folder / "logo.toml"
     recipe.write_text('[[step]]\nuse = "repeat"\nfeature = "logo.png,width:14mm,height:0.3mm"\nat = ["0,0,60"]\n')
