@@ -69,6 +69,7 @@ bench-batch: $(VENV)/dev
 # The page of steps, from their declaration, and the picture of the rooms, from the imports
 docs: $(VENV)/ready
 	$(BIN)/python -c 'from mracad.spec.schema import page; print(page(), end="")' > docs/steps.md
+	$(BIN)/python -c 'from mracad.api.stub import stub; print(stub(), end="")' > mracad/__init__.pyi
 	$(BIN)/python docs/house.py > docs/house.svg
 
 # All other pictures of the documentation, and the gallery, by mracad itself

@@ -11,21 +11,21 @@ import sys
 import time
 from pathlib import Path
 
-import mracad
 from mracad.inspect import accept
 from mracad.occ.facts import facts
+from mracad.occ.files import read, write
 from mracad.occ.load import Text
 
 
 def measure(path: Path) -> tuple[float, float, float]:
     """Seconds of reading, of reading back and of judging."""
     start = time.process_time()
-    document = mracad.read(path)
+    document = read(path)
     done = time.process_time()
     stream = io.BytesIO()
-    written = mracad.write(document, stream, "step")
+    written = write(document, stream, "step")
     again = time.process_time()
-    back = mracad.read(Text(stream.getvalue(), path.name))
+    back = read(Text(stream.getvalue(), path.name))
     judged = time.process_time()
     memory, file = facts(document), facts(back)
     slack = accept.Slack(parts={cut.face: cut.parts for cut in written.cut})

@@ -60,7 +60,7 @@ GALLERY = (
 
 def draw(document: mracad.Document, name: str, **options: object) -> None:
     """One picture with zebra stripes."""
-    picture = mracad.render(document, mracad.Picture(show="zebra", **options))  # type: ignore[arg-type]
+    picture = mracad.render(document, show="zebra", **options)  # type: ignore[arg-type]
     (HERE / name).write_bytes(picture.data)
     print(f"{name}: {len(picture.data) / 1e3:.0f} kB")
 
@@ -70,8 +70,7 @@ def panel() -> None:
     options = {"view": ("top",), "size": "480x360", "stripes": 60}
     draw(mracad.read(SAMPLES / "panel.step"), "panel-0.png", **options)
     for number, edges in enumerate(("frozen", "coupled"), 1):
-        document = mracad.read(SAMPLES / "panel.step")
-        mracad.run(document, mracad.smooth, mracad.Smooth(scale="25mm", edges=edges))
+        document = mracad.smooth(SAMPLES / "panel.step", scale="25mm", edges=edges)
         draw(document, f"panel-{number}.png", **options)
 
 

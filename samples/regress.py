@@ -13,10 +13,11 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-import mracad
 from mracad.inspect.seams import seams, summary
+from mracad.job.look import snapshot
 from mracad.occ.check import check
 from mracad.occ.contents import contents
+from mracad.occ.files import read
 from mracad.occ.measure import mass
 
 FIGURES = Path(__file__).with_name("figures.json")
@@ -25,8 +26,8 @@ SLACK = 1e-6  # relative; for lengths that are zero, millimetres
 
 def figures(path: Path) -> dict:
     """A model in a few numbers."""
-    document = mracad.read(path)
-    model, facts, size, seen = mracad.snapshot(document), check(document), mass(document), contents(document)
+    document = read(path)
+    model, facts, size, seen = snapshot(document), check(document), mass(document), contents(document)
     along = summary(seams(model))
     return {
         "unit": model.unit,

@@ -72,7 +72,7 @@ def run_steps(
     beside: Mapping[str, Callable[[Report], bytes]] = MappingProxyType({}),
 ) -> int:
     """Take one file through steps; without a recipe they are the one edit of a command."""
-    from mracad.spec.recipe import record_of, title
+    from mracad.spec.recipe import record_of
     from mracad_cli.render import json
 
     start = time.perf_counter()
@@ -82,7 +82,7 @@ def run_steps(
     targets = check_outputs(writing, others, needed=not editing.dry_run)
     records = {place: record_of(steps, place) for place in places}
     text = load(reading.file)
-    document, done = produced(reading, text, writing, [] if editing.dry_run else targets, steps, title(steps))
+    document, done = produced(reading, text, writing, [] if editing.dry_run else targets, steps)
     body = json.steps(document.name, steps, done, single=recipe is None)
     body |= {"warnings": document.warnings, **json.written(done.made)}
     files: dict[str, str | bytes | None] = {editing.report: json_text(body, 1) + "\n"} if editing.report else {}
@@ -103,7 +103,7 @@ def run_steps(
 
 
 def produced(
-    reading: Reading, text: Text, writing: Writing, targets: Sequence[Target], steps: Sequence[Step], title: str
+    reading: Reading, text: Text, writing: Writing, targets: Sequence[Target], steps: Sequence[Step]
 ) -> tuple[Document, Production]:
     """Read a document and take it through steps; returns the document and what was produced from it."""
     with Progress() as progress:
@@ -116,7 +116,6 @@ def produced(
             lambda: read_silently(reading, text),
             steps,
             targets,
-            title=title,
             verify=writing.verify,
             progress=progress,
         )

@@ -21,6 +21,7 @@ from mracad.job.words import of_fault
 from mracad.model.facts import Facts
 from mracad.spec.pictures import Picture
 from mracad.spec.quantity import length
+from mracad.spec.recipe import title
 from mracad.spec.steps import Selection
 
 if TYPE_CHECKING:
@@ -85,9 +86,9 @@ def produce(
     steps: Sequence[Step] = (),
     targets: Sequence[Target] = (),
     *,
-    title: str = "",
     verify: bool = True,
     progress: Progress | None = None,
+    done: Sequence[Report | Judged] = (),
 ) -> Production:
     """Take a document through steps, and make output files from it.
 
@@ -103,10 +104,10 @@ def produce(
     steps : sequence of Step
     targets : sequence of Target
         None for a dry run.
-    title : str
-        Description of the steps, for the header of the files.
     verify : bool
         False to skip reading back.
+    done : sequence of Report and Judged
+        Their results, if the document has gone through the steps already.
 
     Raises
     ------
@@ -116,25 +117,27 @@ def produce(
     excluded: dict[int, Excluded] = {}
     firm: set[int] = set()
     faults: tuple[tuple[Target, Fault], ...] = ()
-    copies = _Copies(original)
+    copies, header = _Copies(original), title(steps) or "convert"
     for number in range(ROUNDS):
         if number:
             document = original()
         try:
             put = bool(targets)
-            results = play(
-                document, steps, original=original, progress=progress, apply=put, excluded=excluded, firm=firm
+            results = (
+                play(document, steps, original=original, progress=progress, apply=put, excluded=excluded, firm=firm)
+                if number or not done
+                else list(done)
             )
         except EditError as error:
             if faults:
                 raise _refused(document.name, faults) from error
             raise
-        done = Production(document, tuple(results))
-        if not (targets and done.passed):
-            return done
+        found = Production(document, tuple(results))
+        if not (targets and found.passed):
+            return found
         tell(progress, "writing")
         made = tuple(
-            _pictured(done, target, original, steps) if _is(target, "picture") else _made(document, target, title)
+            _pictured(found, target, original, steps) if _is(target, "picture") else _made(document, target, header)
             for target in targets
         )
         if verify:
@@ -143,7 +146,7 @@ def produce(
             made = tuple(each if _is(each.target, "picture") else _judged(each, memory, copies) for each in made)
         faults = tuple((each.target, fault) for each in made if each.read_back for fault in each.read_back.faults)
         if not faults:
-            return replace(done, made=made)
+            return replace(found, made=made)
         slid = memory.slid({face for _, fault in faults for face in fault.faces})
         if slid:
             firm |= slid
@@ -249,7 +252,7 @@ class _Copies:
         return self.input, self._made[key]
 
 
-def _made(document: Document, target: Target, title: str) -> Made:
+def _made(document: Document, target: Target, header: str) -> Made:
     """A document written to a file, not yet judged."""
     from mracad.occ.files import write
 
@@ -263,7 +266,7 @@ def _made(document: Document, target: Target, title: str) -> Made:
         chord=length(target.chord, _diagonal(document), "chord") if meshed else None,
         angle=target.angle,
         ascii=target.ascii,
-        options_text=title,
+        options_text=header,
     )
     return Made(target, stream.getvalue(), written)
 

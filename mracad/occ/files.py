@@ -166,7 +166,7 @@ def write(document: Document, target: str | os.PathLike | BinaryIO, format: str 
     if format not in FORMATS:
         raise UsageError(f"unknown format '{format}'", "use one of " + ", ".join(FORMATS))
     if FORMATS[format].kind == "picture":
-        raise UsageError(f"{format} is a picture, not a model", "make it with mracad.render(document)")
+        raise UsageError(f"{format} is a picture, not a model", "make it with mracad render")
     data, written = _MAKERS.get(format, _mesh)(document, name, format, wanted)
     if FORMATS[format].kind == "exact" and document.annotations:
         from mracad.occ.part21 import pmi

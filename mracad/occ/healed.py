@@ -76,15 +76,28 @@ def _key(file: Text, how: tuple[str | None, ...]) -> str:
     return hashlib.sha256(hashlib.sha256(file.getvalue()).digest() + asked).hexdigest()
 
 
-def _saved(document: Document, path: Path) -> bool:
-    """Whether the kernel could write a document to a file; :class:`_Rest` follows there, and then its length."""
+def stored(xcaf: TDocStd_Document, path: Path) -> bool:
+    """Whether the kernel could write its document to a file."""
     application, driver = TDocStd_Application(), BinXCAFDrivers_DocumentStorageDriver()
     driver.SetFormat(TCollection_ExtendedString("BinXCAF"))
     with quiet():
-        CDF_Application.Open(application, document.xcaf)
-        driver.Write(document.xcaf, _named(path))
-        CDF_Application.Close(application, document.xcaf)
-    if driver.GetStoreStatus() != PCDM_StoreStatus.PCDM_SS_OK:
+        CDF_Application.Open(application, xcaf)
+        driver.Write(xcaf, _named(path))
+        CDF_Application.Close(application, xcaf)
+    return bool(driver.GetStoreStatus() == PCDM_StoreStatus.PCDM_SS_OK)
+
+
+def restored(path: Path) -> TDocStd_Document | None:
+    """The kernel's document in a file; None if it cannot open it."""
+    driver, xcaf = BinXCAFDrivers_DocumentRetrievalDriver(), TDocStd_Document(TCollection_ExtendedString("BinXCAF"))
+    with quiet(), contextlib.suppress(Standard_Failure):
+        driver.Read(_named(path), xcaf, TDocStd_Application())
+    return xcaf if driver.GetStatus() == PCDM_ReaderStatus.PCDM_RS_OK else None
+
+
+def _saved(document: Document, path: Path) -> bool:
+    """Whether the kernel could write a document to a file; :class:`_Rest` follows there, and then its length."""
+    if not stored(document.xcaf, path):
         return False
     rest = msgspec.json.encode({name: getattr(document, name) for name in _Rest.__struct_fields__})
     path.write_bytes(cache.sealed(path.read_bytes() + rest + len(rest).to_bytes(_COUNT, "big")))
@@ -93,10 +106,8 @@ def _saved(document: Document, path: Path) -> bool:
 
 def _opened(path: Path, name: str) -> Document | None:
     """The document in a file; None if the kernel cannot open it."""
-    driver, xcaf = BinXCAFDrivers_DocumentRetrievalDriver(), TDocStd_Document(TCollection_ExtendedString("BinXCAF"))
-    with quiet(), contextlib.suppress(Standard_Failure):
-        driver.Read(_named(path), xcaf, TDocStd_Application())
-    if driver.GetStatus() != PCDM_ReaderStatus.PCDM_RS_OK:
+    xcaf = restored(path)
+    if xcaf is None:
         return None
     with path.open("rb") as stream:
         stream.seek(-cache.SEAL - _COUNT, os.SEEK_END)

@@ -87,7 +87,8 @@ def scope(
         For a selector that is malformed or matches nothing.
     """
     if options.instance and cadquery is None:
-        raise UsageError(f"instance: {options.instance!r} needs the document, not just the model", "use mracad.run")
+        message = f"instance: {options.instance!r} needs the document, not just the model"
+        raise UsageError(message, "use mracad.job.document.run")
     default = every_nurbs(model) if nurbs is None else list(nurbs)
     faces = select(model, options.faces, default, cadquery)
     if faces.edges:

@@ -289,7 +289,12 @@ def small_models(folder: Path) -> list[Path]:
     from OCP.BRepPrimAPI import BRepPrimAPI_MakeCylinder, BRepPrimAPI_MakePrism
     from OCP.gp import gp_Ax2, gp_Dir, gp_Pnt, gp_Vec
 
-    import mracad
+    from mracad.edit.details import Details
+    from mracad.edit.level import level
+    from mracad.edit.mra import save
+    from mracad.job.look import snapshot
+    from mracad.occ.files import read, write
+    from mracad.spec.steps import Level
     from tests.occ.shapes import bspline, document, face_on, sewn
 
     def patch(x0: float) -> Any:
@@ -307,11 +312,11 @@ def small_models(folder: Path) -> list[Path]:
     paths = []
     for name, parts in shapes.items():
         paths.append(folder / f"{name}.step")
-        mracad.write(document(*parts, names={0: "part", 1: "other"}), paths[-1])
-    model = mracad.snapshot(mracad.read(paths[0]))
-    edit = mracad.level(model, mracad.Level(scale="4mm"))
-    details = mracad.Details.of(model, edit.displacement)
-    paths[0].with_suffix(".mra").write_bytes(mracad.save_details(details))
+        write(document(*parts, names={0: "part", 1: "other"}), paths[-1])
+    model = snapshot(read(paths[0]))
+    edit = level(model, Level(scale="4mm"))
+    details = Details.of(model, edit.displacement)
+    paths[0].with_suffix(".mra").write_bytes(save(details))
     return paths
 
 

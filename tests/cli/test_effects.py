@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-import mracad
+from mracad.occ.files import write
 from tests.cli import declared
 from tests.edit import blocks, halves
 from tests.occ import shapes
@@ -273,24 +273,24 @@ def folder(small, tmp_path_factory):
         (place / path.name).write_bytes(path.read_bytes())
     (place / "recipe.toml").write_text(declared.RECIPE)
     shapes.save(shapes.zigzag_strips(6, 6, 6), place / "strips.step")
-    mracad.write(halves.document(*halves.surfaces(0.05, (10, 14))[1:]), place / "halves.step")
+    write(halves.document(*halves.surfaces(0.05, (10, 14))[1:]), place / "halves.step")
     x, y = np.meshgrid(np.linspace(0, 10, 16), np.linspace(0, 10, 16), indexing="ij")
     near = [np.stack([x + dx, y, declared.heights(x + dx, y) + dz], axis=-1) for dx, dz in ((0, 0), (10, 4e-4))]
     bare = shapes.document(shapes.compound(*(shapes.face_on(shapes.bspline(poles)) for poles in near)))
-    mracad.write(bare, place / "gaping.step")
+    write(bare, place / "gaping.step")
     flat = shapes.document(shapes.compound(*(shapes.face_on(shapes.bspline(0.0 * p + [1, 1, 0] * p)) for p in near)))
-    mracad.write(flat, place / "flat.step")
+    write(flat, place / "flat.step")
     one, two = (net - [0, 0, z] for net, z in zip(near, (0, 4e-4), strict=True))
     two[0], two[1] = one[-1], 2 * one[-1] - one[-2]
     sewn = shapes.sewn(*(shapes.face_on(shapes.bspline(poles)) for poles in (one, two)))
-    mracad.write(shapes.document(sewn), place / "tangent.step")
+    write(shapes.document(sewn), place / "tangent.step")
     angle, along = np.meshgrid(np.linspace(0, 3, 60), np.linspace(0, 20, 24), indexing="ij")
     bent = np.stack([2 * np.cos(angle), 2 * np.sin(angle), along + 0.02 * np.sin(9 * angle) * np.sin(along)], axis=-1)
-    mracad.write(shapes.document(shapes.face_on(shapes.bspline(bent))), place / "tube.step")
+    write(shapes.document(shapes.face_on(shapes.bspline(bent))), place / "tube.step")
     x, y = np.meshgrid(np.arange(20.0), np.arange(20.0), indexing="ij")
     spiky = np.stack([x, y, 0.1 * x], axis=-1) + 0.05 * np.random.default_rng(0).standard_normal((20, 20, 3))
     spiky[[5, 12], [14, 7], 2] += 1.0
-    mracad.write(shapes.document(shapes.face_on(shapes.bspline(spiky))), place / "spiky.step")
+    write(shapes.document(shapes.face_on(shapes.bspline(spiky))), place / "spiky.step")
     shapes.save(blocks.block(blocks.nets(16)[1]).wrapped, place / "block.step")
     text = (place / "sheet.step").read_bytes()
     (place / "latin.step").write_bytes(text.replace(b"'part'", b"'t\xe9t\xe9'"))

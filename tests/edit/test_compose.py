@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from scipy.interpolate import BSpline
 
-import mracad
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net, pairs
 from mracad.edit.compose import compose
@@ -18,6 +17,7 @@ from mracad.edit.mra import load, save
 from mracad.errors import EditError, UsageError
 from mracad.inspect.seams import seams
 from mracad.job.document import run
+from mracad.model.brep import Model
 from mracad.occ.geometry import spline
 from mracad.occ.view import view
 from mracad.spec.steps import Compose, Level
@@ -230,7 +230,7 @@ def test_what_is_held_gets_no_details(tmp_path):
 def test_a_model_that_the_details_are_not_of_is_refused(tmp_path):
     path = tmp_path / "a.mra"
     coarse(sheet(rough(spans=(24, 18))[1]), path)
-    empty = mracad.Model("empty.step", (), (), (), 100.0)
+    empty = Model("empty.step", (), (), (), 100.0)
     with pytest.raises(EditError, match=r"empty\.step: no face fits the details"):
         compose(empty, Compose(details=str(path)))
 

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from mracad_cli.__main__ import main
 
-import mracad
 from mracad.bspline.fit import interpolated
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
 from mracad.edit.equalize import equalize
 from mracad.errors import UsageError
 from mracad.inspect.seams import seams
+from mracad.occ.files import write
 from mracad.occ.step import read_step
 from mracad.occ.view import view
 from mracad.spec.steps.shape import Equalize
@@ -141,7 +141,7 @@ def test_seams_hold_in_the_file(tmp_path):
     patches = panels.cut(whole, (2, 1))
     patches[1, 0] = panels.turned(patches[1, 0], "ux")
     source, target, report = (tmp_path / name for name in ("in.step", "out.step", "r.json"))
-    mracad.write(panels.document(patches), source)
+    write(panels.document(patches), source)
     words = ["--band", "2mm:10mm=0", "--band", "15mm:50mm=2"]
     assert main(["equalize", str(source), "-o", str(target), *words, "--report", str(report)]) == 0
     model = view(read_step(target))

@@ -6,12 +6,15 @@ import msgspec
 import numpy as np
 import pytest
 
-import mracad
+from mracad.edit.feature.edits import repeat
+from mracad.edit.smooth import smooth
 from mracad.errors import UsageError
 from mracad.job.document import run
+from mracad.job.look import snapshot
 from mracad.occ.step import read_step, write_step
 from mracad.occ.view import view
 from mracad.seam.cause import Cause, Still
+from mracad.spec.steps import Repeat, Smooth
 from tests.edit import panels
 from tests.occ import shapes
 
@@ -41,7 +44,7 @@ def test_a_held_edge_stays_and_the_rest_moves(sewn):
     for hold in ((), (f"edge#{place + 1}",)):
         document = panel(sewn=sewn)
         before = view(document).edges[place].points
-        report = run(document, mracad.smooth, mracad.Smooth(level=2, hold=hold))
+        report = run(document, smooth, Smooth(level=2, hold=hold))
         (treatment,) = (t for t in report.edit.edges if t.edge == place)
         moved = np.abs(view(document).edges[place].points - before).max()
         found[hold] = treatment.how, treatment.reason, moved
@@ -59,8 +62,8 @@ def test_a_held_edge_stays_under_a_copy_of_a_feature():
         place = seam_of(model)
         hold = tuple(f"edge#{place + 1}" for _ in hold)
         x, y, z = model.edges[place].points[12]
-        options = mracad.Repeat(feature="near:50,50,0,radius:15", at=(f"{x},{y},{z}",), hold=hold, clip=True)
-        run(document, mracad.repeat, options)
+        options = Repeat(feature="near:50,50,0,radius:15", at=(f"{x},{y},{z}",), hold=hold, clip=True)
+        run(document, repeat, options)
         found.append(np.abs(view(document).edges[place].points - model.edges[place].points).max())
     assert found[0] > 1e-3 and found[1] == 0.0
 
@@ -70,8 +73,8 @@ def test_a_held_edge_stays_under_a_copy_of_a_feature():
     [({}, {0, 1}), ({"faces": ("#1",)}, {0}), ({"faces": ("!#1",)}, {1}), ({"hold": ("#2",)}, {0})],
 )
 def test_the_options_say_which_faces_of_a_model_are_edited(options, edited):
-    model = mracad.snapshot(panel())
-    edit = mracad.smooth(model, mracad.Smooth(level=2, **options))
+    model = snapshot(panel())
+    edit = smooth(model, Smooth(level=2, **options))
     assert {o.face for o in edit.faces("edited")} == edited
     assert {model.surfaces[i].faces[0] for i in edit.displacement.offsets} == edited
 
@@ -89,7 +92,7 @@ def test_the_options_say_which_faces_of_a_model_are_edited(options, edited):
 )
 def test_what_a_model_cannot_be_asked(options, says):
     with pytest.raises(UsageError, match=says):
-        mracad.smooth(mracad.snapshot(panel()), mracad.Smooth(level=2, **options))
+        smooth(snapshot(panel()), Smooth(level=2, **options))
 
 
 def test_an_edge_of_one_instance_is_held_by_the_number_of_the_part(tmp_path):
@@ -104,7 +107,7 @@ def test_an_edge_of_one_instance_is_held_by_the_number_of_the_part(tmp_path):
         from mracad.occ.instance import instances
 
         path = list(instances(document))[-1]
-        report = run(document, mracad.smooth, mracad.Smooth(level=2, instance=path, hold=hold))
+        report = run(document, smooth, Smooth(level=2, instance=path, hold=hold))
         hows = {t.how for t in report.edit.edges if len(t.faces) == 2}
         assert hows == {"frozen" if hold else "coupled"}
 
@@ -112,7 +115,7 @@ def test_an_edge_of_one_instance_is_held_by_the_number_of_the_part(tmp_path):
 @pytest.mark.parametrize("options", [{"level": 2, "edges": "frozen"}, {"level": 1.5, "faces": ("#1",)}, {"level": 2}])
 def test_outcomes_are_plain_numbers(options):
     """Not numpy's, which no encoder of reports takes."""
-    edit = mracad.smooth(mracad.snapshot(panel()), mracad.Smooth(**options))
+    edit = smooth(snapshot(panel()), Smooth(**options))
     records = (edit.outcomes, edit.edges)
     assert msgspec.json.encode(records)
 

@@ -8,7 +8,6 @@ import pytest
 from mracad_cli.__main__ import main
 from OCP.BRepPrimAPI import BRepPrimAPI_MakeSphere
 
-import mracad
 from mracad.bspline.fit import interpolated
 from mracad.bspline.surface import Net
 from mracad.edit.led import led
@@ -16,6 +15,7 @@ from mracad.edit.sweep import sweep
 from mracad.errors import EditError, UsageError
 from mracad.inspect.seams import seams
 from mracad.model.brep import Trim
+from mracad.occ.files import write
 from mracad.occ.step import read_step
 from mracad.occ.view import view
 from mracad.spec.select import scope
@@ -162,7 +162,7 @@ def saved(tmp_path, turns="ux"):
     clean, _ = panels.whole(12, 0.0, patches=(2, 2))
     patches = panels.cut(clean, (2, 2))
     patches[1, 0] = panels.turned(patches[1, 0], turns)
-    mracad.write(panels.document(patches), tmp_path / "in.step")
+    write(panels.document(patches), tmp_path / "in.step")
     return patches, clean
 
 

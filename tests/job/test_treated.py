@@ -1,12 +1,15 @@
 """What edits did, in the words of their reports."""
 
-import mracad
+from mracad.edit.smooth import smooth
+from mracad.job.document import run
 from mracad.job.treated import rings, told
+from mracad.occ.files import read
+from mracad.spec.steps import Smooth
 
 
 def test_faces_and_edges_are_counted_as_in_the_report(samples):
-    options = mracad.Smooth(scale="25mm", faces=("#1", "#2"), hold=("#4",))
-    report = mracad.run(mracad.read(samples / "panel.step"), mracad.smooth, options)
+    options = Smooth(scale="25mm", faces=("#1", "#2"), hold=("#4",))
+    report = run(read(samples / "panel.step"), smooth, options)
     found = told(report, options)
     assert found.faces == {0: "edited", 1: "edited", 3: "held"} | dict.fromkeys((2, 4, 5), "unselected")
     assert found.words["edited"] == "2 faces smoothed at 25mm" and found.words["held"] == "1 face held by --hold"

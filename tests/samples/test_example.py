@@ -7,11 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import mracad
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
 from mracad.inspect.seams import seams
 from mracad.job.document import play
+from mracad.job.look import snapshot
+from mracad.occ.files import read, write
 from mracad.spec import recipe
 from samples.example import make
 from samples.models import documents, panel, shell
@@ -68,17 +69,17 @@ class Story:
 def story(tmp_path_factory):
     path = tmp_path_factory.mktemp("example") / "out.step"
     steps = recipe.load(str(FOLDER / "recipe.toml")).steps(str(FOLDER.parent / "shell.step"))
-    document = mracad.read(FOLDER.parent / "shell.step")
-    models, said = {"shell": mracad.snapshot(document)}, {}
+    document = read(FOLDER.parent / "shell.step")
+    models, said = {"shell": snapshot(document)}, {}
     for step in steps[:-1]:
         (said[step.use],) = play(document, [step])
-        mracad.write(document, path)
-        models[step.use] = mracad.snapshot(mracad.read(path))
+        write(document, path)
+        models[step.use] = snapshot(read(path))
     play(document, steps[-1:])
     assert tuple(models) == STEPS and steps[-1].use == "check"
     bare = documents.single(panel.sewn(panel.cut(*shell.shell_net(0.0), shell.PATCHES)), "bare")
     play(bare, [steps[1]])
-    return Story(models, said, mracad.snapshot(bare))
+    return Story(models, said, snapshot(bare))
 
 
 @pytest.mark.parametrize("name", STEPS)

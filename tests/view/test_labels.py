@@ -7,8 +7,9 @@ from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
 from OCP.gp import gp_Pnt
 from PIL import Image
 
-import mracad
+from mracad.spec.pictures import Picture
 from mracad.view.labels import Label, placed
+from mracad.view.picture import render
 from tests.occ import shapes
 
 
@@ -23,7 +24,7 @@ def test_texts_take_the_next_place_that_is_free_or_none():
 def counted(count):
     """Whether something is written in the lower right corner of a picture of a row of cubes."""
     cubes = [BRepPrimAPI_MakeBox(gp_Pnt(15 * k, 0, 0), 10.0, 10.0, 10.0).Shape() for k in range(count)]
-    drawn = mracad.render(shapes.document(*cubes), mracad.Picture(show="faces", view=("top",), size="400x300"))
+    drawn = render(shapes.document(*cubes), Picture(show="faces", view=("top",), size="400x300"))
     picture = np.asarray(Image.open(io.BytesIO(drawn.data)).convert("L"))
     return bool((picture[275:, 200:] < 128).any())
 

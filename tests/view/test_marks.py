@@ -8,8 +8,9 @@ from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
 from OCP.gp import gp_Pnt
 from PIL import Image
 
-import mracad
 from mracad.errors import UsageError
+from mracad.job.look import snapshot
+from mracad.spec.pictures import Picture
 from mracad.view.colours import rgb
 from mracad.view.picture import render
 from mracad.view.rings import COLOUR, Ring
@@ -29,12 +30,12 @@ def row_of_cubes(count):
 def test_faces_and_edges_have_the_colours_of_what_became_of_them():
     """The tops of seven cubes and the edges between them, seen from above."""
     document = row_of_cubes(7)
-    model = mracad.snapshot(document)
+    model = snapshot(document)
     tops = [f.index for f in model.faces if f.box[0, 2] > 9]
     across = [edge.index for edge in model.edges if np.ptp(edge.points[:, 0]) < 1e-9 and edge.points[:, 2].min() > 9]
     between = sorted(across, key=lambda edge: model.edges[edge].points[0, 0])[1:11:2]
     told = Told(dict(zip(tops, FACES, strict=True)), dict(zip(between, EDGES, strict=True)), {"edited": "7 faces"})
-    picture = image(render(document, mracad.Picture(show="treatment", view=("top",), size="900x160"), told=told).data)
+    picture = image(render(document, Picture(show="treatment", view=("top",), size="900x160"), told=told).data)
     wide = 900 - (19 * 9)
     pixel = 70 / (0.9 * wide)
     at = [round(wide / 2 + (10 * k - 35) / pixel) for k in range(8)]
@@ -49,14 +50,14 @@ def test_faces_and_edges_have_the_colours_of_what_became_of_them():
 
 def test_a_ring_is_as_far_from_its_middle_as_it_says_and_on_its_side_alone():
     document = shapes.document(BRepPrimAPI_MakeBox(100, 100, 1).Shape())
-    model = mracad.snapshot(document)
+    model = snapshot(document)
     top = next(f.index for f in model.faces if f.box[0, 2] > 0.5)
     rings = [Ring(top, (30.0, 30.0, 1.0), 15.0), Ring(top, (70.0, 60.0, 1.0), 20.0)]
     pixel = 100 / 270
     y, x = np.mgrid[:300, :300] + 0.5
     at = np.stack([(x - 150) * pixel + 50, (150 - y) * pixel + 50], axis=-1)
     for view, there in (("top", 1.0), ("bottom", 0.0)):
-        options = mracad.Picture(show="features", view=(view,), size="300x300")
+        options = Picture(show="features", view=(view,), size="300x300")
         picture = image(render(document, options, rings=rings).data)
         ground = np.median(picture[100:200, 100:200].reshape(-1, 3), axis=0)
         way = ground - 255 * COLOUR
@@ -71,10 +72,8 @@ def test_a_ring_is_as_far_from_its_middle_as_it_says_and_on_its_side_alone():
 def test_a_wipe_is_the_left_of_one_and_the_right_of_the_other():
     one, other = (shapes.document(BRepPrimAPI_MakeBox(size, size, 10.0).Shape()) for size in (10.0, 9.9))
     options = {"show": "isophotes", "view": ("1,-2,1.5",), "size": "300x200"}
-    alone = image(mracad.render(one, mracad.Picture(**options)).data)
-    wiped, same = (
-        image(mracad.render(one, mracad.Picture(**options, wipe=True), before=each).data) for each in (other, one)
-    )
+    alone = image(render(one, Picture(**options)).data)
+    wiped, same = (image(render(one, Picture(**options, wipe=True), before=each).data) for each in (other, one))
     assert (same[30:180, 152:] == alone[30:180, 152:]).all() and (same[30:180, :148] == alone[30:180, :148]).all()
     assert (wiped[:, 150] < 60).all(), "a line between"
     assert (wiped[30:180, 152:] == alone[30:180, 152:]).all()
@@ -92,7 +91,7 @@ def test_what_pictures_need_is_asked_for():
         ({"section": ("z=much",)}, "not a position"),
     ):
         with pytest.raises(UsageError, match=says):
-            mracad.render(document, mracad.Picture(**words))
+            render(document, Picture(**words))
 
 
 def widths(frames):
@@ -102,7 +101,7 @@ def widths(frames):
 
 def test_a_model_turns_about_its_middle_at_one_scale():
     document = shapes.document(BRepPrimAPI_MakeBox(30, 20, 10).Shape())
-    data = [render(document, mracad.Picture(view=("front",), size="100x100"), format="gif").data for _ in range(2)]
+    data = [render(document, Picture(view=("front",), size="100x100"), format="gif").data for _ in range(2)]
     assert data[0] == data[1]
     film = Image.open(io.BytesIO(data[0]))
     frames = []
@@ -119,14 +118,14 @@ def test_a_map_has_one_scale_while_it_turns():
     """A plate that bends on one side alone: what is seen from there sets the range of every picture."""
     x, y = np.meshgrid(np.linspace(-20, 20, 9), np.linspace(-20, 20, 9), indexing="ij")
     document = shapes.document(shapes.face_on(shapes.bspline(np.stack([x, 0.02 * x**2 + 0 * y, y], axis=-1))))
-    still = render(document, mracad.Picture(view=("right",), size="60x40", show="curvature"))
-    turned = render(document, mracad.Picture(view=("right",), size="60x40", show="curvature"), format="gif")
+    still = render(document, Picture(view=("right",), size="60x40", show="curvature"))
+    turned = render(document, Picture(view=("right",), size="60x40", show="curvature"), format="gif")
     assert turned.highest > still.highest and turned.highest == pytest.approx(0.04, rel=0.05)
 
 
 def test_an_mp4_is_what_a_player_reads(tmp_path):
     ffmpeg = pytest.importorskip("imageio_ffmpeg")
-    data = render(row_of_cubes(2), mracad.Picture(size="101x81"), format="mp4").data
+    data = render(row_of_cubes(2), Picture(size="101x81"), format="mp4").data
     (tmp_path / "a.mp4").write_bytes(data)
     reader = ffmpeg.read_frames(str(tmp_path / "a.mp4"))
     told = next(reader)

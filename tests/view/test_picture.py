@@ -14,20 +14,20 @@ from OCP.Quantity import Quantity_Color, Quantity_ColorRGBA, Quantity_TOC_sRGB
 from OCP.XCAFDoc import XCAFDoc_ColorType, XCAFDoc_DocumentTool
 from PIL import Image
 
-import mracad
 from mracad.occ.facets import facets
-from mracad.spec.pictures import VIEWS, Show
+from mracad.occ.files import read
+from mracad.spec.pictures import VIEWS, Picture, Show
 from mracad.view.camera import axes, fitted
 from mracad.view.fields import map_of
 from mracad.view.legend import Legend, strip
-from mracad.view.picture import ANGLE, CHORD
+from mracad.view.picture import ANGLE, CHORD, render
 from tests.occ import shapes
 
 
 def pixels(document, **options):
     """A picture as numbers from 0 to 255, ``(height, width, 3)``."""
     others = {name: options.pop(name) for name in ("before", "reference") if name in options}
-    drawn = mracad.render(document, mracad.Picture(**options), **others)
+    drawn = render(document, Picture(**options), **others)
     return np.asarray(Image.open(io.BytesIO(drawn.data)).convert("RGB")).astype(float), drawn
 
 
@@ -86,7 +86,7 @@ def test_the_deviation_of_an_offset_face_is_the_offset():
 
 
 def test_deviation_across_sewn_patches_is_that_of_the_whole(samples):
-    panel, truth = (mracad.read(samples / name) for name in ("panel.step", "panel_clean.step"))
+    panel, truth = (read(samples / name) for name in ("panel.step", "panel_clean.step"))
     _, drawn = pixels(panel, show="deviation", reference=truth, size="160x120")
     assert -0.1 < drawn.lowest < 0 < drawn.highest < 0.1, "noise of 0.02 mm, whichever patch is nearest"
 
@@ -103,7 +103,7 @@ def test_deviation_across_sewn_patches_is_that_of_the_whole(samples):
     ],
 )
 def test_a_model_does_not_deviate_from_itself(samples, name, view):
-    model = mracad.read(samples / f"{name}.step")
+    model = read(samples / f"{name}.step")
     _, drawn = pixels(model, show="deviation", reference=model, view=(view,), size="240x160")
     assert max(-drawn.lowest, drawn.highest) <= 1e-6
 
@@ -300,10 +300,7 @@ def test_two_models_are_seen_from_the_same_place():
 
 @pytest.mark.parametrize("show", ["shaded", "isophotes"])
 def test_the_same_bytes_again(show, samples):
-    first, second = (
-        mracad.render(mracad.read(samples / "blade.step"), mracad.Picture(show=show, size="200x150")).data
-        for _ in range(2)
-    )
+    first, second = (render(read(samples / "blade.step"), Picture(show=show, size="200x150")).data for _ in range(2))
     assert first == second
 
 
@@ -329,7 +326,7 @@ def shaken(*asked):
 
 @pytest.mark.parametrize(("name", "show"), [("blade", "zebra"), ("assembly", "shaded"), ("trimmed", "curvature")])
 def test_rounding_changes_no_pixel_by_more_than_one(name, show, samples, monkeypatch):
-    document = mracad.read(samples / f"{name}.step")
+    document = read(samples / f"{name}.step")
     plain, _ = pixels(document, show=show, size="300x200")
     monkeypatch.setattr("mracad.view.picture.facets", shaken)
     assert np.abs(pixels(document, show=show, size="300x200")[0] - plain).max() <= 1

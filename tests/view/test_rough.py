@@ -6,12 +6,12 @@ from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeEdge
 from OCP.BRepPrimAPI import BRepPrimAPI_MakePrism, BRepPrimAPI_MakeSphere
 from OCP.gp import gp_Vec
 
-import mracad
 from mracad.bspline.fit import interpolated
 from mracad.bspline.knots import KnotVector
 from mracad.errors import UsageError
 from mracad.occ.facets import facets
-from mracad.spec.pictures import Show, show_of
+from mracad.spec.pictures import Picture, Show, show_of
+from mracad.view.picture import render
 from mracad.view.rough import Rough
 from tests.occ import shapes
 
@@ -53,7 +53,7 @@ def test_long_waves_are_shape():
 
 def test_a_ball_has_none():
     ball = shapes.document(BRepPrimAPI_MakeSphere(10.0).Shape())
-    drawn = mracad.render(ball, mracad.Picture(show="roughness:5mm", size="120x90"))
+    drawn = render(ball, Picture(show="roughness:5mm", size="120x90"))
     assert (drawn.lowest, drawn.highest, drawn.unit, drawn.title) == (0.0, 0.0, "1/mm", "roughness below 5 mm")
 
 

@@ -9,9 +9,10 @@ from OCP.BRepPrimAPI import BRepPrimAPI_MakeCylinder, BRepPrimAPI_MakeSphere, BR
 from OCP.gp import gp_Ax1, gp_Ax2, gp_Dir, gp_Pnt, gp_Trsf, gp_Vec
 from PIL import Image
 
-import mracad
 from mracad.errors import UsageError
 from mracad.occ.facets import facets
+from mracad.spec.pictures import Picture
+from mracad.view.picture import render
 from mracad.view.section import combed, curves, lines
 from tests.occ import shapes
 
@@ -99,7 +100,7 @@ def test_teeth_that_are_too_long_are_cut_and_that_is_said():
 
 
 def drawn(document, **options):
-    found = mracad.render(document, mracad.Picture(**options)).data
+    found = render(document, Picture(**options)).data
     return np.asarray(Image.open(io.BytesIO(found)).convert("RGB")).astype(int)
 
 

@@ -21,7 +21,7 @@ def command(reading: Reading, writing: Writing, as_json: bool) -> int:
 
     start = time.perf_counter()
     targets = check_outputs(writing)
-    document, done = produced(reading, load(reading.file), writing, targets, (), "convert")
+    document, done = produced(reading, load(reading.file), writing, targets, ())
     found = text.found(done.made)
     valid = f"valid: {found.words}; " if found else ""
     line = f"{document.name}: {valid}wrote {text.sizes(done.made)}, {time.perf_counter() - start:.1f} s"

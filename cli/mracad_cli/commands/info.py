@@ -48,6 +48,7 @@ from mracad_cli.say import json_text, say
     options.printing,
 )
 def command(reading: Reading, scale: str, keep: Any, everything: bool, places: tuple[str, ...], as_json: bool) -> None:
+    from mracad.job.info import info as look
     from mracad.spec.places import spot
     from mracad_cli.outputs import read
     from mracad_cli.render import info
@@ -57,5 +58,5 @@ def command(reading: Reading, scale: str, keep: Any, everything: bool, places: t
         progress("reading", 0, 1)
         document = read(reading)
         sized = everything or as_json
-        seen = info.Seen.of(document, scale, keep, sized=sized, places=points, progress=progress)
+        seen = look(document, scale, keep, sized=sized, places=points, progress=progress)
     say(*([json_text(info.body(seen))] if as_json else info.lines(seen, everything)))

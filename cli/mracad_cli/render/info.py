@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from mracad_cli.render import json, text
@@ -14,74 +13,12 @@ if TYPE_CHECKING:
 
     from mracad.inspect.scales import FaceScales
     from mracad.inspect.seams import SeamMeasure
+    from mracad.job.info import Info
     from mracad.model.brep import Face, Model
-    from mracad.model.facts import Mass, Spot, Validity
-    from mracad.occ.document import Document
-    from mracad.spec.places import OnFace, Point
+    from mracad.model.facts import Mass, Spot
 
 
-@dataclass(frozen=True)
-class Seen:
-    """What was read and measured.
-
-    ``width`` is the scale, mm, ``keep`` the continuity that edges keep, ``sizes`` those of faces with places in their
-    middles, and ``spots`` the places that were asked for.
-    """
-
-    document: Document
-    model: Model
-    width: float
-    keep: str
-    scales: Mapping[int, FaceScales]
-    seams: list[SeamMeasure]
-    valid: Validity
-    sizes: Sequence[tuple[Mass, Spot]]
-    spots: Sequence[Spot]
-
-    @classmethod
-    def of(
-        cls,
-        document: Document,
-        scale: str,
-        keep: str,
-        *,
-        sized: bool,
-        places: Sequence[Point | OnFace] = (),
-        progress: Callable[[str, int, int], None],
-    ) -> Seen:
-        """Look at a document; with ``sized`` also at the sizes of its faces."""
-        import numpy as np
-
-        from mracad.edit.feature.locate import face_number
-        from mracad.inspect.scales import scales
-        from mracad.inspect.seams import seams
-        from mracad.occ.check import check
-        from mracad.occ.measure import face_masses
-        from mracad.occ.probe import middles, nearest, on_face
-        from mracad.occ.view import view
-        from mracad.spec.places import PLACE, OnFace
-        from mracad.spec.quantity import length
-
-        progress("looking at faces", 0, 1)
-        model = view(document)
-        width = length(scale, model.diagonal, "scale")
-        found = scales(model, width, keep, lambda done, total: progress("looking at scales", done, total))
-        progress("measuring seams", 0, 1)
-        measures = seams(model)
-        progress("checking", 0, 1)
-        valid = check(document)
-        sizes = list(zip(face_masses(document), middles(document), strict=True)) if sized else []
-        spots = [
-            on_face(document, face_number(model, each.face, "at", PLACE), np.array(each.uv))
-            if isinstance(each, OnFace)
-            else nearest(document, model, np.array(each.xyz))
-            for each in places
-            if model.faces
-        ]
-        return cls(document, model, width, keep, found, measures, valid, sizes, spots)
-
-
-def body(seen: Seen) -> dict[str, Any]:
+def body(seen: Info) -> dict[str, Any]:
     """Everything, as JSON-ready values; lengths in millimetres."""
     from mracad.inspect.seams import summary
     from mracad.occ.boxes import face_boxes
@@ -106,7 +43,7 @@ def body(seen: Seen) -> dict[str, Any]:
     }
 
 
-def summary(seen: Seen, everything: bool = False) -> list[str]:
+def summary(seen: Info, everything: bool = False) -> list[str]:
     """The content in a few lines; with ``everything`` also instances."""
     from mracad.inspect.seams import summary as totals
     from mracad.occ.instance import instances
@@ -126,7 +63,7 @@ def summary(seen: Seen, everything: bool = False) -> list[str]:
     ]
 
 
-def lines(seen: Seen, everything: bool) -> list[str]:
+def lines(seen: Info, everything: bool) -> list[str]:
     """A summary, and the NURBS faces; with ``everything`` also instances, other faces and every seam."""
     from mracad.occ.boxes import face_boxes
 

@@ -71,9 +71,10 @@ def told(
     """Look at a document, check it, and compare it with a reference if there is one."""
     from mracad.inspect.spectrum import spectra
     from mracad.job import check, compare
+    from mracad.job.info import info as look
     from mracad.spec.steps import Check, Compare
 
-    seen = info.Seen.of(document, SCALE, "g1", sized=True, progress=progress)
+    seen = look(document, SCALE, "g1", sized=True, progress=progress)
     progress("checking", 0, 1)
     checked = check.check(document, Check(), text=source)
     progress("comparing", 0, 1)

@@ -20,7 +20,7 @@ from mracad.errors import MracadError
 from mracad.inspect.faults import ReadBack
 from mracad.job.batch.manifest import digest
 from mracad.job.batch.settings import Settings
-from mracad.spec.recipe import Step, title, versions
+from mracad.spec.recipe import Step, versions
 from mracad.spec.steps import STEPS
 
 if TYPE_CHECKING:
@@ -153,9 +153,7 @@ def do(work: Work) -> Product:
         steps = _here(work, Path(folder))
         note.doing("reading", work.name)
         document = _read(work)
-        done = produce(
-            document, lambda: _read(work), steps, [target], title=title(work.steps), verify=work.settings.verify
-        )
+        done = produce(document, lambda: _read(work), steps, [target], verify=work.settings.verify)
     page = b""
     if work.pages:
         note.doing("drawing the page")

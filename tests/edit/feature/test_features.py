@@ -17,6 +17,7 @@ from mracad.edit.feature.extract import feature_of
 from mracad.edit.feature.score import Copy, lumpy, refuse
 from mracad.errors import Code, EditError
 from mracad.inspect.seams import seams
+from mracad.job.look import snapshot
 from mracad.occ.step import read_step, write_step
 from mracad.occ.view import view
 from mracad.spec.steps import Repeat, Single
@@ -545,7 +546,6 @@ def test_a_surface_that_stands_in_two_places_is_edited_from_either(angle):
     from OCP.gp import gp_Ax1, gp_Dir, gp_Pnt, gp_Trsf, gp_Vec
     from OCP.TopLoc import TopLoc_Location
 
-    import mracad
     from tests.cli.declared import heights
     from tests.occ import shapes
 
@@ -555,14 +555,14 @@ def test_a_surface_that_stands_in_two_places_is_edited_from_either(angle):
     there.SetTranslation(gp_Vec(30, 0, 0))
     turn.SetRotation(gp_Ax1(gp_Pnt(0, 0, 0), gp_Dir(0, 0, 1)), angle)
     both = shapes.compound(face, face.Moved(TopLoc_Location(there.Multiplied(turn))))
-    model = mracad.snapshot(shapes.document(both))
+    model = snapshot(shapes.document(both))
     assert len(model.surfaces) == 1
 
     def at(number, *point):
         return ",".join(repr(float(c)) for c in (model.faces[number].frame @ [*point, 1.0])[:3])
 
     found = [
-        mracad.repeat(model, mracad.Repeat(feature=f"near:{at(i, 5, 5, 0.3)},radius:1.5", at=(at(j, 5, 7.5, 0.0),)))
+        repeat(model, Repeat(feature=f"near:{at(i, 5, 5, 0.3)},radius:1.5", at=(at(j, 5, 7.5, 0.0),)))
         for i in (0, 1)
         for j in (0, 1)
     ]

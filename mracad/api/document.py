@@ -1,0 +1,137 @@
+"""Documents as Python sees them: they know what was done to them, and are judged as they are written."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from dataclasses import dataclass, field, fields
+from functools import partial
+from pathlib import Path
+from typing import BinaryIO
+
+from mracad.api.speech import speaking
+from mracad.errors import UsageError
+from mracad.formats import FORMATS, by_extension
+from mracad.job.document import Report
+from mracad.job.produce import Target, produce
+from mracad.occ import document as kernel
+from mracad.occ.files import Written
+from mracad.occ.files import read as read_file
+from mracad.occ.load import load
+from mracad.output import put
+from mracad.spec.recipe import Step
+
+
+@dataclass(eq=False)
+class Document(kernel.Document):
+    """A CAD document: what a STEP, IGES or BREP file holds, kept whole.
+
+    Made by :func:`mracad.read`, and by every edit of a file.  Lengths are millimetres, whatever the unit of the file.
+
+    Attributes
+    ----------
+    name : str
+        Name of the file, without its folder.
+    unit : str
+        Length unit of the file, and of those that are written.
+    reports : tuple of Report
+        What each edit did, in order.
+
+    Examples
+    --------
+    >>> document = mracad.read("assembly.step")
+    >>> document.name, document.unit, document.reports
+    ('assembly.step', 'in', ())
+    """
+
+    origin: Callable[[], kernel.Document] | None = field(default=None, repr=False)
+    steps: tuple[Step, ...] = field(default=(), repr=False)
+    reports: tuple[Report, ...] = field(default=(), repr=False)
+
+    def __repr__(self) -> str:
+        count = len(self.reports)
+        done = f", {count} edit{'s' * (count > 1)}" if count else ""
+        return f"<Document {self.name!r}: {len(self.faces)} faces, unit {self.unit}{done}>"
+
+    def write(
+        self,
+        target: str | os.PathLike[str] | BinaryIO,
+        *,
+        format: str = "",
+        schema: str = "",
+        chord: str | float = "0.02%",
+        angle: float | None = None,
+        ascii: bool = False,
+    ) -> Written:
+        """Write a file, whole or not at all; the same as :func:`mracad.write`.
+
+        An exact file is read back and judged, as on the command line: faces that would make it worse stay as they were
+        before the edits, and ``reports`` then says so.
+        """
+        with speaking():
+            wanted = Target(_name(self, target), _format(target, format), schema, str(chord), angle, ascii)
+            return self._write(wanted, target)
+
+    def _write(self, wanted: Target, target: str | os.PathLike[str] | BinaryIO) -> Written:
+        made = produce(self, self.origin or (lambda: self), self.steps, [wanted], done=self.reports)
+        if made.document is not self:
+            self.changed()
+            vars(self).update(vars(made.document))
+        self.reports = tuple(result for result in made.results if isinstance(result, Report))
+        put(made.made[0].data, target)
+        return made.made[0].written
+
+
+def of(document: kernel.Document, origin: Callable[[], kernel.Document]) -> Document:
+    """A document of the kernel room, and how to get it again as it is now."""
+    return Document(**{each.name: getattr(document, each.name) for each in fields(kernel.Document)}, origin=origin)
+
+
+def read(
+    source: str | os.PathLike[str] | BinaryIO, *, input_unit: str | None = None, encoding: str | None = None
+) -> Document:
+    """Read a STEP, IGES, BREP or BinBREP file; the format is detected from its content.
+
+    Parameters
+    ----------
+    source : path or binary stream
+    input_unit : str, optional
+        Length unit of the file's numbers, instead of the one that it states: ``"mm"``, ``"in"``, ...
+    encoding : str, optional
+        Character set of its texts.  Default: UTF-8 if that fits, else the most likely one.
+
+    Returns
+    -------
+    Document
+
+    Raises
+    ------
+    FileError
+        For a file that is missing, damaged, in another format or without faces.
+    UsageError
+        For an unknown unit or character set.
+
+    Examples
+    --------
+    >>> mracad.read("assembly.step")
+    <Document 'assembly.step': 15 faces, unit in>
+    """
+    with speaking():
+        text = load(source)
+        again = partial(read_file, text, input_unit, encoding)
+        return of(again(), again)
+
+
+def _name(document: kernel.Document, target: str | os.PathLike[str] | BinaryIO) -> str:
+    return Path(target).name if isinstance(target, str | os.PathLike) else document.name
+
+
+def _format(target: str | os.PathLike[str] | BinaryIO, format: str) -> str:
+    """The name of the format to write."""
+    if not format:
+        format = by_extension(target).name if isinstance(target, str | os.PathLike) else "step"
+    if format not in FORMATS:
+        raise UsageError(f"unknown format '{format}'", "use one of " + ", ".join(FORMATS))
+    if FORMATS[format].kind == "picture":
+        raise UsageError(f"{format} is a picture, not a model", "make it with mracad.render")
+    return format

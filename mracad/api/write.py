@@ -1,0 +1,67 @@
+"""Writing anything that can be edited."""
+
+from __future__ import annotations
+
+import os
+from typing import BinaryIO
+
+from mracad.api.speech import speaking
+from mracad.api.things import Source, opened
+from mracad.occ.files import Written
+
+
+def write(
+    thing: Source,
+    target: str | os.PathLike[str] | BinaryIO,
+    *,
+    format: str = "",
+    schema: str = "",
+    chord: str | float = "0.02%",
+    angle: float | None = None,
+    ascii: bool = False,
+) -> Written:
+    """Write a model, whole or not at all; the same bytes every time.
+
+    An exact file is read back and judged, as on the command line.  Faces that would make it worse stay as they were
+    before the edits; :func:`report_of` then says so.
+
+    Parameters
+    ----------
+    thing : Document or shape
+    target : path or binary stream
+    format : str
+        ``"step"``, ``"iges"``, ``"brep"``, ``"binbrep"``, ``"stl"``, ``"3mf"``, ``"obj"``, ``"ply"``, ``"gltf"`` or
+        ``"glb"``.  Default: by the extension of a path, STEP for a stream.
+    schema : str
+        STEP: ``"AP203"``, ``"AP214"`` or ``"AP242"``.  Default: that of the file that was read, else AP242.
+    chord : str or float
+        Meshes: largest distance of triangles from the surface, a length.
+    angle : float, optional
+        Meshes: largest angle between triangles, degrees.
+    ascii : bool
+        STL: write text.
+
+    Returns
+    -------
+    Written
+        What the file lacks (``lost``), and which faces it holds in another form (``cut``).
+
+    Raises
+    ------
+    EditError
+        When the file would be worse whichever faces stay unchanged.
+    FileError
+        When it cannot be written.
+    UsageError
+        For an unknown format or schema.
+
+    Examples
+    --------
+    >>> import io
+    >>> target = io.BytesIO()
+    >>> mracad.write(mracad.read("assembly.step"), target, format="stl").lost
+    ()
+    """
+    with speaking():
+        document = opened(thing, change=False).document
+    return document.write(target, format=format, schema=schema, chord=chord, angle=angle, ascii=ascii)
