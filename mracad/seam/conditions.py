@@ -12,7 +12,9 @@ seam free to move where they vary.  With double knots along the seam (:func:`dou
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -69,7 +71,8 @@ def matched(nets: Mapping[int, Net], seams: Sequence[Seam]) -> dict[int, Net]:
 def doubled(nets: Mapping[int, Net], seams: Sequence[Seam]) -> dict[int, Net]:
     """The nets with double knots along seams whose joint varies, so that their conditions can hold everywhere.
 
-    Both sides still have the same splines along these seams, but other seams may have to be matched again.
+    Laws that are linear between knots get as many as they need.  Both sides still have the same splines along these
+    seams, but other seams may have to be matched again.
     """
     result = dict(nets)
     for seam in seams:
@@ -77,10 +80,20 @@ def doubled(nets: Mapping[int, Net], seams: Sequence[Seam]) -> dict[int, Net]:
             for border in (seam.a, seam.b):
                 net = result[border.surface]
                 if _along(net, border).degree > 1:
-                    simple = [share for share, count in _inner(_along(net, border), border).items() if count == 1]
-                    places = [_near(result, border, border.start + x * (border.stop - border.start)) for x in simple]
-                    result[border.surface] = net.refined(*(places, [])[:: 1 if border.axis else -1])
+                    more = _double(_inner(_along(net, border), border), seam.joint.pieces)
+                    places = [_near(result, border, border.start + x * (border.stop - border.start)) for x in more]
+                    result[border.surface] = net.refined(*(np.array(places), [])[:: 1 if border.axis else -1])
     return result
+
+
+def _double(inner: Mapping[float, int], pieces: int) -> Iterator[float]:
+    """Fractions of further knots along a seam: all inner ones are double, and spans short enough for laws of so many
+    pieces."""
+    yield from (share for share, count in inner.items() if count == 1)
+    ends = [0.0, *inner, 1.0]
+    for low, high in pairwise(ends):
+        count = math.ceil((pieces if low > 0 and high < 1 else 2 * pieces) * (high - low) - SAME)
+        yield from (low + (high - low) * k / count for k in range(1, count) for _ in range(2))
 
 
 def _lost(joint: Joint) -> int:
@@ -167,7 +180,7 @@ def rows(
             share = knots.greville()
             sides = [(_sided(nets[b.surface], b, share), first[b.surface]) for b in (seam.b, seam.a)]
             column = np.concatenate([begin + index for (index, _), begin in sides], axis=1)
-            value = np.concatenate(_terms(seam.joint, order, share, sides), axis=1)
+            value = np.concatenate(_terms(seam.joint, order, share, knots.breaks, sides), axis=1)
             row, column, value = _plain(knots, column, value)
             entries.append((count + row, column, value))
             mended.append(np.full(len(share), (seam.joint.close, seam.joint.fit, False)[order]))
@@ -209,19 +222,15 @@ def _plain(knots: KnotVector, column: Array, value: Array) -> tuple[Array, Array
     return row, used[place], asked[row, place]
 
 
-def _terms(joint: Joint, order: int, share: Array, sides: Sequence[Any]) -> tuple[Array, Array]:
-    """The terms of a condition on side b and on side a."""
+def _terms(joint: Joint, order: int, share: Array, breaks: Array, sides: Sequence[Any]) -> tuple[Array, Array]:
+    """The terms of a condition on side b and on side a, at fractions of a seam with knots at ``breaks``."""
     b, a = (table for (_, table), _ in sides)
     if order == 0:
         return b["s"], -a["s"]
     if order == 1:
-        return b["n"], -(_law(joint.across, share) * a["n"] + _law(joint.along, share) * a["t"])
-    return b["nn"], -(joint.across[0] ** 2 * a["nn"] + joint.bend * a["n"] + joint.shear * a["t"])
-
-
-def _law(coefficients: Array, share: Array) -> Array:
-    """A polynomial of the joint at fractions of the seam, ``(q, 1)``."""
-    return np.asarray(np.polynomial.polynomial.polyval(share, np.append(coefficients, 0.0))[:, None])
+        across, along = (law.at(share, breaks)[:, None] for law in (joint.across, joint.along))
+        return b["n"], -(across * a["n"] + along * a["t"])
+    return b["nn"], -(joint.across.values[0] ** 2 * a["nn"] + joint.bend * a["n"] + joint.shear * a["t"])
 
 
 def _asked(spaces: Mapping[int, tuple[KnotVector, KnotVector]], seam: Seam, order: int) -> KnotVector:
@@ -229,7 +238,7 @@ def _asked(spaces: Mapping[int, tuple[KnotVector, KnotVector]], seam: Seam, orde
 
     For an order above 0, the space in which the condition of that order lies.
     """
-    more, lost = (order * (len(seam.joint.across) - 1), _lost(seam.joint)) if order else (0, 0)
+    more, lost = (order * max(seam.joint.across.degree, 0), _lost(seam.joint)) if order else (0, 0)
     found = []
     for border in (seam.a, seam.b):
         knots = spaces[border.surface][1 - border.axis]

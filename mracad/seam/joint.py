@@ -5,21 +5,21 @@ parameters.  The joint of the input is
 
     G0   S = T∘φ,    G1   T_n = a S_n + b S_t,    G2   T_nn = a² S_nn + r S_n + s S_t   (a constant, b = 0)
 
-with scalar functions of t that are polynomials as simple as the input allows.  With a, b, r, s kept, these are linear
-conditions on a displacement; the errors of the input (gap, angle) then stay unchanged.
+with scalar functions of t: polynomials as simple as the input allows, or linear between knots.  With a, b, r, s kept,
+these are linear conditions on a displacement; the errors of the input (gap, angle) then stay unchanged.
 """
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from mracad.bspline.vectors import between, components
 from mracad.model.brep import Model
-from mracad.seam.border import SHARES, Border, Jet, outward
+from mracad.seam.border import SHARES, Border, Jet, jets, outward
 from mracad.seam.cause import Cause, Still
+from mracad.seam.law import NONE, Law, breaks, constant, polynomial
 from mracad.seam.wishes import Wishes
 
 Array = np.ndarray
@@ -28,22 +28,30 @@ SLIP = 1e-4
 """Largest distance along the seam between points of equal parameter, as a share of its length."""
 
 EXACT, CLOSE = 1e-8, 2e-3
-"""A joint's polynomials are exact if they miss the input by at most EXACT of |T_n|, and usable up to CLOSE: the angle
+"""A joint's laws are exact if they miss the input by at most EXACT of |T_n|, and usable up to CLOSE: the angle
 of the seam then grows by at most CLOSE of the angle by which the normal turns."""
 
+FINE = 5e-4
+"""The same for laws that are linear between knots, which cost only knots."""
+
 _SHAPES = ((0, -1), (0, 0), (1, -1), (1, 1), (2, -1), (2, 2))
+
+FEWEST = 4
+"""Fewest pieces of a law that is linear between knots."""
+
+_EVENLY = np.linspace(0.0, 1.0, 1025)
 
 
 @dataclass(frozen=True, eq=False)
 class Joint:
-    """How smoothly two surfaces meet: coefficients of polynomials in the fraction of the edge, lowest degree first.
+    """How smoothly two surfaces meet.
 
     Attributes
     ----------
     order : {0, 1, 2}
         Cross derivatives that the seam keeps.
-    across, along : ndarray
-        a and b; b is empty where it vanishes.
+    across, along : Law
+        a and b.
     bend, shear : float
         r and s.
     missed : float
@@ -55,8 +63,8 @@ class Joint:
     """
 
     order: int
-    across: Array
-    along: Array
+    across: Law
+    along: Law
     bend: float = 0.0
     shear: float = 0.0
     missed: float = 0.0
@@ -67,14 +75,19 @@ class Joint:
     @property
     def varying(self) -> bool:
         """Whether the conditions raise the degree, so that no smooth T of S's degree may satisfy them."""
-        return self.order > 0 and (len(self.across) > 1 or len(self.along) > 0)
+        return self.order > 0 and (self.across.degree > 0 or self.along.degree >= 0)
+
+    @property
+    def pieces(self) -> int:
+        """Number of spans along the seam that are fine enough for its laws."""
+        return max(self.across.pieces, self.along.pieces) if self.order else 0
 
     def part(self, low: float, high: float) -> Joint:
         """The joint of the part between two fractions of the edge, rescaled to 0 … 1."""
         size = high - low
-        across, along = (_composed(law, low, size) for law in (self.across, self.along))
+        across, along = self.across.part(low, high), self.along.part(low, high).over(size)
         smoother = self.smoother and self.smoother.part(low, high)
-        return replace(self, across=across, along=along / size, shear=self.shear / size, smoother=smoother)
+        return replace(self, across=across, along=along, shear=self.shear / size, smoother=smoother)
 
 
 def joint_of(
@@ -90,29 +103,55 @@ def joint_of(
     sizes = [np.linalg.norm(n, axis=1) for n in normals]
     if min(size.min() / max(size.max(), 1e-300) for size in sizes) < 1e-9:
         return Cause(Still.DEGENERATE)
-    close = wishes.close_gaps
+    plain = Joint(0, constant(1.0), NONE, close=wishes.close_gaps)
     if order == 0:
-        return Joint(0, np.ones(1), np.empty(0), close=close)
-    fit = bool(between(*normals).max() <= wishes.fit)
-    across, along = components(sn, st, tn).T
-    size = np.linalg.norm(tn, axis=1)
+        return plain
+    joint = _polynomial(sn, st, tn)
+    if joint is None and wishes.pieces:
+        (_, sn, st), (_, tn, _) = (jets(model, each, _EVENLY, 1) for each in borders)
+        joint = _piecewise(sn, st, tn, wishes.pieces)
+    if joint is None:
+        return plain
+    joint = replace(joint, close=plain.close, fit=bool(between(*normals).max() <= wishes.fit))
+    bent = joint if joint.varying else _bent(joint, sn, st, snn, tnn)
+    return bent if order == 2 or bent is joint else replace(joint, smoother=bent)
+
+
+def _polynomial(sn: Array, st: Array, tn: Array) -> Joint | None:
+    """The joint of first order whose laws are the simplest polynomials that are exact, or else close."""
+    values = components(sn, st, tn).T
     for limit in (EXACT, CLOSE):
-        for degree, shear in _SHAPES:
-            p, q = _polynomial(across, degree), _polynomial(along, shear)
-            off = sn * (across - _value(p))[:, None] + st * (along - _value(q))[:, None]
-            missed = float((np.linalg.norm(off, axis=1) / size).max())
+        for degrees in _SHAPES:
+            across, along = (polynomial(SHARES, x, degree) for x, degree in zip(values, degrees, strict=True))
+            missed = _missed(sn, st, tn, (across.at(SHARES, SHARES), along.at(SHARES, SHARES)))
             if missed <= limit:
-                joint = Joint(1, p, q, missed=missed, close=close, fit=fit)
-                bent = _bent(joint, sn, st, snn, tnn)
-                return bent if order == 2 or bent is joint else replace(joint, smoother=bent)
-    return Joint(0, np.ones(1), np.empty(0), close=close)
+                return Joint(1, across, along, missed=missed)
+    return None
+
+
+def _piecewise(sn: Array, st: Array, tn: Array, most: int) -> Joint | None:
+    """The joint of first order with a constant ratio across it, and a law along it of as few pieces as are close."""
+    across, along = components(sn, st, tn).T
+    ratio, pieces = constant(float(across.mean())), FEWEST
+    while pieces <= most:
+        law, knots = Law(along, pieces), breaks(pieces)
+        missed = _missed(sn, st, tn, (ratio.at(_EVENLY, knots), law.at(_EVENLY, knots)))
+        if missed <= FINE:
+            return Joint(1, ratio, law, missed=missed)
+        pieces *= 2
+    return None
+
+
+def _missed(sn: Array, st: Array, tn: Array, laws: tuple[Array, Array]) -> float:
+    """Largest part of T_n within the tangent plane that a S_n + b S_t misses, relative."""
+    across, along = (law - x for law, x in zip(laws, components(sn, st, tn).T, strict=True))
+    off = sn * across[:, None] + st * along[:, None]
+    return float((np.linalg.norm(off, axis=1) / np.linalg.norm(tn, axis=1)).max())
 
 
 def _bent(joint: Joint, sn: Array, st: Array, snn: Array, tnn: Array) -> Joint:
     """The joint with its second derivatives, if they have a law."""
-    if joint.varying:
-        return joint
-    bend, shear = components(sn, st, tnn - joint.across[0] ** 2 * snn).T
+    bend, shear = components(sn, st, tnn - joint.across.values[0] ** 2 * snn).T
     scale = np.linalg.norm(tnn, axis=1).max() + 1e-300
     fitted = [
         float(x.mean()) if np.abs(x[:, None] * d).max() > EXACT * scale else 0.0 for x, d in ((bend, sn), (shear, st))
@@ -121,21 +160,3 @@ def _bent(joint: Joint, sn: Array, st: Array, snn: Array, tnn: Array) -> Joint:
     if np.linalg.norm(off, axis=1).max() > CLOSE * scale:
         return joint
     return replace(joint, order=2, bend=fitted[0], shear=fitted[1])
-
-
-def _polynomial(values: Array, degree: int) -> Array:
-    """Coefficients in the fraction of the edge that fit values at the samples; none for degree −1."""
-    return np.polynomial.polynomial.polyfit(SHARES, values, degree) if degree >= 0 else np.empty(0)
-
-
-def _composed(coefficients: Array, low: float, size: float) -> Array:
-    """Coefficients of p(low + size x) from those of p(x)."""
-    result = np.zeros(len(coefficients))
-    for k in range(len(result)):
-        result[k] = np.polynomial.polynomial.polyval(low, coefficients) * size**k / math.factorial(k)
-        coefficients = np.polynomial.polynomial.polyder(coefficients)
-    return result
-
-
-def _value(coefficients: Array) -> Array:
-    return np.polynomial.polynomial.polyval(SHARES, coefficients) if len(coefficients) else np.zeros_like(SHARES)

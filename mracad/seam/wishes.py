@@ -45,6 +45,8 @@ class Wishes:
         Whether jumps of curvature must not grow where seams keep what they have.
     slide : frozenset of int
         Edges that may slide along a neighbour that stays.
+    pieces : int
+        Largest number of pieces of a joint's law; 0 where laws must be polynomials.
     """
 
     keep: str = "g1"
@@ -58,6 +60,7 @@ class Wishes:
     corners: bool = False
     jumps: bool = True
     slide: frozenset[int] = frozenset()
+    pieces: int = 0
 
     def order(self, angles: Array, one: Array, other: Array) -> int:
         """Number of derivatives kept across an edge, given those along it.

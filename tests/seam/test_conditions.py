@@ -10,10 +10,9 @@ from mracad.bspline.surface import Net
 from mracad.seam.border import Border
 from mracad.seam.conditions import doubled, laid_out, matched, rows
 from mracad.seam.joint import Joint
+from mracad.seam.law import NONE, Law, breaks, constant
 from mracad.seam.natural import Seam
 from mracad.seam.solve import Constrained
-
-NONE = np.empty(0)
 
 
 def chart(place, degrees=(3, 3), spans=(3, 4)):
@@ -69,7 +68,7 @@ def across(sign, how):
 @pytest.mark.parametrize("degrees", [(3, 3), (5, 4)])
 def test_fields_that_are_smooth_across_the_seam_obey_up_to_the_second_order(how, degrees):
     right = turned(chart(lambda u, v: (2 * u, v), degrees, (4, 3)), how)
-    joint = Joint(2, np.array([across(2.0, how)]), NONE)
+    joint = Joint(2, constant(across(2.0, how)), NONE)
     seam = joined(border(0, False), border(1, True, how), joint)
     nets = matched({0: LEFT, 1: right}, [seam])
     form, mended = rows(nets, [seam])
@@ -88,13 +87,13 @@ def test_fields_that_are_smooth_across_the_seam_obey_up_to_the_second_order(how,
 @pytest.mark.parametrize(
     ("place", "laws"),
     [
-        (lambda u, v: (u * (1 + v / 2), v), ([1.0, 0.5], NONE)),
+        (lambda u, v: (u * (1 + v / 2), v), ([1.0, 0.5], [])),
         (lambda u, v: (u, v + 0.3 * u), ([1.0], [0.3])),
         (lambda u, v: (u, v + 0.3 * u * v), ([1.0], [0.0, 0.3])),
     ],
 )
 def test_the_laws_of_a_joint_follow_its_parameters(place, laws):
-    seam = joined(border(0, False), border(1, True), Joint(1, *map(np.asarray, laws)))
+    seam = joined(border(0, False), border(1, True), Joint(1, *(Law(np.array(each)) for each in laws)))
     nets = matched({0: LEFT, 1: chart(place, (6, 6))}, [seam])
     for function in SMOOTH:
         delta = np.concatenate([field(net, function) for net in nets.values()])
@@ -104,7 +103,7 @@ def test_the_laws_of_a_joint_follow_its_parameters(place, laws):
 def test_a_bend_and_a_shear_of_second_derivatives():
     """x = u + r u² / 2, y = v + s u² / 2 has T_uu = S_uu + r S_u + s S_v on u = 0."""
     right = chart(lambda u, v: (u + 0.4 * u**2, v + 0.25 * u**2), (6, 6))
-    seam = joined(border(0, False), border(1, True), Joint(2, np.ones(1), NONE, 0.8, 0.5))
+    seam = joined(border(0, False), border(1, True), Joint(2, constant(1.0), NONE, 0.8, 0.5))
     nets = matched({0: LEFT, 1: right}, [seam])
     delta = np.concatenate([field(net, SMOOTH[1]) for net in nets.values()])
     assert np.abs(rows(nets, [seam])[0] @ delta).max() < 1e-10
@@ -140,7 +139,7 @@ PAIRS = {
 def test_any_displacement_against_finite_differences(pair):
     """What is asked of a displacement decides what it lacks at the sites, and is decided by it."""
     a, side_a, b, side_b = PAIRS[pair]
-    joint = Joint(2, np.array([0.8, 0.3]), np.array([0.1, -0.2]), 0.6, -0.4)
+    joint = Joint(2, Law(np.array([0.8, 0.3])), Law(np.array([0.1, -0.2])), 0.6, -0.4)
     seam = joined(side_a, side_b, joint)
     nets = matched({0: a, 1: b}, [seam])
     rng = np.random.default_rng(3)
@@ -177,7 +176,7 @@ def test_any_displacement_against_finite_differences(pair):
 
 def test_sides_of_the_same_make_are_joined_point_by_point():
     """Each control point with the few across the seam from it."""
-    seam = joined(border(0, False), border(1, True), Joint(2, np.array([0.8]), NONE, 0.6))
+    seam = joined(border(0, False), border(1, True), Joint(2, constant(0.8), NONE, 0.6))
     form, _ = rows(matched({0: LEFT, 1: chart(lambda u, v: (u, v))}, [seam]), [seam])
     assert [np.unique(each).tolist() for each in np.split(np.diff(form.indptr), 3)] == [[2], [4], [6]]
 
@@ -201,7 +200,7 @@ def sites(nets, sides, count):
 @pytest.mark.parametrize("order", [0, 1, 2])
 def test_what_obeys_is_smooth_all_along_the_seam(order):
     right = chart(lambda u, v: (2 * u, v), (4, 5), (4, 3))
-    seam = joined(border(0, False), border(1, True), Joint(order, np.array([2.0]), NONE))
+    seam = joined(border(0, False), border(1, True), Joint(order, constant(2.0), NONE))
     nets = matched({0: LEFT, 1: right}, [seam])
     form, _ = rows(nets, [seam])
     total = form.shape[1]
@@ -223,12 +222,19 @@ def test_what_obeys_is_smooth_all_along_the_seam(order):
         assert np.abs(jets[1][order + 1] - 2.0 ** (order + 1) * jets[0][order + 1]).max() > 1e-3
 
 
-LAWS = {"skew": ([0.8], [0.3]), "linear": ([0.8, 0.3], [0.1]), "quadratic": ([0.9, 0.2, -0.3], [0.1, -0.2, 0.4])}
+WAVE = np.cos(np.pi * np.linspace(0, 1, 1025))
+
+LAWS = {
+    "skew": (constant(0.8), constant(0.3)),
+    "linear": (Law(np.array([0.8, 0.3])), constant(0.1)),
+    "quadratic": (Law(np.array([0.9, 0.2, -0.3])), Law(np.array([0.1, -0.2, 0.4]))),
+    "piecewise": (constant(0.8), Law(0.5 * WAVE, 4)),
+}
 
 
 @pytest.mark.parametrize("law", LAWS)
 def test_what_obeys_a_varying_joint_along_double_knots_is_smooth_everywhere(law):
-    across, along = map(np.array, LAWS[law])
+    across, along = LAWS[law]
     seam = joined(border(0, False), border(1, True), Joint(1, across, along))
     left, right = (chart(lambda u, v, i=i: (u + i - 1, v), (3, 3), (3, 6 + i)) for i in (0, 1))
     nets = matched({0: left, 1: right}, [seam])
@@ -245,32 +251,63 @@ def test_what_obeys_a_varying_joint_along_double_knots_is_smooth_everywhere(law)
             own = own.reshape(net.u.count, net.v.count, 1)
             jets.append(Net(net.u, net.v, own).evaluate(side.places(share), 1, side.limits("right")))
         (s, n, t), (z, m, _) = jets
-        laws = [np.polynomial.polynomial.polyval(share, c)[:, None] for c in (across, along)]
+        laws = [each.at(share, wide[0].v.breaks)[:, None] for each in (across, along)]
         worst[name] = np.abs(m - laws[0] * n - laws[1] * t).max()
         assert np.abs(z - s).max() < 1e-9 and np.abs(s).max() > 0.1 and np.abs(n).max() > 0.1
     print(law, worst)
     # conditions with a varying ratio all but depend on each other
-    assert worst["double"] < (1e-9 if len(across) == 1 else 1e-3 * worst["simple"]) and worst["simple"] > 1e-2
+    assert worst["double"] < (1e-9 if across.degree == 0 else 1e-3 * worst["simple"]) and worst["simple"] > 1e-2
 
 
 def test_a_part_of_a_seam_asks_the_same_as_the_whole():
     """On displacements of the whole that obey, and only on those; its fractions are its own."""
-    across, along = np.array([0.9, 0.2, -0.3]), np.array([0.1, -0.2, 0.4])
+    across, along = LAWS["quadratic"]
     seam = joined(border(0, False), border(1, True), Joint(1, across, along))
     part = seam.part(0.25, 0.75)
     share = np.linspace(0, 1, 9)
     assert np.abs(part.a.places(share) - seam.a.places(0.25 + share / 2)).max() < 1e-15
     for own, whole, pace in ((part.joint.across, across, 1.0), (part.joint.along, along, 2.0)):
-        value = np.polynomial.polynomial.polyval
-        assert np.abs(value(share, own) - pace * value(0.25 + share / 2, whole)).max() < 1e-14
-    bent = Joint(2, np.array([2.0]), NONE, 0.6, -0.4).part(0.25, 0.75)
-    assert (bent.across, bent.bend, bent.shear) == (np.array([2.0]), 0.6, -0.8)
+        assert np.abs(own.at(share, share) - pace * whole.at(0.25 + share / 2, share)).max() < 1e-14
+    bent = Joint(2, constant(2.0), NONE, 0.6, -0.4).part(0.25, 0.75)
+    assert (bent.across.values, bent.bend, bent.shear) == (np.array([2.0]), 0.6, -0.8)
+
+
+def test_piecewise_laws_get_the_spans_that_they_need():
+    """No longer than those of their pieces, and half as long at both ends; without them the seam has its own knots."""
+    seam = joined(border(0, False), border(1, True), Joint(1, constant(1.0), Law(WAVE, 12)))
+    nets = {i: chart(lambda u, v, i=i: (u + i - 1, v)) for i in (0, 1)}
+    wide = doubled(nets, [seam])
+    assert wide[0].v == wide[1].v and set(wide[0].v.multiplicities[1:-1]) == {2}
+    widths = np.diff(wide[0].v.breaks)
+    assert widths.max() <= 1 / 12 + 1e-9 and widths[[0, -1]].max() <= 1 / 24 + 1e-9
+    assert set(np.round(nets[0].v.breaks, 12)) <= set(np.round(wide[0].v.breaks, 12)) and len(widths) <= 24
+    part = seam.part(0.25, 0.75).joint.along
+    share = np.linspace(0, 1, 50)
+    assert part.pieces == 6 and np.abs(part.at(share, share) - 2 * np.cos(np.pi * (0.25 + share / 2))).max() < 1e-3
+
+
+def test_piecewise_laws_are_exact_at_knots_and_have_the_slopes_of_the_ends():
+    """Where three seams meet, second derivatives could not agree otherwise."""
+    law, knots = Law(np.sin(3 * np.linspace(0, 1, 1025)), 8), breaks(8)
+    found = law.at(knots, knots)
+    assert np.abs(found - np.sin(3 * knots))[[0, *range(2, len(knots) - 2), -1]].max() < 1e-5
+    slopes = np.diff(found)[[0, -1]] / np.diff(knots)[[0, -1]]
+    assert np.abs(slopes - [3.0, 3 * np.cos(3)]).max() < 1e-4
+
+
+def test_piecewise_laws_do_not_bend_where_they_vanish():
+    """A displacement of a seam would have to be level there."""
+    even, knots = np.linspace(0, 1, 1025), np.array([0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.7, 0.8, 0.9, 1])
+    found = Law((even - 0.5) * (even + 1), 8).at(knots, knots)
+    slopes = np.diff(found) / np.diff(knots)
+    assert abs(slopes[5] - slopes[4]) < 1e-12 and np.diff(np.delete(slopes, 5)).min() > 0.05
+    assert np.abs(found - (knots - 0.5) * (knots + 1)).max() < 0.03
 
 
 @pytest.mark.parametrize("pair", PAIRS)
 def test_matched_nets_are_the_same_surfaces_with_the_same_knots_on_both_sides(pair):
     a, side_a, b, side_b = PAIRS[pair]
-    seam = joined(side_a, side_b, Joint(0, np.ones(1), NONE))
+    seam = joined(side_a, side_b, Joint(0, constant(1.0), NONE))
     nets = matched({0: a, 1: b}, [seam])
     inner = []
     for old, side in ((a, side_a), (b, side_b)):
@@ -291,14 +328,14 @@ def test_knots_that_two_neighbours_have_all_but_alike_are_inserted_once():
     middle = chart(lambda u, v: (u, v), spans=(2, 1))
     left, right = (middle.refined((), [0.5 + off]) for off in (0.0, 7e-11))
     ends = [(border(i, False), border(i + 1, True)) for i in (0, 1)]
-    seams = [joined(a, b, Joint(0, np.ones(1), NONE)) for a, b in ends]
+    seams = [joined(a, b, Joint(0, constant(1.0), NONE)) for a, b in ends]
     nets = matched({0: left, 1: middle, 2: right}, seams)
     assert nets[1].v.count == middle.v.count + 1
 
 
 def test_knots_are_handed_on_through_a_strip():
     nets = {i: chart(lambda u, v, i=i: (u + i, v), (3, 3 + i // 8), spans=(2, 3 + i)) for i in range(9)}
-    seams = [joined(border(i, False), border(i + 1, True), Joint(0, np.ones(1), NONE)) for i in range(8)]
+    seams = [joined(border(i, False), border(i + 1, True), Joint(0, constant(1.0), NONE)) for i in range(8)]
     found = matched(nets, seams)
     assert len({net.v for net in found.values()}) == 1 and found[0].u == nets[0].u
 
@@ -307,12 +344,12 @@ def test_the_end_of_a_side_inside_the_seam_does_not_cut_the_other_in_two():
     """Where one side ends a little before the seam, the other gets no more knots there than leave it in one piece."""
     other = Border(1, 1, 0, 0.0, "right", 0.0, 1.0 + 1e-5)
     every = {0: LEFT, **{i: chart(lambda u, v: (u, v)) for i in range(1, 6)}}
-    nets = matched(every, [joined(border(0, False), other, Joint(0, np.ones(1), NONE))])
+    nets = matched(every, [joined(border(0, False), other, Joint(0, constant(1.0), NONE))])
     assert nets[0].v.multiplicities[1:-1].max() == 3
 
 
 def test_defects_to_be_mended_are_named():
-    seam = joined(border(0, False), border(1, True), Joint(1, np.ones(1), NONE, close=True))
+    seam = joined(border(0, False), border(1, True), Joint(1, constant(1.0), NONE, close=True))
     nets = matched({0: LEFT, 1: chart(lambda u, v: (u, v))}, [seam])
     _, mended = rows(nets, [seam])
     assert mended[: len(mended) // 2].all() and not mended[len(mended) // 2 :].any()

@@ -81,6 +81,12 @@ class Feature:
         return float(np.linalg.norm(self.table[..., :3], axis=-1).max())
 
     @cached_property
+    def curvature(self) -> float:
+        """Its largest second derivative along x or y, 1/mm."""
+        cell, height = 2 * self.reach / (len(self.table) - 1), self.table[..., 2]
+        return float(max(np.abs(np.diff(height, 2, axis)).max() for axis in (0, 1)) / cell**2)
+
+    @cached_property
     def _splines(self) -> list[Array]:
         from scipy.ndimage import spline_filter
 

@@ -36,6 +36,9 @@ from mracad.spec.steps import Copied, Move, Repeat, Transfer
 
 Array = np.ndarray
 
+PIECES = 64
+"""Largest number of pieces of the law of a joint that moves with copies."""
+
 FACE = "write a face as #3, or its name"
 
 
@@ -130,7 +133,7 @@ def _laid(
 
 
 def _wishes(options: Copied | Transfer, scope: Scope) -> Wishes:
-    return Wishes(options.keep, hold=scope.edges, zones=scope.zones)
+    return Wishes(options.keep, hold=scope.edges, zones=scope.zones, pieces=PIECES)
 
 
 def _edit(model: Model, scope: Scope, laid: Laid) -> Edit:

@@ -19,19 +19,18 @@ from mracad.edit.feature.fit import MISSED, holding, over_knots
 from mracad.edit.feature.ground import Ground
 from mracad.edit.feature.ideal import Copies
 from mracad.edit.feature.score import Copy, compared, refuse
-from mracad.edit.feature.seams import ALLOWED, Crossing, Wanted, crossing, held, refined, trace
+from mracad.edit.feature.seams import Crossing, Size, Wanted, crossing, held, refined, trace
 from mracad.edit.feature.taken import clipped
 from mracad.edit.pose import WITHIN
 from mracad.model.brep import Model
 from mracad.model.displacement import Displacement, Offset, lifted
-from mracad.seam.border import opening
 from mracad.seam.cause import Cause, Still
 from mracad.seam.hold import separate
 from mracad.seam.interface import Joints, joints
 from mracad.seam.junction import pieced
 from mracad.seam.natural import Seam
-from mracad.seam.trace import Trace
-from mracad.seam.trimmed import TrimmedSeam, followed
+from mracad.seam.trace import Trace, along
+from mracad.seam.trimmed import TrimmedSeam, followed, judged, parted
 from mracad.seam.wishes import Wishes
 from mracad.seam.zones import zoned
 
@@ -44,7 +43,10 @@ MOVED = 1e-7
 """A seam moves where a copy displaces it by more than this share of its height."""
 
 HALVINGS, LARGEST = 3, 400_000
-"""How often the spans under a trimmed seam are halved at most, and the largest net, in control points, for which."""
+"""How often the spans under a seam are halved at most, and the largest net, in control points, for which."""
+
+BETTER = 0.7
+"""Share of its last excess below which the curvature of a seam must come so that its spans are halved again."""
 
 _EVENLY = np.linspace(0, 1, 401)
 
@@ -87,8 +89,7 @@ class _Task:
         Offsets of the copies over these.
     joints : Joints
         Joints of the faces under them.
-    size : (float, float)
-        Allowed error of the least copy, and the largest reach, mm.
+    size : Size
     """
 
     copies: Copies
@@ -97,7 +98,7 @@ class _Task:
     nets: dict[int, Net]
     poles: dict[int, Array]
     joints: Joints
-    size: tuple[float, float]
+    size: Size
 
     @property
     def model(self) -> Model:
@@ -161,7 +162,8 @@ def _task(copies: Copies, shifts: Shifts, wishes: Wishes, removed: Mapping[int, 
                 knots, laid = holding(rest, patch)
                 nets[i], poles[i] = own.over(*knots), laid @ patch.turn
     under = {face.index for i in nets for face in ground.patches[i].faces}
-    size = MISSED * copies.height, float(copies.reach.max())
+    bend = copies.feature.curvature * float((np.abs(copies.heights) / copies.sizes**2).min())
+    size = Size(MISSED * copies.height, float(copies.reach.max()), bend)
     joined = pieced(ground.model, joints(ground.model, under, wishes), under, wishes)
     joined = replace(joined, loose=tuple(followed(ground.model, seam) for seam in joined.loose))
     return _Task(rest, known, removed, nets, poles, _explained(ground, under, joined), size)
@@ -206,24 +208,28 @@ def _wanted(task: _Task, index: int, net: Net) -> tuple[Array, Array]:
 def _settled(task: _Task, found: Sequence[Crossing]) -> tuple[_Attempt, Sequence[Crossing], dict[int, Cause]]:
     """The copies with the seams that can move, these seams, and why others do not.
 
-    The spans under a trimmed seam that opens are halved a few times before it is given up.
+    The spans under a seam that opens are halved a few times, where that helps, before it is given up.  If that would be
+    only for its curvature, the seam is not asked to keep it.
     """
     given_up: dict[int, Cause] = {}
     while True:
         attempt = _attempt(task, found)
         after = Displacement(attempt.offsets).applied(task.model)
-        failed = [each for each in found if not _holds(task, each, after)]
+        every = [(each, _excess(task, each, after)) for each in found]
+        failed = [(each, excess) for each, excess in every if excess > 1.0]
         if not failed:
             return attempt, found, given_up
-        finer = {each.seam.edge for each in failed if _finer(each, attempt)}
-        for each in failed:
-            if not _finer(each, attempt):
+        lost = [(each, excess) for each, excess in failed if not _finer(each, attempt, excess)]
+        finer = {each.seam.edge for each, _ in failed} - {each.seam.edge for each, _ in lost}
+        dropped = [each for each, _ in lost if each.bent]
+        for each, _ in lost:
+            if each not in dropped:
                 why = Still.BROKEN if isinstance(each.seam, Seam) else Still.OPEN
                 given_up |= dict.fromkeys(each.edges, Cause(why))
         found = [
-            replace(each, halvings=each.halvings + (each.seam.edge in finer))
-            for each in found
-            if each.edges.isdisjoint(given_up)
+            replace(each, halvings=each.halvings + (each.seam.edge in finer), excess=excess)
+            for each, excess in every
+            if each not in dropped and each.edges.isdisjoint(given_up)
         ]
 
 
@@ -242,23 +248,23 @@ def _attempt(task: _Task, found: Sequence[Crossing]) -> _Attempt:
     return _Attempt(wanted, done, offsets)
 
 
-def _holds(task: _Task, each: Crossing, after: Model) -> bool:
-    """Whether a seam is within its tolerances after an edit."""
+def _excess(task: _Task, each: Crossing, after: Model) -> float:
+    """The opening of a seam after an edit over the allowed one; it is within its tolerances up to 1."""
     seam = each.seam
+    gap, angle, bend = task.size.allowed
     if isinstance(seam, TrimmedSeam):
-        gap, angle, bend = ALLOWED.contact(task.size[1])
         more = WIDER, WITHIN * angle, bend
-        return bool(seam.excess(task.model, after, (gap, 0.0, 0.0), more)[1].max() <= 1.0)
-    for stretch in each.stretches:
-        part = seam.part(*stretch)
-        old, new = (opening(model, part.a, part.b) for model in (task.model, after))
-        if new[0] > old[0] + WIDER or (seam.joint.order and new[1] > old[1] + ALLOWED.angle):
-            return False
-    return True
+        return float(seam.excess(task.model, after, (gap, 0.0, 0.0), more)[1].max())
+    traces = along(seam.a), along(seam.b)
+    share = judged(after, traces)
+    old, new = (parted(model, *traces, share).max(axis=1) for model in (task.model, after))
+    opened, turned = float(new[0] - old[0]) / WIDER, float(new[1] - old[1]) / angle
+    return max(opened, turned) if seam.joint.order else opened
 
 
-def _finer(each: Crossing, attempt: _Attempt) -> bool:
+def _finer(each: Crossing, attempt: _Attempt, excess: float) -> bool:
     """Whether halving the spans under a seam is possible and can help."""
     nets = (attempt.wanted[i].net for i in each.surfaces)
     small = all(net.u.count * net.v.count <= LARGEST for net in nets)
-    return small and isinstance(each.seam, TrimmedSeam) and each.halvings < HALVINGS
+    able = each.seam.joint.pieces > 0 if isinstance(each.seam, Seam) else not each.bent or excess < BETTER * each.excess
+    return small and able and each.halvings < HALVINGS

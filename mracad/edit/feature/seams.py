@@ -6,7 +6,7 @@ have exactly the displacement of the copies.  Both sides of a stretch get the kn
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -28,12 +28,33 @@ from mracad.seam.natural import Seam
 from mracad.seam.solve import Problem, Soft, Space
 from mracad.seam.trace import Trace, along, crossings
 from mracad.seam.trimmed import TrimmedSeam
+from mracad.seam.wishes import BENT
 
 Array = np.ndarray
 Stretch = tuple[float, float]
 
-ALLOWED = Tolerances()
-"""Allowed errors of a seam after a copy."""
+
+@dataclass(frozen=True)
+class Size:
+    """What copies are like.
+
+    Attributes
+    ----------
+    error, reach : float
+        Allowed error of the least copy, and the largest reach, mm.
+    curvature : float
+        Largest curvature of the flattest copy, 1/mm.
+    """
+
+    error: float
+    reach: float
+    curvature: float
+
+    @property
+    def allowed(self) -> tuple[float, float, float]:
+        """By how much the gap (mm), the angle and the jump of curvature (1/mm) of a seam may grow."""
+        gap, angle, bend = Tolerances().contact(self.reach)
+        return gap, angle, max(bend, BENT * self.curvature)
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,11 +68,19 @@ class Crossing:
         Pairs of fractions of its length between which control points that move reach it; the rest of it stays.
     halvings : int
         Number of times that the spans under them are halved.
+    excess : float
+        Opening over the allowed one, when last measured.
     """
 
     seam: Seam | TrimmedSeam
     stretches: Sequence[Stretch]
     halvings: int = 0
+    excess: float = np.inf
+
+    @property
+    def bent(self) -> bool:
+        """Whether it only keeps the curvature of a seam whose other conditions are exact."""
+        return isinstance(self.seam, TrimmedSeam) and self.seam.since == 2
 
     @property
     def edges(self) -> set[int]:
@@ -144,14 +173,21 @@ def _merged(stretches: Sequence[Stretch]) -> Iterator[Stretch]:
 def refined(nets: Mapping[int, Net], found: Sequence[Crossing]) -> dict[int, Net]:
     """The nets with the knots that seams need under copies."""
     result = dict(nets)
-    for each in found:
-        for side in map(trace, (each.seam.a, each.seam.b) * each.halvings):
-            net = result[side.surface]
-            cells = _met(net, side, each.stretches)
+    for step in range(max((each.halvings for each in found), default=0)):
+        again = [each for each in found if each.halvings > step]
+        for i in {i for each in again for i in each.surfaces}:
+            net = result[i]
+            cells = np.logical_or.reduce([_met(net, side, stretches) for side, stretches in _on(i, again)])
             middles = ((kv.breaks[:-1] + kv.breaks[1:]) / 2 for kv in (net.u, net.v))
-            result[side.surface] = net.refined(*(x[cells.any(axis=1 - axis)] for axis, x in enumerate(middles)))
+            result[i] = net.refined(*(x[cells.any(axis=1 - axis)] for axis, x in enumerate(middles)))
     parts = _exact_parts(found)
     return matched(doubled(matched(result, parts), parts), parts)
+
+
+def _on(surface: int, found: Iterable[Crossing]) -> Iterator[tuple[Trace, Sequence[Stretch]]]:
+    """The sides of seams that lie on a surface, and their stretches."""
+    sides = ((trace(side), each.stretches) for each in found for side in (each.seam.a, each.seam.b))
+    yield from ((side, stretches) for side, stretches in sides if side.surface == surface)
 
 
 def _exact_parts(found: Sequence[Crossing]) -> list[Seam]:
@@ -168,7 +204,7 @@ def _met(net: Net, side: Trace, stretches: Sequence[Stretch]) -> Array:
     return side.cells(net, np.concatenate(shares))
 
 
-def held(wanted: Mapping[int, Wanted], found: Sequence[Crossing], size: tuple[float, float]) -> dict[int, Array]:
+def held(wanted: Mapping[int, Wanted], found: Sequence[Crossing], size: Size) -> dict[int, Array]:
     """The offsets nearest to those wanted that keep seams under copies.
 
     Parameters
@@ -176,8 +212,7 @@ def held(wanted: Mapping[int, Wanted], found: Sequence[Crossing], size: tuple[fl
     wanted : mapping of int to Wanted
         By surface; those of both sides of a seam have the same knots where copies move it.
     found : sequence of Crossing
-    size : (float, float)
-        Allowed error of a copy, and its reach, mm.
+    size : Size
 
     Returns
     -------
@@ -203,7 +238,7 @@ def _problem(
     laid: Array,
     windows: Mapping[int, _Window],
     found: Sequence[Crossing],
-    size: tuple[float, float],
+    size: Size,
 ) -> Problem:
     """The least changes of offsets ``(points, 3)`` that satisfy the seams."""
     nets = {i: window.net for i, window in windows.items()}
@@ -225,7 +260,7 @@ def _problem(
     if not contacts:
         return Problem(spaces, rows, -(rows @ laid))
     soft = contact_rows(nets, contacts)
-    weight, limits = worth(*size), WITHIN * np.array(ALLOWED.contact(size[1]))[soft.order]
+    weight, limits = worth(size.error, size.reach), WITHIN * np.array(size.allowed)[soft.order]
     pull = weight * soft.pull(-(soft.matrix @ laid), limits)
     return Problem(spaces, rows, -(rows @ laid), Soft(weight * soft.form(limits), pull))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
@@ -15,6 +16,9 @@ Array = np.ndarray
 
 POINTS, MOST, LEAST = 20_000, 1000, 300
 """Points at which copies beside edges are compared: in all, and in one copy at most and at least."""
+
+BATCH = 60_000
+"""Points compared at a time."""
 
 GOLDEN = np.pi * (3 - np.sqrt(5))
 """Angle between points of a sunflower, which are spread evenly over a disc but lie on no lines along a rim."""
@@ -53,7 +57,8 @@ def clipped(
     some = np.flatnonzero(lost | _beside(copies, still))
     count = int(np.clip(POINTS // max(len(some), 1), LEAST, MOST))
     shares = np.zeros(len(found))
-    shares[some] = [_taken(copies, k, count, wanted, done) for k in some.tolist()]
+    for batch in np.array_split(some, math.ceil(len(some) * count / BATCH)) if len(some) else ():
+        shares[batch] = _taken(copies, batch, count, wanted, done)
     return [
         replace(copy, volume=size, taken=share)
         for copy, size, share in zip(found, every.tolist(), shares.tolist(), strict=True)
@@ -79,12 +84,14 @@ def _beside(copies: Copies, still: Collection[int]) -> Array:
     return np.asarray(far <= copies.reach + step)
 
 
-def _taken(copies: Copies, number: int, count: int, wanted: Mapping[int, Wanted], done: Mapping[int, Array]) -> float:
-    """The share of the volume of one copy that is not there, 0 to 1."""
-    place, reach = np.arange(count), copies.reach[number]
-    xy = reach * np.sqrt((place + 0.5) / count)[:, None] * np.stack([np.cos(GOLDEN * place), np.sin(GOLDEN * place)], 1)
-    points = copies.charts.points(xy, np.full(len(xy), number))
-    way = Way(copies.turns[number], copies.sizes[number], copies.heights[number], copies.mirror)
+def _taken(copies: Copies, some: Array, count: int, wanted: Mapping[int, Wanted], done: Mapping[int, Array]) -> Array:
+    """The shares of the volume of some copies that are not there, 0 to 1."""
+    place, which = np.tile(np.arange(count), len(some)), np.repeat(some, count)
+    reach = copies.reach[which]
+    spread = np.stack([np.cos(GOLDEN * place), np.sin(GOLDEN * place)], axis=1)
+    xy = (reach * np.sqrt((place + 0.5) / count))[:, None] * spread
+    points = copies.charts.points(xy, which)
+    way = Way(copies.turns[which], copies.sizes[which], copies.heights[which], copies.mirror)
     size = np.abs(copies.feature.lookup(way.back(xy))[:, 2])
     feet = copies.ground.feet(points)
     on = (copies.ground.faces(feet.surface, feet.uv) >= 0) & (feet.beside(points) <= reach * SLIGHT)
@@ -99,4 +106,5 @@ def _taken(copies: Copies, number: int, count: int, wanted: Mapping[int, Wanted]
         now = np.asarray(net.evaluate(feet.uv[own]))
         square = np.maximum((ideal**2).sum(axis=1), (1e-9 * copies.feature.height) ** 2)
         kept[own] = np.clip((now * ideal).sum(axis=1) / square, 0.0, 1.0)
-    return float(np.clip(1.0 - (kept * size).sum() / max(size.sum(), 1e-300), 0.0, 1.0))
+    there, whole = ((x * size).reshape(len(some), count).sum(axis=1) for x in (kept, np.ones_like(kept)))
+    return np.asarray(np.clip(1.0 - there / np.maximum(whole, 1e-300), 0.0, 1.0))

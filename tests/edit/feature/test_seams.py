@@ -1,5 +1,7 @@
 """Copies over seams: what takes part, where knots go, and what is left as it was."""
 
+import io
+
 import numpy as np
 import pytest
 from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
@@ -9,13 +11,18 @@ from mracad.bspline.surface import Net
 from mracad.edit.feature.edits import repeat
 from mracad.edit.feature.seams import crossing
 from mracad.errors import EditError
+from mracad.inspect.seams import seams
+from mracad.job.document import run
+from mracad.occ.step import read_step, write_step
 from mracad.occ.view import view
 from mracad.seam.border import Border
 from mracad.seam.joint import Joint
+from mracad.seam.law import NONE, constant
 from mracad.seam.natural import Seam
 from mracad.spec.steps import Repeat
 from tests import zoo
 from tests.edit import panels
+from tests.edit.feature import grounds
 from tests.edit.feature.grounds import HEIGHT, SIGMA, bump
 from tests.edit.models import sheet
 from tests.occ import shapes
@@ -66,7 +73,7 @@ def test_stretches_hold_the_supports_of_what_moves():
     x, y = np.meshgrid(k.greville(), k.greville(), indexing="ij")
     nets = {i: Net(k, k, np.stack([x + i, y, 0 * x], axis=-1)) for i in (0, 1)}
     sides = Border(0, 0, 0, 1.0, "left", 0.0, 1.0), Border(1, 1, 0, 0.0, "right", 1.0, 0.0)
-    seam = Seam(0, 0, *sides, Joint(1, np.ones(1), np.empty(0)), 0.0, 0.0)
+    seam = Seam(0, 0, *sides, Joint(1, constant(1.0), NONE), 0.0, 0.0)
     moved = {i: np.zeros((33, 33), bool) for i in (0, 1)}
     moved[0][-1, 16] = True
     found = crossing(seam, nets, moved)
@@ -133,3 +140,38 @@ def test_a_copy_over_a_sharp_edge_is_refused(feature):
     document = shapes.document(zoo.nurbs(BRepPrimAPI_MakeBox(100.0, 100.0, 100.0).Shape()))
     with pytest.raises(EditError, match="stay in place cut off"):
         repeat(view(document), Repeat(feature=feature, at=("95,50,100",)))
+
+
+BALL = 20.0
+
+
+def on_ball(way):
+    """The point of the ball in a direction."""
+    return BALL * np.array(way) / np.linalg.norm(way)
+
+
+@pytest.mark.parametrize(("way", "faces"), [((1, 1, 0.1), 2), ((1, 0.95, 0.85), 3)], ids=["seam", "corner"])
+def test_copies_cross_the_seams_and_corners_of_a_ball(feature, way, faces):
+    """Whose patches meet at an angle to their parameter lines: the closed form, and seams as they were, in the file."""
+    paper = grounds.sewn(grounds.ball(BALL, 24))
+    before = view(paper)
+    place = on_ball(way)
+    report = run(
+        paper, repeat, Repeat(feature=feature, at=(",".join(map(repr, place.tolist())),), size=0.25, height=0.2)
+    )
+    stream = io.BytesIO()
+    write_step(paper, stream)
+    after = view(read_step(io.BytesIO(stream.getvalue())))
+    (copy,) = report.edit.copies
+    old, new = ([max(getattr(s, name) for s in seams(model)) for name in ("gap", "angle")] for model in (before, after))
+    print(f"gap {new[0]:.1e} mm, angle {new[1] - old[1]:+.1e}°, off by {copy.deviation:.1e} mm")
+    assert report.valid_after.valid and len(copy.faces) == faces and copy.taken < 1e-3
+    assert [t.how for t in report.edit.edges if t.how != "frozen"] == ["to tolerance"] * (1 if faces == 2 else 3)
+    assert new[0] <= 1e-4 and new[1] <= old[1] + 0.01 and copy.deviation <= 5e-3 * 0.2 * HEIGHT
+    uv = np.random.default_rng(0).uniform(-np.pi / 4, np.pi / 4, (4000, 2))
+    for one, two in zip(before.surfaces, after.surfaces, strict=True):
+        points = one.net.evaluate(uv)
+        far = BALL * np.arccos(np.clip(points @ place / BALL**2, -1, 1))
+        wanted = bump(far, 0.2 * HEIGHT, 0.25 * SIGMA)
+        moved = np.linalg.norm(two.net.evaluate(uv), axis=1) - np.linalg.norm(points, axis=1)
+        assert np.abs(moved - wanted).max() <= 5e-3 * 0.2 * HEIGHT
