@@ -1,9 +1,11 @@
-"""The current activity of this process, for the error message should it crash or exceed a limit."""
+"""The current activity of this process, for the error message should it crash or exceed a limit, and for those who watch."""
 
 from __future__ import annotations
 
 import mmap
 from collections.abc import Callable
+
+Watcher = Callable[[str, str], object]
 
 
 class Note:
@@ -34,7 +36,7 @@ class Note:
 
 
 _note: Note | None = None  # of this process, when it is a child
-_watcher: Callable[[str], object] = bool
+_watchers: list[Watcher] = []
 
 
 def set_note(note: Note) -> None:
@@ -55,14 +57,18 @@ def doing(stage: str = "", subject: str = "") -> None:
     """
     if _note:
         _note.write(stage or _note.stage, subject or _note.subject)
-    if stage:
-        _watcher(stage)
+    for watcher in _watchers:
+        watcher(stage, subject)
 
 
-def watch(watcher: Callable[[str], object] = bool) -> None:
-    """Have a function called with the name of each stage that begins in this process; by default none."""
-    global _watcher
-    _watcher = watcher
+def watch(watcher: Watcher) -> None:
+    """Have a function called with the stage and the subject of every activity in this process and its children."""
+    _watchers.append(watcher)
+
+
+def unwatch(watcher: Watcher) -> None:
+    """Call a function no longer."""
+    _watchers.remove(watcher)
 
 
 def now() -> str:

@@ -17,7 +17,7 @@ from mracad.job.wire import internal
 from mracad.spec.fields import nearest
 from mracad_cli import commands
 from mracad_cli.command import Group, run
-from mracad_cli.say import json_text, say
+from mracad_cli.say import json_text, printable, say, voice
 from mracad_cli.steps import edit_command, edits
 
 
@@ -61,10 +61,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")  # for characters that its encoding lacks
     words = list(sys.argv[1:] if arguments is None else arguments)
+    voice.quiet, voice.as_json, voice.debug = False, "--json" in words, "--debug" in words
     try:
         return run(group, words, guarded=arguments is None)
     except MracadError as error:
-        if "--debug" in words:
+        if voice.debug:
             traceback.print_exception(error)
         failure = error
     except KeyboardInterrupt:
@@ -72,10 +73,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except MemoryError as error:
         failure = internal(error)
 
-    if "--json" in words:
+    if voice.as_json:
         body = {"code": int(failure.code), "message": failure.message, "hint": failure.hint}
         say(json_text({"error": body}))
-    say(f"mracad: {' '.join(str(failure).split())}", file=sys.stderr)
+    print(printable(f"mracad: {' '.join(str(failure).split())}"), file=sys.stderr)
     return int(failure.code)
 
 

@@ -4,34 +4,151 @@ from __future__ import annotations
 
 import contextlib
 import os
+import re
 import sys
-from collections.abc import Iterator
+from collections.abc import Collection, Iterable, Iterator
 from typing import Any
 
 import click
+from click.core import ParameterSource
 
 from mracad import note
 from mracad.errors import Code, MracadError
 from mracad.job import guard
 from mracad.job.wire import internal
+from mracad_cli.defaults import Default, chosen, options_of, value
+from mracad_cli.journal import Ended, Journal, subject_of
+from mracad_cli.outputs import check_junit
+from mracad_cli.params import Title
+from mracad_cli.running import Kept
+from mracad_cli.say import voice
 
 
 class Command(click.Command):
-    """A command that reports a crash of the kernel, or an exceeded limit, as an error."""
+    """A command that reports a crash of the kernel, or an exceeded limit, as an error.
+
+    Parameters
+    ----------
+    examples : str
+        Calls of the command for its help, one per line.
+    """
 
     guarded = True
 
-    def invoke(self, ctx: click.Context) -> int:
-        def work() -> int:
-            with told():
-                code = click.Command.invoke(self, ctx)
-                sys.stdout.flush()
-            return code if isinstance(code, int) else 0
+    def __init__(self, *args: Any, examples: str, **how: Any) -> None:
+        super().__init__(*args, **how)
+        self.examples = examples.splitlines()
 
-        debug, seconds, memory = (ctx.meta.get(f"mracad.{name}") for name in ("debug", "time_limit", "memory_limit"))
-        if seconds is None and memory is None and not (self.guarded and ctx.obj and not debug):
+    def sections(self, ctx: click.Context) -> dict[str, list[click.Parameter]]:
+        """The options by the titles under which the help lists them, in its order."""
+        found: dict[str, list[click.Parameter]] = {}
+        for param in self.get_params(ctx):
+            if isinstance(param, click.Option):
+                found.setdefault(getattr(param, "section", Title.RUNNING) or "Options", []).append(param)
+        last = [title for title in Title if title in found]
+        return {title: found[title] for title in [*(title for title in found if title not in last), *last]}
+
+    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        for title, params in self.sections(ctx).items():
+            with formatter.section(title):
+                formatter.write_dl([record for param in params if (record := param.get_help_record(ctx))])
+
+    def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        with formatter.section("Examples" if len(self.examples) > 1 else "Example"):
+            for line in self.examples:
+                formatter.write(f"  {line}\n")
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        ctx.meta["mracad.arguments"] = [*ctx.command_path.split()[1:], *args]
+        if not ctx.resilient_parsing:
+            self._take_defaults(ctx, {*args} & {*ctx.help_option_names})
+        return super().parse_args(ctx, args)
+
+    def _take_defaults(self, ctx: click.Context, helped: Collection[str]) -> None:
+        """Give the context the defaults of files and the environment; help is shown even where these are wrong."""
+        try:
+            found = chosen(self.words(ctx), self, lambda: every(ctx.find_root().command))
+            options = {str(option.name): option for option in options_of(self).values()}
+            ctx.default_map = {name: value(default, options[name], ctx) for name, default in found.items()}
+            ctx.meta["mracad.defaults"] = found
+        except MracadError:
+            if not helped:
+                raise
+
+    def invoke(self, ctx: click.Context) -> int:
+        kept = Kept.of(ctx)
+        voice.as_json = bool(ctx.params.get("as_json"))
+        voice.quiet, voice.debug = bool(kept.quiet) and not voice.as_json, bool(kept.debug)
+        own = str(ctx.params.get("junit") or "")
+        if kept.junit:
+            check_junit(kept.junit, overwrite=ctx.params.get("overwrite", True))
+        used = {name: d for name, d in ctx.meta.get("mracad.defaults", {}).items() if _used(ctx, name)}
+        journal = Journal(self.words(ctx), kept.log, bool(kept.verbose))
+        journal.began(ctx.meta["mracad.arguments"], used)
+        failure: MracadError | None = None
+        try:
+            with journal.listening():
+                ended = self._work(ctx, kept, journal)
+            journal.said = ended.said
+            code = ended.code
+        except MracadError as error:
+            failure, code = explained(error, used.values()), int(error.code)
+        journal.ended(code, failure)
+        if path := kept.junit or (failure and own):
+            from mracad.output import put_all
+
+            put_all({path: journal.junit(subject_of(ctx), code, failure).encode()})
+        if failure:
+            raise failure
+        return code
+
+    def _work(self, ctx: click.Context, kept: Kept, journal: Journal) -> Ended:
+        """Do the work of the command, in a child process where it is guarded."""
+
+        def work() -> Ended:
+            try:
+                with told():
+                    code = click.Command.invoke(self, ctx)
+                    sys.stdout.flush()
+            finally:
+                journal.leave()
+            return Ended(code if isinstance(code, int) else 0, journal.said)
+
+        seconds, memory = kept.time_limit, kept.memory_limit
+        if seconds is None and memory is None and not (self.guarded and ctx.obj and not kept.debug):
             return work()
-        return guard.run(work, int, seconds, None if memory is None else max(1, int(memory)))
+        return guard.run(work, Ended, seconds, None if memory is None else max(1, int(memory)))
+
+    @staticmethod
+    def words(ctx: click.Context) -> str:
+        """The words that name the command."""
+        return " ".join(ctx.command_path.split()[1:])
+
+
+def _used(ctx: click.Context, name: str) -> bool:
+    return ctx.get_parameter_source(name) is ParameterSource.DEFAULT_MAP
+
+
+def explained(error: MracadError, used: Iterable[Default]) -> MracadError:
+    """An error of usage, with the places of the defaults that its message names."""
+    named = [d for d in used if re.search(rf"\b{re.escape(d.option)}\b", error.message)]
+    if error.code == Code.USAGE and named:
+        said = "; ".join(f"{d.option} is set in {d.place}" for d in named)
+        error.hint = f"{error.hint}; {said}".removeprefix("; ")
+    return error
+
+
+def every(group: click.Command) -> dict[str, click.Command]:
+    """The commands of a group by their words, those of groups in it among them."""
+    context = click.Context(group)
+    found: dict[str, click.Command] = {}
+    for name in group.list_commands(context) if isinstance(group, click.Group) else ():
+        command = group.get_command(context, name)  # type: ignore[attr-defined]
+        if isinstance(command, click.Group):
+            found |= {f"{name} {below}": each for below, each in every(command).items()}
+        elif command:
+            found[name] = command
+    return found
 
 
 class Unguarded(Command):

@@ -15,11 +15,8 @@ from mracad import note
 from mracad.errors import FileError, UsageError
 from mracad.formats import FORMATS, Format, by_extension
 from mracad.spec.fields import dashed
-from mracad_cli.options import PICTURES, Reading, Reports, Writing
-from mracad_cli.say import json_text, say
-
-PAGES = ".html", ".htm"
-"""Extensions of pages."""
+from mracad_cli.options import PAGES, PICTURES, Reading, Reports, Writing
+from mracad_cli.say import json_text, say, warn
 
 OF = {
     **dict.fromkeys(PICTURES.values(), ("picture", "OUT.png")),
@@ -49,7 +46,7 @@ def read(reading: Reading, text: Text | None = None) -> Document:
     note.doing("reading", text.name)
     document = read_silently(reading, text)
     for warning in document.warnings:
-        say(f"warning: {warning}", file=sys.stderr)
+        warn(warning)
     return document
 
 
@@ -119,6 +116,13 @@ def check_page(path: str | None) -> None:
         raise UsageError(f"cannot write {path}: reports with pictures are HTML", "name a file that ends in .html")
 
 
+def check_junit(path: str, overwrite: bool) -> None:
+    """Refuse a report for CI that is not XML, or could not be written."""
+    if not path.lower().endswith(".xml"):
+        raise UsageError(f"cannot write {path}: JUnit is XML", "name a file that ends in .xml")
+    check_target(Path(path), overwrite)
+
+
 def check_target(path: Path, overwrite: bool) -> None:
     """Refuse an output that could not be written, or that exists already."""
     if path.is_dir():
@@ -170,7 +174,7 @@ def deliver_models(
 
     for each in made:
         if each.written.lost:
-            say(f"warning: {each.target.name} lacks {', '.join(map(str, each.written.lost))}", file=sys.stderr)
+            warn(f"{each.target.name} lacks {', '.join(map(str, each.written.lost))}")
     data = {path: each.data for path, each in zip(writing.outputs, made, strict=False)}
     stream = data.pop("-", b"" if "-" in writing.outputs else None)
     changed = {p: d for p, d in data.items() if not (writing.if_changed and holds(Path(p), d))}

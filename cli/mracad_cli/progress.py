@@ -8,6 +8,7 @@ from types import TracebackType
 from typing import Any
 
 from mracad import note
+from mracad_cli.say import voice
 
 PATIENCE = 1.0
 """Seconds before a bar appears."""
@@ -35,18 +36,18 @@ class Progress:
     def __exit__(
         self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
     ) -> None:
-        note.watch()
+        note.unwatch(self._begun)
         if self._bar is not None:
             self._bar.stop()
 
-    def _begun(self, stage: str) -> None:
+    def _begun(self, stage: str, _: str) -> None:
         """Show a stage that begins within the one that was told."""
-        if self._bar is not None:
+        if stage and self._bar is not None:
             self._bar.update(self._task, description=stage)
 
     def __call__(self, stage: str, done: int, total: int) -> None:
         note.doing(stage)
-        if not sys.stderr.isatty() or (time.monotonic() - self._start < PATIENCE and not self._rate):
+        if not sys.stderr.isatty() or voice.quiet or (time.monotonic() - self._start < PATIENCE and not self._rate):
             return
         if self._bar is None:
             from rich.console import Console

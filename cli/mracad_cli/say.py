@@ -6,6 +6,8 @@ import json
 import math
 import re
 import sys
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any, TextIO
 
 _CONTROL = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029]")
@@ -16,10 +18,47 @@ def printable(line: str) -> str:
     return _CONTROL.sub(lambda match: f"\\u{ord(match[0]):04x}", line)
 
 
+@dataclass
+class Voice:
+    """How results are told.
+
+    Attributes
+    ----------
+    quiet : bool
+        They are not printed.
+    as_json : bool
+        Errors are, too, printed as JSON.
+    debug : bool
+        Errors are printed with their tracebacks.
+    listener : callable or None
+        Gets every line of them, and with True every warning.
+    """
+
+    quiet: bool = False
+    as_json: bool = False
+    debug: bool = False
+    listener: Callable[[str, bool], None] | None = None
+
+
+voice = Voice()
+"""That of this process."""
+
+
 def say(*lines: str, file: TextIO | None = None) -> None:
-    """Print lines, on standard output unless ``file`` is given."""
+    """Print lines of a result, on standard output unless ``file`` is given."""
     for line in lines:
-        print(printable(line), file=file)
+        if voice.listener:
+            voice.listener(line, False)
+        if not voice.quiet:
+            print(printable(line), file=file)
+
+
+def warn(*lines: str) -> None:
+    """Print warnings on standard error."""
+    for line in lines:
+        if voice.listener:
+            voice.listener(line, True)
+        print(f"warning: {printable(line)}", file=sys.stderr)
 
 
 def size(count: int) -> str:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from mracad.spec.steps import STEPS, Options, Selection
-from mracad_cli import options
+from mracad_cli import options, running
 from mracad_cli.command import Command
 from mracad_cli.options import Editing, Reading, Writing
 from mracad_cli.outputs import check_outputs, check_page, deliver_models, depfile_text, load, read, read_silently
@@ -34,8 +34,8 @@ def edit_command(use: str) -> click.Command:
     """The command of an edit, from its declaration."""
     struct = STEPS[use]
 
-    @click.command(use, cls=Command, help=struct.__doc__)
-    @options.apply(options.reading(), options.of(struct, "chosen"), options.writing, options.editing, options.printing)
+    @click.command(use, cls=Command, help=struct.__doc__, examples=struct.example)
+    @options.apply(options.reading(), options.of(struct, "chosen"), options.writing, options.editing, running.printing)
     def command(chosen: Options, **how: Any) -> int:
         return run_edit(use, chosen, **how)
 

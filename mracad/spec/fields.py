@@ -35,6 +35,13 @@ def nearest(word: str, known: Iterable[str], otherwise: str = "") -> str:
 
 
 @dataclass(frozen=True)
+class Begins:
+    """How the texts of a field may begin, or be, for completion in shells."""
+
+    texts: tuple[str, ...]
+
+
+@dataclass(frozen=True)
 class Field:
     """A field of a struct of options.
 
@@ -56,6 +63,10 @@ class Field:
     bounds : tuple of Meta
     form : callable or None
         ``form(text, name)`` reads its texts, or raises UsageError.
+    begins : tuple of str
+        See :class:`Begins`.
+    section : str
+        What it is about, as a title in the help; ``""`` if its step alone has it.
     """
 
     owner: str
@@ -68,6 +79,8 @@ class Field:
     naming: Naming | None
     bounds: tuple[Meta, ...]
     form: Callable[[str, str], object] | None
+    begins: tuple[str, ...]
+    section: str
 
     @property
     def hint(self) -> str:
@@ -147,10 +160,19 @@ def fields(struct: type[Struct]) -> dict[str, Field]:
     hints = typing.get_type_hints(struct, include_extras=True)
     named = getattr(struct, "command", "") or getattr(struct, "function", "").partition(":")[2]
     owner = named or struct.__name__.lower()
-    return {field.name: _field(owner, field, hints[field.name]) for field in structs.fields(struct)}
+    return {
+        field.name: _field(owner, _section(struct, field.name), field, hints[field.name])
+        for field in structs.fields(struct)
+    }
 
 
-def _field(owner: str, field: structs.FieldInfo, hint: Any) -> Field:
+def _section(struct: type[Struct], name: str) -> str:
+    """The section of the class that first declares a field, where it is not the struct itself."""
+    first = next(base for base in reversed(struct.__mro__) if name in vars(base).get("__annotations__", ()))
+    return "" if first is struct else str(vars(first).get("section", ""))
+
+
+def _field(owner: str, section: str, field: structs.FieldInfo, hint: Any) -> Field:
     notes: list[Any] = []
     many = False
     while True:
@@ -176,4 +198,6 @@ def _field(owner: str, field: structs.FieldInfo, hint: Any) -> Field:
         next((note for note in notes if isinstance(note, Naming)), None),
         tuple(meta for meta in metas if (meta.gt, meta.ge, meta.le) != (None, None, None)),
         next((note for note in notes if callable(note)), None),
+        next((note.texts for note in notes if isinstance(note, Begins)), ()),
+        section,
     )

@@ -10,6 +10,9 @@ from mracad.errors import UsageError
 from mracad.spec.places import AXES, numbers, whole
 from mracad.spec.quantity import NUMBER, length
 
+FILLS = "hexagons", "grid", "poisson"
+"""Ways to arrange places all over faces."""
+
 FILL = "write it as hexagons, grid or poisson with a distance: hexagons,spacing:4mm"
 ALIGN = "write it as X, Y, Z, three numbers such as 1,1,0, or edge#4"
 FADE = "write two distances and the factors there: distance-to:edge#4,from:2mm=0.4,to:30mm=1"
@@ -48,7 +51,7 @@ class Fade:
 
 def fill(text: str, name: str) -> Fill:
     """Places all over the faces from ``KIND,spacing:LENGTH``; raises UsageError."""
-    match = re.fullmatch(r"\s*(hexagons|grid|poisson)\s*,\s*spacing\s*:\s*(.+)", text)
+    match = re.fullmatch(rf"\s*({'|'.join(FILLS)})\s*,\s*spacing\s*:\s*(.+)", text)
     if match is None:
         raise UsageError(f"{name}: {text!r} is not a way to fill faces", FILL)
     length(match[2], 1.0, f"{name}: spacing")

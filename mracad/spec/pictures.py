@@ -9,7 +9,7 @@ from typing import Annotated, ClassVar
 from msgspec import Meta
 
 from mracad.errors import UsageError
-from mracad.spec.fields import nearest
+from mracad.spec.fields import Begins, nearest
 from mracad.spec.files import File, Naming
 from mracad.spec.quantity import NUMBER, PLACE, length
 from mracad.spec.steps.base import Options
@@ -38,6 +38,9 @@ STRIPED = "zebra", "isophotes"
 
 CURVATURES = "max", "mean", "gauss"
 """What maps of curvature show; the first by default."""
+
+SHOWN = (*SHOWS, *(f"curvature:{kind}" for kind in CURVATURES), "deviation:")
+"""How texts of --show begin."""
 
 AXES = "xyz"
 """Axes on which planes of sections stand."""
@@ -134,10 +137,10 @@ def section_of(text: str, name: str = "section") -> tuple[int, float]:
     return AXES.index(axis.strip()), PLACE.read(place, name)
 
 
-ShowText = Annotated[str, Naming(prefix="deviation:"), show_of]
+ShowText = Annotated[str, Naming(prefix="deviation:"), show_of, Begins(SHOWN)]
 """The type of a field that tells what a picture shows."""
 
-ViewText = Annotated[str, views_of]
+ViewText = Annotated[str, views_of, Begins(tuple(VIEWS))]
 """The type of a field that holds views."""
 
 SectionText = Annotated[str, section_of]
@@ -151,6 +154,7 @@ class Picture(Options, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """What a picture shows, from where."""
 
     command: ClassVar[str] = "render"
+    example: ClassVar[str] = "mracad render part.step -o part.png --show zebra --view iso,top"
 
     show: Annotated[
         ShowText,

@@ -14,6 +14,7 @@ from mracad.errors import UsageError
 from mracad.spec.fields import dashed, fields, named, nearest
 from mracad.spec.steps import Options
 
+_NAME = r"""(?:"[^"]*"|'[^']*'|[\w-]+)"""
 Given = TypeVar("Given", bound=Options)
 
 
@@ -110,6 +111,23 @@ def places_of_steps(text: str, name: str) -> list[dict[str, str]]:
         elif inside and (match := re.match(r"\s*[\"']?([\w-]+)[\"']?\s*=", line)):
             found[-1].setdefault(dashed(match[1]), f"{name}:{number}")
     return found
+
+
+def places_of_keys(text: str) -> dict[tuple[str, ...], int]:
+    """The lines of the keys of a TOML text, with the names of the tables that they are in."""
+    found: dict[tuple[str, ...], int] = {}
+    table: tuple[str, ...] = ()
+    for number, line in enumerate(_without_long_strings(text).splitlines(), 1):
+        if match := re.match(r"\s*\[([^\[\]]+)\]", line):
+            table = _names(match[1])
+        elif match := re.match(rf"\s*({_NAME}(?:\s*\.\s*{_NAME})*)\s*=", line):
+            found[(*table, *_names(match[1]))] = number
+    return found
+
+
+def _names(text: str) -> tuple[str, ...]:
+    """The parts of a dotted key of TOML."""
+    return tuple(name.strip("\"'") for name in re.findall(_NAME, text))
 
 
 def place_of(text: str, key: str, name: str) -> str:

@@ -174,6 +174,7 @@ VALUES: Mapping[str, Sequence[Any]] = {
     "junit": ["junit.xml"],
     "kink": ["5"],
     "layer_limit": ["50"],
+    "log": ["run.log"],
     "max_angle": ["1"],
     "max_angle_growth": ["1"],
     "max_deviation": ["0.01mm"],

@@ -65,12 +65,16 @@ def test_every_phase_of_info_is_noted_in_its_turn(mracad, panel, monkeypatch):
 
 def test_copies_of_features_note_their_phases_also_for_a_bar(mracad, panel, tmp_path):
     noted = []
-    note.watch(noted.append)
+
+    def watcher(stage, _):
+        noted.append(stage)
+
+    note.watch(watcher)
     try:
         options = Repeat(feature="formula:0.5*cos(x/9)**2,radius:12mm", fill="hexagons,spacing:90mm")
         run(read(panel), repeat, options)
     finally:
-        note.watch()
+        note.unwatch(watcher)
     phases = ["finding places", "laying copies", "fitting seams under copies", "comparing copies with the feature",
               "measuring what edges take of copies"]  # fmt: skip
     assert [stage for stage in noted if stage in phases] == phases

@@ -22,11 +22,11 @@ from mracad.errors import Code, MracadError
 from mracad.formats import FORMATS
 from mracad.job.batch.settings import Limits, Settings
 from mracad.spec.quantity import MEMORY, TIME
-from mracad_cli import options
+from mracad_cli import options, running
 from mracad_cli.command import Unguarded
 from mracad_cli.outputs import check_page, check_reports, deliver, depfile_text
 from mracad_cli.progress import Progress
-from mracad_cli.say import json_text, say
+from mracad_cli.say import json_text, say, warn
 from mracad_cli.steps import needed, plan
 
 if TYPE_CHECKING:
@@ -63,28 +63,28 @@ class Reports:
 _placing = options.gathered(
     "place",
     Place,
-    click.option("-O", "--folder", metavar="DIR", required=True, type=options.path, help="Folder to write into."),
-    click.option(
+    options.option("-O", "--folder", metavar="DIR", required=True, type=options.folder, help="Folder to write into."),
+    options.option(
         "-j", "--jobs", type=click.IntRange(min=1), metavar="N", help="Number of workers.  [default: one per core]"
     ),
-    click.option(
+    options.option(
         "--cluster",
         metavar="ADDRESS",
         help="Work on a Dask cluster: tcp://HOST:8786, or local to start one here. Needs mracad[cluster].",
     ),
-    click.option(
+    options.option(
         "--time-limit",
         type=options.Quantity(TIME),
         default="10min",
         show_default=True,
         help="For each file: 90s, 2h.",
     ),
-    click.option(
+    options.option(
         "--memory-limit",
         type=options.Quantity(MEMORY),
         help="For each worker: 500MB, 2GB.  [default: its share of the machine]",
     ),
-    click.option(
+    options.option(
         "--format",
         type=click.Choice(list(FORMATS)),
         help="Format of the outputs, and their extension.  [default: that of each input]",
@@ -93,10 +93,10 @@ _placing = options.gathered(
 _settings = options.gathered(
     "settings",
     Settings,
-    click.option(
+    options.option(
         "--keep-going/--fail-fast", default=True, show_default=True, help="What to do after a file has failed."
     ),
-    click.option(
+    options.option(
         "--retry",
         type=click.IntRange(min=0),
         default=0,
@@ -104,35 +104,36 @@ _settings = options.gathered(
         metavar="N",
         help="How often to try a file again after a crash or a limit.",
     ),
-    options.input_unit,
-    options.encoding,
-    options.schema,
-    options.verify,
-    options.overwrite,
-    options.if_changed,
-    options.record,
+    options.section(options.Title.INPUT, options.input_unit, options.encoding),
+    options.section(
+        options.Title.OUTPUT, options.schema, options.verify, options.overwrite, options.if_changed, options.record
+    ),
+)
+_printing = options.section(
+    options.Title.RUNNING,
+    options.option("--json", "as_json", is_flag=True, help="Print each result as a JSON line as soon as it is ready."),
+    running.telling,
 )
 _reports = options.gathered(
     "reports",
     Reports,
-    click.option("--report", metavar="F.json", type=options.path, help="Write the summary as JSON."),
-    click.option(
+    options.option("--report", metavar="F.json", type=options.data, help="Write the summary as JSON."),
+    options.option(
         "--report-html",
         metavar="F.html",
-        type=options.path,
+        type=options.page,
         help="Write an index with pictures, and a page for each file into the folder F_files (HTML).",
     ),
-    click.option("--junit", metavar="F.xml", type=options.path, help="Write the summary as JUnit XML, for CI."),
+    options.option("--junit", metavar="F.xml", type=options.junit, help="Write the summary as JUnit XML, for CI."),
     options.depfile,
-    click.option("--dry-run", is_flag=True, help="List the steps and the files; do nothing."),
-    click.option("--json", "as_json", is_flag=True, help="Print each result as a JSON line as soon as it is ready."),
+    options.option("--dry-run", is_flag=True, help="List the steps and the files; do nothing."),
 )
 
 
-@click.command(cls=Unguarded, help=__doc__)
-@click.argument("recipe", metavar="RECIPE", type=options.path)
-@click.argument("sources", metavar="IN...", nargs=-1, required=True)
-@options.apply(_placing, options.assignments, _settings, _reports, options.debug)
+@click.command(cls=Unguarded, help=__doc__, examples="mracad batch fair.toml models -O out -j 4 --junit batch.xml")
+@click.argument("recipe", metavar="RECIPE", type=options.recipe)
+@click.argument("sources", metavar="IN...", nargs=-1, required=True, type=options.model)
+@options.apply(_placing, options.assignments, _settings, options.section(options.Title.REPORTS, _reports), _printing)
 def command(
     recipe: str, sources: Sequence[str], assignments: Sequence[str], place: Place, settings: Settings, reports: Reports
 ) -> int:
@@ -208,7 +209,7 @@ def _outcomes(
             for outcome in results:
                 outcomes.append(outcome)
                 for warning in outcome.warnings:
-                    say(f"warning: {outcome.file}: {warning}", file=sys.stderr)
+                    warn(f"{outcome.file}: {warning}")
                 if as_json and outcome.status != "not tried":
                     say(json_text(plain(outcome)))
                     sys.stdout.flush()

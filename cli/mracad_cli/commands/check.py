@@ -9,15 +9,15 @@ from __future__ import annotations
 import click
 
 from mracad.spec.steps import Check
-from mracad_cli import options
+from mracad_cli import options, running
 from mracad_cli.command import Command
 from mracad_cli.options import Reading, Reports
 from mracad_cli.outputs import check_page, check_reports, deliver_verdict, load, read
 from mracad_cli.progress import Progress
 
 
-@click.command(cls=Command, help=__doc__)
-@options.apply(options.reading(), options.of(Check, "limits"), options.reports, options.printing)
+@click.command(cls=Command, help=__doc__, examples=Check.example)
+@options.apply(options.reading(), options.of(Check, "limits"), options.reports, running.judging)
 def command(reading: Reading, limits: Check, reports: Reports) -> int:
     check_page(reports.report_html)
     check_reports(reports.junit, reports.sarif, reports.report_html, overwrite=reports.overwrite)

@@ -11,17 +11,17 @@ from dataclasses import replace
 import click
 
 from mracad.spec.steps import Compare
-from mracad_cli import options
+from mracad_cli import options, running
 from mracad_cli.command import Command
 from mracad_cli.options import Reading, Reports
 from mracad_cli.outputs import check_page, check_reports, deliver_verdict, read
 from mracad_cli.progress import Progress
 
 
-@click.command(cls=Command, help=__doc__)
-@click.argument("reference", metavar="REF", type=click.Path(allow_dash=True))
+@click.command(cls=Command, help=__doc__, examples=Compare.example)
+@click.argument("reference", metavar="REF", type=options.model)
 @options.apply(
-    options.reading("NEW"), options.of(Compare, "limits", without="reference"), options.reports, options.printing
+    options.reading("NEW"), options.of(Compare, "limits", without="reference"), options.reports, running.judging
 )
 def command(reference: str, reading: Reading, limits: Compare, reports: Reports) -> int:
     check_page(reports.report_html)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from mracad_cli import options
+from mracad_cli import options, running
 from mracad_cli.command import Command
 from mracad_cli.options import Reading, Writing
 from mracad_cli.outputs import check_outputs, deliver_models, load
@@ -12,8 +12,8 @@ from mracad_cli.say import json_text
 from mracad_cli.steps import produced
 
 
-@click.command(cls=Command, help=__doc__)
-@options.apply(options.reading(), options.writing, options.printing)
+@click.command(cls=Command, help=__doc__, examples="mracad convert part.igs -o part.step -o part.stl")
+@options.apply(options.reading(), options.writing, running.printing)
 def command(reading: Reading, writing: Writing, as_json: bool) -> int:
     import time
 

@@ -10,7 +10,7 @@ from mracad.errors import UsageError
 from mracad.spec.quantity import LENGTH
 from mracad.spec.sources import source
 from mracad.spec.steps import Extract, Make, Selection
-from mracad_cli import options
+from mracad_cli import options, running
 from mracad_cli.command import Group
 from mracad_cli.options import Reading
 from mracad_cli.outputs import check_target, deliver, read
@@ -25,8 +25,8 @@ def command() -> None:
     pass
 
 
-@command.command("list")
-@options.apply(options.reading(), options.of(Selection, "chosen", OTHERS), options.printing)
+@command.command("list", examples="mracad feature list part.step")
+@options.apply(options.reading(), options.of(Selection, "chosen", OTHERS), running.printing)
 def list_(reading: Reading, chosen: Selection, as_json: bool) -> None:
     """List features: places where the detail of a face stands out, with size, height and scales."""
     from mracad.edit.feature.find import found
@@ -48,13 +48,13 @@ def list_(reading: Reading, chosen: Selection, as_json: bool) -> None:
         say(f"{model.name}: nothing stands out")
 
 
-@command.command(help=Extract.__doc__)
+@command.command(help=Extract.__doc__, examples=Extract.example)
 @options.apply(
     options.reading(),
     options.of(Extract, "chosen", OTHERS),
-    click.option("-o", "--output", metavar="F.feature", required=True, type=options.path, help="File to write."),
-    options.overwrite,
-    options.printing,
+    options.option("-o", "--output", metavar="F.feature", required=True, type=options.feature, help="File to write."),
+    options.section(options.Title.OUTPUT, options.overwrite),
+    running.printing,
 )
 def extract(reading: Reading, chosen: Extract, output: str, overwrite: bool, as_json: bool) -> None:
     from mracad.edit.feature.detail import save
@@ -77,12 +77,12 @@ def extract(reading: Reading, chosen: Extract, output: str, overwrite: bool, as_
     deliver({output: save(found)}, [json_text(body) if as_json else said])
 
 
-@command.command(help=Make.__doc__)
+@command.command(help=Make.__doc__, examples=Make.example)
 @options.apply(
     options.of(Make, "given", arguments={"source": "SOURCE"}),
-    click.option("-o", "--output", metavar="F.feature", required=True, type=options.path, help="File to write."),
-    options.overwrite,
-    options.printing,
+    options.option("-o", "--output", metavar="F.feature", required=True, type=options.feature, help="File to write."),
+    options.section(options.Title.OUTPUT, options.overwrite),
+    running.printing,
 )
 def make(given: Make, output: str, overwrite: bool, as_json: bool) -> None:
     from mracad.edit.feature.detail import save

@@ -7,37 +7,37 @@ from typing import Any
 import click
 
 from mracad.spec.quantity import LENGTH
-from mracad_cli import options
+from mracad_cli import options, running
 from mracad_cli.command import Command
 from mracad_cli.options import Reading
 from mracad_cli.progress import Progress
 from mracad_cli.say import json_text, say
 
 
-@click.command(cls=Command, help=__doc__)
+@click.command(cls=Command, help=__doc__, examples="mracad info part.step --at 10,20,5")
 @options.apply(
     options.reading(),
-    click.option(
+    options.option(
         "--scale",
         type=options.Quantity(LENGTH),
         default="2%",
         show_default=True,
         help="Scale at which to look for detail.",
     ),
-    click.option(
+    options.option(
         "--keep",
         type=click.Choice(["g0", "g1", "g2"]),
         default="g1",
         show_default=True,
         help="Continuity that edges keep; it determines which control points are free.",
     ),
-    click.option(
+    options.option(
         "--all",
         "everything",
         is_flag=True,
         help="Also list instances, faces that are not NURBS, the area, centre and box of faces, and every seam.",
     ),
-    click.option(
+    options.option(
         "--at",
         "places",
         metavar="PLACE",
@@ -45,7 +45,7 @@ from mracad_cli.say import json_text, say
         help="Also tell the face nearest to X,Y,Z (mm), or #3@u,v, with its parameters, frame and curvature there; "
         "repeatable.",
     ),
-    options.printing,
+    running.printing,
 )
 def command(reading: Reading, scale: str, keep: Any, everything: bool, places: tuple[str, ...], as_json: bool) -> None:
     from mracad.job.info import info as look

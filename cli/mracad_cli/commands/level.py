@@ -8,7 +8,7 @@ import click
 
 from mracad.errors import UsageError
 from mracad.spec.steps import Level
-from mracad_cli import options
+from mracad_cli import options, running
 from mracad_cli.command import Command
 from mracad_cli.steps import run_edit
 
@@ -16,16 +16,19 @@ if TYPE_CHECKING:
     from mracad.job.document import Report
 
 
-@click.command("level", cls=Command, help=__doc__)
+@click.command("level", cls=Command, help=__doc__, examples=Level.example)
 @options.apply(
     options.reading(),
     options.of(Level, "chosen"),
-    click.option(
-        "--details", metavar="F.mra", type=options.path, help="Save the details to a file, for mracad compose."
+    options.option(
+        "--details",
+        metavar="F.mra",
+        type=options.File((".mra",)),
+        help="Save the details to a file, for mracad compose.",
     ),
     options.writing,
     options.editing,
-    options.printing,
+    running.printing,
 )
 def command(chosen: Level, details: str | None, **how: Any) -> int:
     if details and not details.endswith(".mra"):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from mracad_cli import options
+from mracad_cli import options, running
 from mracad_cli.command import Group
 from mracad_cli.say import json_text, say
 from mracad_cli.steps import plan
@@ -15,9 +15,9 @@ def command() -> None:
     pass
 
 
-@command.command()
-@click.argument("file", metavar="RECIPE", type=options.path)
-@options.apply(options.assignments, options.printing)
+@command.command(examples="mracad recipe check fair.toml --set smooth.scale=3mm")
+@click.argument("file", metavar="RECIPE", type=options.recipe)
+@options.apply(options.assignments, running.printing)
 def check(file: str, assignments: tuple[str, ...], as_json: bool) -> None:
     """Show what a recipe would do; exit code 2 when something in it is wrong."""
     from mracad.spec.recipe import load
@@ -28,7 +28,7 @@ def check(file: str, assignments: tuple[str, ...], as_json: bool) -> None:
     say(*([json_text({"recipe": found.name, "steps": listed})] if as_json else plan(steps)))
 
 
-@command.command()
+@command.command(examples="mracad recipe schema > recipe.schema.json")
 def schema() -> None:
     """Print the JSON schema of recipes, for editors and validators."""
     from mracad.spec import schema

@@ -12,28 +12,31 @@ import click
 from mracad.errors import UsageError
 from mracad.formats import FORMATS, by_extension
 from mracad.spec.pictures import Picture, show_of
-from mracad_cli import options
+from mracad_cli import options, running
 from mracad_cli.command import Command
 from mracad_cli.options import Reading
 from mracad_cli.outputs import check_reports, deliver, read
 from mracad_cli.progress import Progress
 from mracad_cli.say import json_text
 
+DRAWN = [extension for format in FORMATS.values() if format.kind == "picture" for extension in format.extensions]
+"""Extensions of pictures."""
 
-@click.command(cls=Command, help=__doc__)
+
+@click.command(cls=Command, help=__doc__, examples=Picture.example)
 @options.apply(
     options.reading(),
-    click.option(
+    options.option(
         "-o",
         "--output",
         metavar="OUT.png",
         required=True,
-        type=click.Path(allow_dash=True),
+        type=options.File(DRAWN, dash=True),
         help="Picture to write: .png, or .gif or .mp4, in which the model turns; - for PNG on standard output.",
     ),
     options.of(Picture, "picture"),
-    options.overwrite,
-    options.printing,
+    options.section(options.Title.OUTPUT, options.overwrite),
+    running.printing,
 )
 def command(reading: Reading, output: str, picture: Picture, overwrite: bool, as_json: bool) -> None:
     import time

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import click
 
-from mracad_cli import options
+from mracad_cli import options, running
 from mracad_cli.command import Command
 from mracad_cli.options import Reading
 from mracad_cli.outputs import check_page, check_reports, deliver, load, read
@@ -18,13 +18,15 @@ from mracad_cli.progress import Progress
 from mracad_cli.say import json_text
 
 
-@click.command(cls=Command, help=__doc__)
+@click.command(cls=Command, help=__doc__, examples="mracad report new.step old.step -o new.html")
 @options.apply(
     options.reading(),
-    click.argument("reference", metavar="[REF]", required=False, type=click.Path(allow_dash=True)),
-    click.option("-o", "--output", metavar="F.html", required=True, type=options.path, help="Report to write (HTML)."),
-    options.overwrite,
-    options.printing,
+    click.argument("reference", metavar="[REF]", required=False, type=options.model),
+    options.option(
+        "-o", "--output", metavar="F.html", required=True, type=options.page, help="Report to write (HTML)."
+    ),
+    options.section(options.Title.OUTPUT, options.overwrite),
+    running.printing,
 )
 def command(reading: Reading, reference: str | None, output: str, overwrite: bool, as_json: bool) -> None:
     check_page(output)

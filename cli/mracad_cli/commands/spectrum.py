@@ -11,7 +11,7 @@ import click
 
 from mracad.errors import EditError, UsageError
 from mracad.spec.steps import Selection
-from mracad_cli import options
+from mracad_cli import options, running
 from mracad_cli.command import Command
 from mracad_cli.options import Reading
 from mracad_cli.outputs import check_reports, deliver, read
@@ -29,22 +29,22 @@ PICTURES = ".png", ".svg"
 ENDINGS = ".csv", ".json", *PICTURES
 
 
-@click.command("spectrum", cls=Command, help=__doc__)
+@click.command("spectrum", cls=Command, help=__doc__, examples="mracad spectrum part.step --faces '#3' -o spectrum.png")
 @options.apply(
     options.reading(),
     options.of(Selection, "chosen", OTHERS),
-    click.option(
+    options.option(
         "-o",
         "--output",
         "outputs",
         metavar="F",
-        type=options.path,
+        type=options.File(ENDINGS),
         multiple=True,
         help="Write all bands of all faces to a .csv or .json file, or draw them: .png or .svg, with a scalogram of a "
         "single face; repeatable.",
     ),
-    options.overwrite,
-    options.printing,
+    options.section(options.Title.OUTPUT, options.overwrite),
+    running.printing,
 )
 def command(reading: Reading, chosen: Selection, outputs: tuple[str, ...], overwrite: bool, as_json: bool) -> None:
     for output in outputs:

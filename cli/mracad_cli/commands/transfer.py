@@ -7,18 +7,18 @@ from typing import Any
 import click
 
 from mracad.spec.steps import Transfer
-from mracad_cli import options
+from mracad_cli import options, running
 from mracad_cli.command import Command
 from mracad_cli.steps import run_edit
 
 
-@click.command("transfer", cls=Command, help=__doc__)
+@click.command("transfer", cls=Command, help=__doc__, examples=Transfer.example)
 @options.apply(
     options.of(Transfer, "chosen", arguments={"source": "SRC"}),
     options.reading("DST"),
     options.writing,
     options.editing,
-    options.printing,
+    running.printing,
 )
 def command(chosen: Transfer, **how: Any) -> int:
     return run_edit("transfer", chosen, **how)

@@ -6,12 +6,17 @@ import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 from xml.etree import ElementTree as Xml
 
-from mracad.inspect.verdict import Layer, Verdict
-from mracad.job.batch.run import Outcome
-from mracad.job.words import placed
+from mracad.errors import Code
+
+if TYPE_CHECKING:
+    from mracad.inspect.verdict import Layer, Verdict
+    from mracad.job.batch.run import Outcome
+
+VERDICTS = Code.FAILED_CHECK, Code.CANNOT_EDIT
+"""Exit codes that tell something about the model: failures, where all others are errors."""
 
 _CONTROL = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")  # what XML cannot hold
 
@@ -67,7 +72,14 @@ def verdict(found: Verdict, failed: Sequence[Layer], command: str) -> str:
     return text(f"mracad {command} {found.subject}", [_layer(found.subject, x, x in failed) for x in found.layers])
 
 
+def became(code: int) -> Literal["failure", "error"]:
+    """What an exit code other than 0 is in JUnit."""
+    return "failure" if code in VERDICTS else "error"
+
+
 def _layer(subject: str, layer: Layer, failed: bool) -> Case:
+    from mracad.job.words import placed
+
     if failed:
         return Case(
             subject, layer.name, "failure", layer.text, "\n".join(map(placed, layer.findings)), kind=layer.status
@@ -78,14 +90,13 @@ def _layer(subject: str, layer: Layer, failed: bool) -> Case:
 
 
 def batch(name: str, outcomes: Sequence[Outcome], seconds: float) -> str:
-    """A batch as a test suite: a failed check is a failure, anything else an error."""
+    """A batch as a test suite; see :func:`became`."""
     return text(name, [_outcome(name, outcome) for outcome in outcomes], seconds)
 
 
 def _outcome(name: str, outcome: Outcome) -> Case:
     if outcome.status == "failed":
-        became: Literal["failure", "error"] = "failure" if outcome.code == 1 else "error"
-        words = became, outcome.message, outcome.hint, str(outcome.code)
+        words = became(outcome.code or Code.INTERNAL), outcome.message, outcome.hint, str(outcome.code)
         return Case(name, outcome.file, *words, seconds=outcome.seconds)
     if outcome.status == "not tried":
         return Case(name, outcome.file, "skipped", "the batch stopped before", seconds=outcome.seconds)

@@ -8,7 +8,7 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from msgspec import Meta, Struct, structs
 
-from mracad.spec.fields import fields
+from mracad.spec.fields import Begins, fields
 
 Edges = Annotated[
     Literal["coupled", "frozen"],
@@ -19,6 +19,9 @@ Edges = Annotated[
 ]
 """The type of ``edges`` for edits whose edges do not slide."""
 
+_Faces = Annotated[str, Begins(("#", "!#", "type:bspline", "colour:#", "near:", "cq:"))]
+_Held = Annotated[str, Begins(("#", "edge#", "type:bspline", "colour:#", "near:", "box:", "radius<", "cq:"))]
+
 
 class Options(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Options of a step.
@@ -27,9 +30,15 @@ class Options(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     ----------
     function : str
         The function that does the step, ``"module:function"``.
+    example : str
+        A call of its command.
+    section : str
+        What the options that a class adds for its subclasses are about, as a title.
     """
 
     function: ClassVar[str]
+    example: ClassVar[str] = ""
+    section: ClassVar[str] = ""
 
     def __post_init__(self) -> None:
         for name, field in fields(type(self)).items():
@@ -63,8 +72,10 @@ class Options(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 class Selection(Options, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Which faces an edit may touch and how their edges are treated; shared by every edit."""
 
+    section: ClassVar[str] = "Faces and edges"
+
     faces: Annotated[
-        tuple[str, ...],
+        tuple[_Faces, ...],
         Meta(
             description="Faces to edit: #3, a product or face name, type:bspline, colour:#ff0000, near:X,Y,Z, "
             "cq:'>Z'; !SEL excludes. Default: all NURBS faces."
@@ -78,7 +89,7 @@ class Selection(Options, frozen=True, kw_only=True, forbid_unknown_fields=True):
         ),
     ] = None
     hold: Annotated[
-        tuple[str, ...],
+        tuple[_Held, ...],
         Meta(
             description="Faces and edges (edge#4) that must not move, by the selectors of --faces; or regions: "
             "near:X,Y,Z,radius:R, box:X,Y,Z,X,Y,Z, or 'radius<25mm', where faces bend more tightly."

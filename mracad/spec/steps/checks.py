@@ -15,6 +15,7 @@ class Check(Options, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Check validity and continuity; a failure stops a recipe, with exit code 1."""
 
     function: ClassVar[str] = "mracad.job.check:check"
+    example: ClassVar[str] = "mracad check part.step --max-gap 0.01mm --junit check.xml"
 
     max_gap: Annotated[Length | None, Meta(description="Largest gap along any seam.")] = None
     max_angle: Annotated[
@@ -48,6 +49,7 @@ class Compare(Options, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Compare with a reference; a difference beyond its limit stops a recipe, with exit code 1."""
 
     function: ClassVar[str] = "mracad.job.compare:compare"
+    example: ClassVar[str] = "mracad compare old.step new.step --max-deviation 0.05mm"
 
     reference: Annotated[File | None, Meta(description="File to compare with; by default the input of the recipe.")] = (
         None

@@ -8,6 +8,8 @@ from msgspec import Meta
 
 from mracad.errors import UsageError
 from mracad.spec import places, sources
+from mracad.spec.fields import Begins
+from mracad.spec.fill import FILLS
 from mracad.spec.fill import align as read_align
 from mracad.spec.fill import fade as read_fade
 from mracad.spec.fill import fill as read_fill
@@ -71,6 +73,8 @@ def not_flat(height: float) -> None:
 class Featured(Selection, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Options that separate a feature from its surroundings."""
 
+    section: ClassVar[str] = "Feature"
+
     taper: Taper = None
     base: Base = "surroundings"
     band: Band = None
@@ -88,6 +92,7 @@ class Extract(Featured, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Save a feature to a file, for mracad repeat and mracad transfer."""
 
     command: ClassVar[str] = "feature extract"
+    example: ClassVar[str] = "mracad feature extract part.step --feature near:10,20,5,radius:8 -o bump.feature"
 
     feature: _Feature
 
@@ -106,6 +111,7 @@ class Make(Options, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """
 
     command: ClassVar[str] = "feature make"
+    example: ClassVar[str] = "mracad feature make texture:leather,width:40mm,height:0.2mm -o leather.feature"
 
     source: Annotated[
         Annotated[str, places.NAMED, sources.source],
@@ -116,6 +122,8 @@ class Make(Options, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
 class Copied(Featured, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Options of edits that make copies of a feature."""
+
+    section: ClassVar[str] = "Copies"
 
     edges: Annotated[
         Literal["frozen", "coupled"],
@@ -138,6 +146,8 @@ class Copied(Featured, frozen=True, kw_only=True, forbid_unknown_fields=True):
 class Single(Copied, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Options of edits that copy a feature of the model itself."""
 
+    section: ClassVar[str] = ""
+
     feature: _Feature
 
 
@@ -145,6 +155,7 @@ class Move(Single, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Move a detail feature to another place; the surface that it leaves is clean."""
 
     function: ClassVar[str] = "mracad.edit.feature.edits:move"
+    example: ClassVar[str] = "mracad move part.step --feature near:10,20,5,radius:8 --to 40,20,5 -o moved.step"
 
     to: Annotated[places.Spot, Meta(description="Where to: X,Y,Z (mm) or #face@u,v.")]
 
@@ -163,6 +174,7 @@ class Repeat(Single, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Copy a detail feature to other places, on the same or other faces and across seams."""
 
     function: ClassVar[str] = "mracad.edit.feature.edits:repeat"
+    example: ClassVar[str] = "mracad repeat part.step --feature near:10,20,5,radius:8 --grid 3x2,30,30 -o grid.step"
 
     at: Annotated[
         tuple[places.Place, ...],
@@ -190,7 +202,7 @@ class Repeat(Single, frozen=True, kw_only=True, forbid_unknown_fields=True):
         Meta(description="EDGE,N[,OFFSET]: N places evenly along edge#4, OFFSET (mm) inside its first selected face."),
     ] = None
     fill: Annotated[
-        Annotated[str, read_fill] | None,
+        Annotated[str, read_fill, Begins(tuple(f"{kind},spacing:" for kind in FILLS))] | None,
         Meta(
             description="hexagons, grid or poisson (at random), with ,spacing:4mm: places all over the selected faces, "
             "this far apart along the surface, over smooth seams."
@@ -204,7 +216,7 @@ class Repeat(Single, frozen=True, kw_only=True, forbid_unknown_fields=True):
         ),
     ] = None
     align: Annotated[
-        Annotated[str, read_align] | None,
+        Annotated[str, read_align, Begins(("X", "Y", "Z", "edge#"))] | None,
         Meta(
             description="With --fill: direction of its rows and of each copy's x: X, Y or Z or three numbers, brought "
             "to the surface, or edge#4, whose direction goes on over the faces. Default: as even as can be, near u."

@@ -23,6 +23,7 @@ class Level(Shaped, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Reduce the NURBS faces of a model to a level: the coarse shape that they form together, without its details."""
 
     function: ClassVar[str] = "mracad.edit.level:level"
+    example: ClassVar[str] = "mracad level part.step --scale 20mm -o coarse.step --details part.mra"
 
     level: Annotated[
         Annotated[float, Meta(gt=0.0)] | None,
@@ -59,6 +60,7 @@ class Compose(Shaped, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Put the details that mracad level saved back on the coarse model, or on one that was edited since."""
 
     function: ClassVar[str] = "mracad.edit.compose:compose"
+    example: ClassVar[str] = "mracad compose coarse.step part.mra -o whole.step"
 
     details: Annotated[File, Meta(description="File with the details (.mra).")]
 

@@ -24,6 +24,7 @@ class Equalize(Fairing, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Weaken or amplify the waves of NURBS faces, band by band of wavelength."""
 
     function: ClassVar[str] = "mracad.edit.equalize:equalize"
+    example: ClassVar[str] = "mracad equalize part.step --band 2mm:10mm=0 -o even.step"
 
     band: Annotated[
         tuple[Annotated[str, _band], ...],
@@ -80,6 +81,7 @@ class Sweep(Shaped, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Move points of NURBS faces; the shape around them follows smoothly, and details turn with it."""
 
     function: ClassVar[str] = "mracad.edit.sweep:sweep"
+    example: ClassVar[str] = "mracad sweep part.step --at 10,20,5 --by 0,0,2 --scale 80mm -o swept.step"
 
     at: Annotated[
         tuple[motions.Start, ...],

@@ -8,6 +8,7 @@ from msgspec import Meta
 
 from mracad.errors import UsageError
 from mracad.spec import places
+from mracad.spec.fields import Begins
 from mracad.spec.quantity import Angle, Length, Share
 from mracad.spec.steps.base import Edges, Selection
 
@@ -24,6 +25,8 @@ Sliding = Annotated[
 
 class Fitting(Selection, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Options of edits that change whole faces."""
+
+    section: ClassVar[str] = "Seams and limits"
 
     fit_g1: Annotated[
         Annotated[Angle, Meta(ge=0.0, le=45.0)] | None,
@@ -60,6 +63,8 @@ class Fitting(Selection, frozen=True, kw_only=True, forbid_unknown_fields=True):
 class Fairing(Fitting, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Options of edits that make faces fairer."""
 
+    section: ClassVar[str] = "Faces and edges"
+
     edges: Sliding = "coupled"
     free_edges: Annotated[
         Literal["hold", "smooth"],
@@ -83,6 +88,7 @@ class Smooth(Fairing, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Remove detail finer than a scale from the NURBS faces of a model."""
 
     function: ClassVar[str] = "mracad.edit.smooth:smooth"
+    example: ClassVar[str] = "mracad smooth part.step --scale 5mm -o fair.step"
 
     scale: Annotated[
         Length | None,
@@ -99,7 +105,7 @@ class Smooth(Fairing, frozen=True, kw_only=True, forbid_unknown_fields=True):
         ),
     ] = None
     along: Annotated[
-        Annotated[str, places.heading] | None,
+        Annotated[str, places.heading, Begins(("X", "Y", "Z", "u", "v", "edge#"))] | None,
         Meta(
             description="Direction of --scale, with --across: X, Y, Z, edge#4, or the face's u or v. Default: the "
             "direction in which each face is longer."
@@ -160,6 +166,7 @@ class Denoise(Fairing, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Remove noise from the NURBS faces of a model and keep their shape, with no scale to choose."""
 
     function: ClassVar[str] = "mracad.edit.denoise:denoise"
+    example: ClassVar[str] = "mracad denoise scan.step --noise 0.05mm -o clean.step"
 
     edges: Sliding = "slide"
     noise: Annotated[
@@ -202,6 +209,7 @@ class OffsetFaces(Fitting, frozen=True, kw_only=True, forbid_unknown_fields=True
     """Move NURBS faces along their normals by a length, with the seams between them and their free edges."""
 
     function: ClassVar[str] = "mracad.edit.offset:offset"
+    example: ClassVar[str] = "mracad offset part.step --distance 0.2mm -o thicker.step"
 
     distance: Annotated[Length, Meta(description="How far to move, outward.")]
     edges: Edges = "coupled"

@@ -47,6 +47,7 @@ class Transfer(Fairing, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Copy the detail of faces, or a feature, from another file to this one; units may differ."""
 
     function: ClassVar[str] = "mracad.edit.transfer:transfer"
+    example: ClassVar[str] = "mracad transfer old.step new.step --from near:10,20,5,radius:8 --to 40,20,5 -o both.step"
 
     source: Annotated[
         File, Meta(description="The file that the detail is taken from: a model, or details (.mra) of mracad level.")
