@@ -17,6 +17,19 @@ class Code(IntEnum):
     INTERRUPTED = 130
 
 
+MEANINGS = {
+    0: "Done.",
+    Code.FAILED_CHECK: "A check or a comparison failed.",
+    Code.USAGE: "An option, a recipe or a default is wrong.",
+    Code.FILE: "A file cannot be read or written.",
+    Code.CANNOT_EDIT: "The edit cannot be done on this model.",
+    Code.LIMIT: "A limit of time or memory was exceeded.",
+    Code.INTERNAL: "An internal error, or a crash of the CAD kernel.",
+    Code.INTERRUPTED: "Interrupted.",
+}
+"""What exit codes mean."""
+
+
 class MracadError(Exception):
     """A failure that the user can act on.
 

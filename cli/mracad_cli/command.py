@@ -1,4 +1,7 @@
-"""Running a command in a child process within its limits; every failure becomes a MracadError."""
+"""Running a command in a child process within its limits; every failure becomes a MracadError.
+
+What only a command that runs needs is imported then: help is to be quick.
+"""
 
 from __future__ import annotations
 
@@ -7,21 +10,18 @@ import os
 import re
 import sys
 from collections.abc import Collection, Iterable, Iterator
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 from click.core import ParameterSource
 
-from mracad import note
-from mracad.errors import Code, MracadError
-from mracad.job import guard
-from mracad.job.wire import internal
-from mracad_cli.defaults import Default, chosen, options_of, value
-from mracad_cli.journal import Ended, Journal, subject_of
-from mracad_cli.outputs import check_junit
-from mracad_cli.params import Title
-from mracad_cli.running import Kept
+from mracad.errors import Code, MracadError, UsageError
 from mracad_cli.say import voice
+
+if TYPE_CHECKING:
+    from mracad_cli.defaults import Default
+    from mracad_cli.journal import Ended, Journal
+    from mracad_cli.running import Kept
 
 
 class Command(click.Command):
@@ -34,6 +34,8 @@ class Command(click.Command):
     """
 
     guarded = True
+    defaulted = True
+    replaces = False
 
     def __init__(self, *args: Any, examples: str, **how: Any) -> None:
         super().__init__(*args, **how)
@@ -41,6 +43,8 @@ class Command(click.Command):
 
     def sections(self, ctx: click.Context) -> dict[str, list[click.Parameter]]:
         """The options by the titles under which the help lists them, in its order."""
+        from mracad_cli.params import Title
+
         found: dict[str, list[click.Parameter]] = {}
         for param in self.get_params(ctx):
             if isinstance(param, click.Option):
@@ -60,30 +64,43 @@ class Command(click.Command):
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         ctx.meta["mracad.arguments"] = [*ctx.command_path.split()[1:], *args]
-        if not ctx.resilient_parsing:
+        if self.defaulted and not ctx.resilient_parsing:
             self._take_defaults(ctx, {*args} & {*ctx.help_option_names})
         return super().parse_args(ctx, args)
 
     def _take_defaults(self, ctx: click.Context, helped: Collection[str]) -> None:
         """Give the context the defaults of files and the environment; help is shown even where these are wrong."""
+        from mracad_cli.defaults import chosen, options_of, taken, value
+
         try:
             found = chosen(self.words(ctx), self, lambda: every(ctx.find_root().command))
-            options = {str(option.name): option for option in options_of(self).values()}
-            ctx.default_map = {name: value(default, options[name], ctx) for name, default in found.items()}
-            ctx.meta["mracad.defaults"] = found
         except MracadError:
             if not helped:
                 raise
+            return
+        options = {str(option.name): option for option in options_of(self).values()}
+        ctx.default_map, ctx.meta["mracad.defaults"] = {}, found
+        for name, default in found.items():
+            try:
+                ctx.default_map[name] = value(default, options[name], ctx)
+            except UsageError:
+                if not helped and (default.command or not taken(default, every(ctx.find_root().command))):
+                    raise
 
     def invoke(self, ctx: click.Context) -> int:
+        from mracad_cli.journal import Journal, subject_of
+        from mracad_cli.outputs import check_junit
+        from mracad_cli.running import Kept
+
         kept = Kept.of(ctx)
         voice.as_json = bool(ctx.params.get("as_json"))
         voice.quiet, voice.debug = bool(kept.quiet) and not voice.as_json, bool(kept.debug)
-        own = str(ctx.params.get("junit") or "")
+        path = kept.junit or str(ctx.params.get("junit") or "")
+        replaced = self.replaces or bool(ctx.params.get("overwrite", True))
         if kept.junit:
-            check_junit(kept.junit, overwrite=ctx.params.get("overwrite", True))
+            check_junit(kept.junit, replaced)
         used = {name: d for name, d in ctx.meta.get("mracad.defaults", {}).items() if _used(ctx, name)}
-        journal = Journal(self.words(ctx), kept.log, bool(kept.verbose))
+        journal = Journal(self.words(ctx), kept.log, verbose=bool(kept.verbose), keeps=bool(kept.log or kept.junit))
         journal.began(ctx.meta["mracad.arguments"], used)
         failure: MracadError | None = None
         try:
@@ -94,7 +111,7 @@ class Command(click.Command):
         except MracadError as error:
             failure, code = explained(error, used.values()), int(error.code)
         journal.ended(code, failure)
-        if path := kept.junit or (failure and own):
+        if kept.junit or (path and failure and not refused(path, replaced)):
             from mracad.output import put_all
 
             put_all({path: journal.junit(subject_of(ctx), code, failure).encode()})
@@ -104,6 +121,8 @@ class Command(click.Command):
 
     def _work(self, ctx: click.Context, kept: Kept, journal: Journal) -> Ended:
         """Do the work of the command, in a child process where it is guarded."""
+        from mracad.job import guard
+        from mracad_cli.journal import Ended
 
         def work() -> Ended:
             try:
@@ -123,6 +142,17 @@ class Command(click.Command):
     def words(ctx: click.Context) -> str:
         """The words that name the command."""
         return " ".join(ctx.command_path.split()[1:])
+
+
+def refused(path: str, replaced: bool) -> bool:
+    """Whether a report for CI could not be written."""
+    from mracad_cli.outputs import check_junit
+
+    try:
+        check_junit(path, replaced)
+    except MracadError:
+        return True
+    return False
 
 
 def _used(ctx: click.Context, name: str) -> bool:
@@ -152,9 +182,16 @@ def every(group: click.Command) -> dict[str, click.Command]:
 
 
 class Unguarded(Command):
-    """A command that does its work in worker processes, to which its limits apply."""
+    """A command that does its work in worker processes, to which its limits apply; it replaces its reports."""
 
     guarded = False
+    replaces = True
+
+
+class Plain(Unguarded):
+    """A command that touches no model: no default can keep it from its work."""
+
+    defaulted = False
 
 
 class Group(click.Group):
@@ -176,6 +213,9 @@ def told() -> Iterator[None]:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # discard the rest of the output
         raise MracadError("standard output was closed", "", Code.FILE) from error
     except Exception as error:
+        from mracad import note
+        from mracad.job.wire import internal
+
         if not type(error).__module__.startswith("OCP"):
             raise internal(error) from error
         what = f"{type(error).__name__}: {error}"

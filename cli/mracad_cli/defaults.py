@@ -1,11 +1,13 @@
 """Defaults of options from files and the environment; what is given on the command line goes before them all.
 
 ``pyproject.toml`` (its table ``tool.mracad``) comes first, then ``mracad.toml``, then environment variables; later
-ones go before earlier ones, and in each of them an option of one command before that of all commands.
+ones go before earlier ones, and in each of them an option of one command before that of all commands. A default for all
+commands counts where an option takes its value: some commands have fewer choices than others.
 """
 
 from __future__ import annotations
 
+import contextlib
 import os
 import re
 import shlex
@@ -91,7 +93,7 @@ def chosen(command: str, own: click.Command, commands: Callable[[], Commands]) -
     options = options_of(own)
     result: dict[str, Default] = {}
     for default in found():
-        name = _option(default, command, options)
+        name = option(default, command, options)
         if name is None:
             check(default, commands())
         elif name in GIVEN:
@@ -102,7 +104,7 @@ def chosen(command: str, own: click.Command, commands: Callable[[], Commands]) -
     return {name: default for name, default in result.items() if default.value != ""}
 
 
-def value(default: Default, option: click.Option, ctx: click.Context) -> Any:
+def value(default: Default, its: click.Option, ctx: click.Context) -> Any:
     """The value of a default as click takes it.
 
     Raises
@@ -111,14 +113,26 @@ def value(default: Default, option: click.Option, ctx: click.Context) -> Any:
         For a value that the option does not take, with its place.
     """
     try:
-        plain = _plain(default, option)
-        option.type_cast_value(ctx, plain)
+        plain = _plain(default, its)
+        its.type_cast_value(ctx, plain)
     except (MracadError, click.UsageError) as error:
         message = error.message if isinstance(error, MracadError) else error.format_message()
         hint = error.hint if isinstance(error, MracadError) else ""
         says = message if message.startswith(default.option) else f"{default.option}: {message.rstrip('.')}"
-        raise UsageError(f"{default.place}: {says}", hint or "see mracad env for all defaults") from error
+        raise UsageError(f"{default.place}: {says}", hint) from error
     return plain
+
+
+def taken(default: Default, commands: Commands) -> bool:
+    """Whether some command takes the value of a default for all commands."""
+    for name, command in commands.items():
+        options = options_of(command)
+        own = option(default, name, options)
+        with contextlib.suppress(UsageError):
+            if own is not None:
+                value(default, options[own], click.Context(command))
+                return True
+    return False
 
 
 def check(default: Default, commands: Commands) -> None:
@@ -129,7 +143,7 @@ def check(default: Default, commands: Commands) -> None:
             hint = nearest(default.command, [*commands, *groups], "see mracad --help")
             raise UsageError(f"{default.place}: there is no command {default.command!r}", hint)
     every = {name: options_of(command) for name, command in commands.items() if default.command in ("", name)}
-    if not any(_option(default, name, options) for name, options in every.items()):
+    if not any(option(default, name, options) for name, options in every.items()):
         names = {option for options in every.values() for option in options}
         what = f"{default.command} has no option" if default.command else "no command has an option"
         raise UsageError(f"{default.place}: {what} {default.option!r}", nearest(default.option, names, "see --help"))
@@ -141,7 +155,7 @@ def options_of(command: click.Command) -> dict[str, click.Option]:
     return {max(option.opts, key=len).lstrip("-"): option for option in options}
 
 
-def _option(default: Default, command: str, options: Mapping[str, click.Option]) -> str | None:
+def option(default: Default, command: str, options: Mapping[str, click.Option]) -> str | None:
     """The long name of a command's option that a default is for; None if it is for others."""
     if default.command not in ("", command):
         return None
@@ -151,21 +165,19 @@ def _option(default: Default, command: str, options: Mapping[str, click.Option])
     return default.option if default.option in options else None
 
 
-def _plain(default: Default, option: click.Option) -> Any:
+def _plain(default: Default, its: click.Option) -> Any:
     """The value as a text, for a flag true or false, for many a list of texts; paths are from the working folder."""
     given = default.value
-    if option.is_flag:
+    if its.is_flag:
         if default.folder is not None and not isinstance(given, bool):
             raise UsageError(f"{default.option}: {given!r} is neither true nor false", "write true or false")
         return given
-    if isinstance(given, bool) or (isinstance(given, list) and not option.multiple):
+    if isinstance(given, bool) or (isinstance(given, list) and not its.multiple):
         raise UsageError(f"{default.option}: it takes one value, not {given!r}", f'write {default.option} = "…"')
     if default.folder is None:
-        return _words(default) if option.multiple else given
-    texts = [
-        relocated(option.type, str(text), default.folder) for text in (given if isinstance(given, list) else [given])
-    ]
-    return texts if option.multiple else texts[0]
+        return _words(default) if its.multiple else given
+    texts = [relocated(its.type, str(text), default.folder) for text in (given if isinstance(given, list) else [given])]
+    return texts if its.multiple else texts[0]
 
 
 def _words(default: Default) -> list[str]:

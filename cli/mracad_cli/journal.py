@@ -37,10 +37,12 @@ class Journal:
     log : str or None
         File to which events are added, one JSON object per line.
     verbose : bool
+    keeps : bool
+        Whether what is said is kept.
     """
 
-    def __init__(self, command: str, log: str | None, verbose: bool) -> None:
-        self.command, self.verbose = command, verbose
+    def __init__(self, command: str, log: str | None, *, verbose: bool, keeps: bool) -> None:
+        self.command, self.verbose, self.keeps = command, verbose, keeps
         self.said: list[str] = []
         self._log = _opened(log) if log else None
         self._start = time.time()
@@ -78,7 +80,7 @@ class Journal:
         """Note a line that is printed."""
         if warning:
             self._event("warning", text=line)
-        else:
+        elif self.keeps:
             self.said.append(line)
 
     def ended(self, code: int, error: MracadError | None = None) -> None:

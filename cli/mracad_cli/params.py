@@ -6,13 +6,15 @@ import os
 from collections.abc import Callable, Iterable
 from enum import StrEnum
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
-from click.shell_completion import CompletionItem
 
 from mracad.spec.fields import Field, dashed
 from mracad.spec.quantity import ANGLE, LENGTH, MEMORY, TIME, Kind
+
+if TYPE_CHECKING:
+    from click.shell_completion import CompletionItem
 
 Command = Callable[..., Any]
 
@@ -80,6 +82,13 @@ class Quantity(click.ParamType):
         return value if self.kind is LENGTH else found
 
 
+def items(texts: Iterable[str]) -> list[CompletionItem[str]]:
+    """Texts as completions."""
+    from click.shell_completion import CompletionItem
+
+    return [CompletionItem(text) for text in texts]
+
+
 class File(click.Path):
     """A path; shells complete folders, and files with one of the extensions (all files where none is given).
 
@@ -96,14 +105,14 @@ class File(click.Path):
         self.extensions = tuple(extensions)
 
     def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem[str]]:
-        return [CompletionItem(path) for path in paths(incomplete, self.extensions)]
+        return items(paths(incomplete, self.extensions))
 
 
 class Folder(File):
     """The path of a folder."""
 
     def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem[str]]:
-        return [CompletionItem(path) for path in paths(incomplete, None)]
+        return items(paths(incomplete, None))
 
 
 def paths(start: str, extensions: tuple[str, ...] | None) -> list[str]:
@@ -139,7 +148,7 @@ class Declared(click.ParamType):
         if naming and incomplete.startswith(naming.prefix):
             ending = (naming.ending,) if isinstance(naming.ending, str) else naming.ending
             found += [naming.prefix + path for path in paths(incomplete.removeprefix(naming.prefix), ending)]
-        return [CompletionItem(text) for text in found]
+        return items(found)
 
 
 def relocated(kind: click.ParamType, text: str, folder: str) -> str:

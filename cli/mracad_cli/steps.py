@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from mracad.spec.steps import STEPS, Options, Selection
+from mracad.spec.steps import STEPS, Options
 from mracad_cli import options, running
 from mracad_cli.command import Command
 from mracad_cli.options import Editing, Reading, Writing
@@ -23,11 +23,6 @@ if TYPE_CHECKING:
     from mracad.occ.document import Document
     from mracad.occ.load import Text
     from mracad.spec.recipe import Recipe, Step
-
-
-def edits() -> list[str]:
-    """Names of the edits among the steps; each is also a command."""
-    return [use for use, struct in STEPS.items() if issubclass(struct, Selection)]
 
 
 def edit_command(use: str) -> click.Command:

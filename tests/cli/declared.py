@@ -214,8 +214,11 @@ PIPELINE = "smooth --scale 20% ! check ! compare --max-deviation 1mm"
 ARGUMENTS = {
     "batch": ("recipe.toml", "IN"),
     "compare": ("REF", "IN"),
+    "completion": ("bash",),
     "compose": ("IN", "MRA"),
+    "env": (),
     "feature make": ("formula:0.2*cos(x)*cos(y),radius:3mm",),
+    "man": (".",),
     "pipeline": (PIPELINE, "IN"),
     "recipe check": ("recipe.toml",),
     "recipe schema": (),

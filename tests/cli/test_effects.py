@@ -39,6 +39,7 @@ BASE = {
     "compose": ("compose", "coarse.step", "sheet.mra", "-o", "a.step", "--json"),
     "convert": ("convert", "sheet.step", "-o", "a.step", "--json"),
     "denoise": ("denoise", "sheet.step", "--noise", "0.05mm", "-o", "a.step", "--json"),
+    "env": ("env", "--json"),
     "equalize": ("equalize", "sheet.step", "--band", "0.5mm:3mm=2", "-o", "a.step", "--json"),
     "feature extract": ("feature", "extract", "sheet.step", *FEATURE, "-o", "a.feature", "--json"),
     "feature list": ("feature", "list", "sheet.step", "--json"),

@@ -4,6 +4,7 @@ import shlex
 
 import click
 import pytest
+from mracad_cli.__main__ import group
 
 from tests.cli import declared
 
@@ -60,3 +61,13 @@ def test_an_example_is_told_as_it_stands(mracad):
     """No line of it is wrapped: it can be copied."""
     context = click.Context(declared.commands()["repeat"])
     assert declared.commands()["repeat"].examples[0] in context.get_help()
+
+
+def test_the_list_of_commands_says_what_their_helps_say(mracad):
+    """It is made without the commands, which would take time to load."""
+    listed = mracad("--help").out.partition("Commands:\n")[2]
+    context = click.Context(group)
+    for name in group.list_commands(context):
+        line = next(line for line in listed.splitlines() if line.split()[0] == name)
+        words = line.split(maxsplit=1)[1].removesuffix("...")
+        assert " ".join(group.get_command(context, name).help.split()).startswith(words)

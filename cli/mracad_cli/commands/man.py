@@ -1,0 +1,29 @@
+"""Write manual pages of all commands into a folder: mracad.1, mracad-smooth.1 …"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from mracad.errors import FileError
+from mracad_cli import options
+from mracad_cli.command import Plain, every
+from mracad_cli.outputs import deliver
+
+
+@click.command(cls=Plain, help=__doc__, examples="mracad man man1")
+@click.argument("folder", metavar="DIR", type=options.folder)
+@click.pass_context
+def command(ctx: click.Context, folder: str) -> None:
+    from mracad_cli.render import man
+
+    try:
+        Path(folder).mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise FileError(f"cannot write into {folder}: {error.strerror}", "name another folder") from error
+    root = ctx.find_root().command
+    pages = {"mracad": man.overview(root, every(root))}
+    for name, page in every(root).items():
+        pages[f"mracad-{name.replace(' ', '-')}"] = man.page(name, page, ctx.find_root())
+    deliver({str(Path(folder, f"{name}.1")): text for name, text in pages.items()}, [f"wrote {len(pages)} pages"])
