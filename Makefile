@@ -5,6 +5,7 @@
 #   make test    set everything up and run the tests
 #   make test-long  at more scales, with the largest real models everywhere
 #   make regress compare every sample with the reference figures in samples/figures.json
+#   make fresh   build wheel and sdist, install each in an empty environment and try it
 #   make fuzz    feed the commands 2 000 damaged files and kill 200 writers (half an hour)
 #
 # The pattern rule below is the use the tool is for: copy it into a Makefile beside your own models.
@@ -20,7 +21,7 @@ export SOURCE_DATE_EPOCH ?= 0
 
 SAMPLES := $(wildcard samples/*.step)
 
-.PHONY: demo example test test-long regress fuzz lint bench bench-batch bench-fill docs pictures samples smooth wheel clean
+.PHONY: demo example test test-long regress fuzz lint bench bench-batch bench-fill docs pictures samples smooth wheel fresh man clean
 
 demo: $(VENV)/ready
 	@mkdir -p build
@@ -92,6 +93,20 @@ build/%.stl: build/%.step
 
 wheel: $(VENV)/dev
 	$(BIN)/python -m build --wheel
+
+# The packages as users get them, installed where nothing else is: some minutes and a gigabyte
+fresh: $(VENV)/dev
+	rm -rf build/fresh && mkdir -p build/fresh
+	$(BIN)/python -m build --outdir build/fresh
+	for package in build/fresh/*.whl build/fresh/*.tar.gz; do \
+	  rm -rf build/fresh/venv && $(PYTHON) -m venv build/fresh/venv && \
+	  build/fresh/venv/bin/pip install --quiet $$package && \
+	  (cd build/fresh && PATH="$$PWD/venv/bin:$$PATH" sh -e ../../packaging/try.sh ../../samples) || exit 1; \
+	done
+
+# Manual pages, for packagers
+man: $(VENV)/ready
+	$(BIN)/mracad man build/man/man1
 
 $(VENV)/ready: pyproject.toml constraints.txt
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "mracad needs Python 3.11 or newer: make PYTHON=python3.11")'

@@ -1,4 +1,4 @@
-"""The current activity of this process, for the error message should it crash or exceed a limit, and for those who watch."""
+"""The current activity of this process, for the message of a crash or an exceeded limit, and for those who watch."""
 
 from __future__ import annotations
 

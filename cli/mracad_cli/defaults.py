@@ -8,6 +8,7 @@ commands counts where an option takes its value: some commands have fewer choice
 from __future__ import annotations
 
 import contextlib
+import json
 import os
 import re
 import shlex
@@ -57,6 +58,11 @@ class Default:
     value: Any
     place: str
     folder: str | None
+
+    @property
+    def text(self) -> str:
+        """Its value as JSON."""
+        return json.dumps(self.value, default=str, ensure_ascii=False)
 
     @property
     def key(self) -> str:

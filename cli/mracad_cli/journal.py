@@ -52,13 +52,13 @@ class Journal:
 
     def began(self, arguments: Iterable[str], defaults: Mapping[str, Default]) -> None:
         """Tell what is asked for."""
-        told = [{"option": d.key, "value": d.value, "from": d.place} for d in defaults.values()]
         if self._log is not None:
             from mracad.spec.recipe import versions
 
+            told = [{"option": d.key, "value": d.value, "from": d.place} for d in defaults.values()]
             self._event("began", arguments=list(arguments), defaults=told, versions=versions(), folder=os.getcwd())
-        for default in told:
-            self._tell(f"default: {default['option']} = {json.dumps(default['value'])} from {default['from']}")
+        for default in defaults.values():
+            self._tell(f"default: {default.key} = {default.text} from {default.place}")
 
     def doing(self, stage: str, subject: str) -> None:
         """Note an activity; see :func:`mracad.note.doing`."""

@@ -34,9 +34,17 @@ class Title(StrEnum):
 
 
 class Option(click.Option):
-    """An option with the title under which the help lists it; ``""`` for those of a command alone."""
+    """An option with the title under which the help lists it, ``""`` for those of a command alone; the help tells where
+    its default was set."""
 
     section = ""
+
+    def get_help_record(self, ctx: click.Context) -> tuple[str, str] | None:
+        record = super().get_help_record(ctx)
+        default = ctx.meta.get("mracad.defaults", {}).get(self.name)
+        if record is None or default is None:
+            return record
+        return record[0], f"{record[1]}  [{default.place}: {default.text}]"
 
 
 def option(*names: str, **how: Any) -> Callable[[Command], Command]:

@@ -169,7 +169,7 @@ def fields(struct: type[Struct]) -> dict[str, Field]:
 def _section(struct: type[Struct], name: str) -> str:
     """The section of the class that first declares a field, where it is not the struct itself."""
     first = next(base for base in reversed(struct.__mro__) if name in vars(base).get("__annotations__", ()))
-    return "" if first is struct else str(vars(first).get("section", ""))
+    return "" if first is struct else str(vars(first).get("about", ""))
 
 
 def _field(owner: str, section: str, field: structs.FieldInfo, hint: Any) -> Field:

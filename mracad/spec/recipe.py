@@ -299,4 +299,10 @@ def versions() -> dict[str, str]:
     """Versions of the packages that affect the result."""
     from importlib import metadata  # slow to load, and not needed for help
 
-    return {"mracad": __version__, **{name: metadata.version(name) for name in ("cadquery-ocp", "numpy", "scipy")}}
+    def version(name: str) -> str:
+        try:
+            return metadata.version(name)
+        except metadata.PackageNotFoundError:  # other packagers may have other names
+            return "unknown"
+
+    return {"mracad": __version__, **{name: version(name) for name in ("cadquery-ocp", "numpy", "scipy")}}

@@ -157,6 +157,13 @@ def test_an_error_tells_where_the_option_was_set(here, mracad):
     assert "a level or a scale, not both" in result.err and "scale is set in mracad.toml:2" in result.err
 
 
+def test_the_help_tells_defaults_and_their_places(here, mracad):
+    (here / "mracad.toml").write_text('keep = "g1"\n[smooth]\nscale = "5mm"\n')
+    said = " ".join(mracad("smooth", "--help").out.split())
+    assert '[mracad.toml:3: "5mm"]' in said and '[default: g1] [mracad.toml:1: "g1"]' in said
+    assert "mracad.toml" not in mracad("convert", "--help").out
+
+
 def test_steps_of_recipes_take_no_defaults(here, mracad):
     (here / "fair.toml").write_text('[[step]]\nuse = "smooth"\nscale = "5mm"\n')
     before = mracad("recipe", "check", "fair.toml", "--json")

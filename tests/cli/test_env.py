@@ -19,11 +19,22 @@ def test_versions_threads_and_caches(mracad):
     body = json.loads(mracad("env", "--json").out)
     assert body["mracad"] == library.__version__ and body["python"] == platform.python_version()
     assert body["packages"]["msgspec"] == msgspec.__version__ and body["kernel"].startswith("7.")
-    assert body["threads"]["OPENBLAS_NUM_THREADS"] == "1" and body["caches"]
+    assert body["threads"]["OPENBLAS_NUM_THREADS"] == "1"
     assert body["defaults"] == body["problems"] == []
     text = mracad("env").out
     for word in (library.__version__, body["kernel"], body["packages"]["click"], "OPENBLAS_NUM_THREADS 1"):
         assert word in text
+
+
+def test_what_the_cache_of_documents_holds(mracad, here, monkeypatch):
+    from mracad import cache
+
+    assert json.loads(mracad("env", "--json").out)["caches"]["documents"] == "off"
+    monkeypatch.setenv("MRACAD_CACHE", str(here / "cache"))
+    assert json.loads(mracad("env", "--json").out)["caches"]["documents"] == "0 in 0.0 kB"
+    cache.keep("a" * 64, cache.sealed(b"x" * 1968))
+    assert json.loads(mracad("env", "--json").out)["caches"]["documents"] == "1 in 2.0 kB"
+    assert str(here) not in mracad("env").out  # no path of the user
 
 
 def test_defaults_with_their_places_and_what_is_wrong_with_them(mracad, here, monkeypatch):

@@ -13,9 +13,11 @@ from typing import Any
 
 import click
 
+from mracad import cache
 from mracad.errors import MracadError
 from mracad.version import __version__
 from mracad_cli.defaults import Default, check, found, option, options_of, taken, value
+from mracad_cli.say import size
 
 THREADS = "OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"
 
@@ -34,7 +36,7 @@ def body(commands: Mapping[str, click.Command]) -> dict[str, Any]:
         "packages": _packages(),
         "threads": {"processors": os.cpu_count(), **{name: os.environ.get(name) for name in THREADS}},
         "encoding": {"files": sys.getfilesystemencoding(), "output": sys.stdout.encoding},
-        "caches": {"compiled code": _compiled()},
+        "caches": {"documents": _documents(), "compiled code": _compiled()},
         "defaults": defaults,
         "problems": [*wrong, *(default["problem"] for default in defaults if default["problem"])],
     }
@@ -92,6 +94,14 @@ def _version(name: str) -> str | None:
         return metadata.version(name)
     except metadata.PackageNotFoundError:
         return None
+
+
+def _documents() -> str:
+    """How much the cache of healed documents holds."""
+    if cache.folder() is None:
+        return "off"
+    entries, total = cache.size()
+    return f"{entries} in {size(total)}"
 
 
 def _compiled() -> str:

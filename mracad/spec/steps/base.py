@@ -32,13 +32,13 @@ class Options(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         The function that does the step, ``"module:function"``.
     example : str
         A call of its command.
-    section : str
+    about : str
         What the options that a class adds for its subclasses are about, as a title.
     """
 
     function: ClassVar[str]
     example: ClassVar[str] = ""
-    section: ClassVar[str] = ""
+    about: ClassVar[str] = ""
 
     def __post_init__(self) -> None:
         for name, field in fields(type(self)).items():
@@ -72,7 +72,7 @@ class Options(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 class Selection(Options, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Which faces an edit may touch and how their edges are treated; shared by every edit."""
 
-    section: ClassVar[str] = "Faces and edges"
+    about: ClassVar[str] = "Faces and edges"
 
     faces: Annotated[
         tuple[_Faces, ...],

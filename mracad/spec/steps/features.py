@@ -73,7 +73,7 @@ def not_flat(height: float) -> None:
 class Featured(Selection, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Options that separate a feature from its surroundings."""
 
-    section: ClassVar[str] = "Feature"
+    about: ClassVar[str] = "Feature"
 
     taper: Taper = None
     base: Base = "surroundings"
@@ -123,7 +123,7 @@ class Make(Options, frozen=True, kw_only=True, forbid_unknown_fields=True):
 class Copied(Featured, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Options of edits that make copies of a feature."""
 
-    section: ClassVar[str] = "Copies"
+    about: ClassVar[str] = "Copies"
 
     edges: Annotated[
         Literal["frozen", "coupled"],
@@ -146,7 +146,7 @@ class Copied(Featured, frozen=True, kw_only=True, forbid_unknown_fields=True):
 class Single(Copied, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Options of edits that copy a feature of the model itself."""
 
-    section: ClassVar[str] = ""
+    about: ClassVar[str] = ""
 
     feature: _Feature
 

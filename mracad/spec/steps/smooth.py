@@ -26,7 +26,7 @@ Sliding = Annotated[
 class Fitting(Selection, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Options of edits that change whole faces."""
 
-    section: ClassVar[str] = "Seams and limits"
+    about: ClassVar[str] = "Seams and limits"
 
     fit_g1: Annotated[
         Annotated[Angle, Meta(ge=0.0, le=45.0)] | None,
@@ -63,7 +63,7 @@ class Fitting(Selection, frozen=True, kw_only=True, forbid_unknown_fields=True):
 class Fairing(Fitting, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Options of edits that make faces fairer."""
 
-    section: ClassVar[str] = "Faces and edges"
+    about: ClassVar[str] = "Faces and edges"
 
     edges: Sliding = "coupled"
     free_edges: Annotated[
