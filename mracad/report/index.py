@@ -9,7 +9,7 @@ from typing import Any
 from mracad.report.page import Verdict, rendered
 from mracad.report.table import Column, Table
 
-HEIGHT = 80
+HEIGHT = 64
 """Of the pictures in rows, pixels."""
 
 COLUMNS = (

@@ -143,7 +143,7 @@ def _row(page: Page, done: Production, key: str) -> dict[str, Any]:
     edits = [each for each in done.results if isinstance(each, Report)]
     return {
         "key": key,
-        "valid": page.verdicts[0].answer,
+        "valid": page.verdicts[0].answer.partition(",")[0],
         "edited": len({o.face for each in edits for o in each.edit.faces("edited")}),
         "faces": len({o.face for each in edits for o in each.edit.outcomes}),
         "deviation": max((d.largest for each in edits for d in each.deviations), default=0.0),
