@@ -25,11 +25,14 @@ class Format:
         In lower case, with the dot; the first is the usual one.
     kind : {"exact", "mesh", "picture"}
         Exact formats are read and written, meshes and pictures only written.
+    scalars : bool
+        Whether it holds numbers or colours at the points of a mesh, face by face.
     """
 
     name: str
     extensions: tuple[str, ...]
     kind: Kind
+    scalars: bool = False
 
 
 FORMATS = {
@@ -40,11 +43,13 @@ FORMATS = {
         Format("brep", (".brep", ".brp"), "exact"),
         Format("binbrep", (".bbrep", ".binbrep"), "exact"),
         Format("stl", (".stl",), "mesh"),
-        Format("3mf", (".3mf",), "mesh"),
+        Format("3mf", (".3mf",), "mesh", scalars=True),
         Format("obj", (".obj",), "mesh"),
-        Format("ply", (".ply",), "mesh"),
-        Format("gltf", (".gltf",), "mesh"),
-        Format("glb", (".glb",), "mesh"),
+        Format("ply", (".ply",), "mesh", scalars=True),
+        Format("gltf", (".gltf",), "mesh", scalars=True),
+        Format("glb", (".glb",), "mesh", scalars=True),
+        Format("vtp", (".vtp",), "mesh", scalars=True),
+        Format("vtu", (".vtu",), "mesh", scalars=True),
         Format("png", (".png",), "picture"),
         Format("gif", (".gif",), "picture"),
         Format("mp4", (".mp4",), "picture"),

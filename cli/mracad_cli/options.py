@@ -15,7 +15,7 @@ from msgspec import Struct
 
 from mracad.formats import FORMATS, READABLE
 from mracad.spec.fields import Field, dashed, fields
-from mracad.spec.pictures import Picture
+from mracad.spec.pictures import Picture, Scalars
 from mracad.spec.quantity import ANGLE, LENGTH
 from mracad_cli.params import (
     SHORT,
@@ -134,6 +134,7 @@ class Writing:
     ascii_stl: bool
     verify: bool
     picture: Picture
+    scalars: Scalars
     overwrite: bool
     if_changed: bool
 
@@ -254,6 +255,7 @@ _meshes = section(
         help="Largest turn of the normal along a triangle's edge (degrees).",
     ),
     option("--ascii", "ascii_stl", is_flag=True, help="STL: write text instead of binary."),
+    of(Scalars, "scalars"),
 )
 writing = gathered(
     "writing",

@@ -28,7 +28,7 @@ OF = {
 
 if TYPE_CHECKING:
     from mracad.job.judge import Judged
-    from mracad.job.produce import Made, Target
+    from mracad.job.output import Made, Target
     from mracad.occ.document import Document
     from mracad.occ.load import Text
 
@@ -68,7 +68,7 @@ def check_outputs(writing: Writing, beside: Iterable[str | None] = (), *, needed
     FileError
         For an unknown file extension, or a folder that cannot be written to.
     """
-    from mracad.job.produce import Target
+    from mracad.job.output import Target
 
     paths = writing.outputs
     if needed and not paths:
@@ -77,9 +77,12 @@ def check_outputs(writing: Writing, beside: Iterable[str | None] = (), *, needed
         raise UsageError("- is named twice", "give each -o once")
     formats = {path: FORMATS[writing.format] if path == "-" else by_extension(path) for path in paths}
     _check_options(formats.values(), "-" in paths)
+    if writing.scalars.scalar:
+        _check_scalars(formats.values())
     files = [path for path in paths if path != "-"]
     check_reports(*files, *beside, overwrite=writing.overwrite or writing.if_changed)
-    how = (writing.schema or "").upper(), writing.chord, writing.angle, writing.ascii_stl, writing.picture
+    mesh = writing.chord, writing.angle, writing.ascii_stl
+    how = (writing.schema or "").upper(), *mesh, writing.picture, writing.scalars
     return [
         Target("standard output" if path == "-" else Path(path).name, format.name, *how)
         for path, format in formats.items()
@@ -99,6 +102,16 @@ def _check_options(formats: Collection[Format], streamed: bool) -> None:
             raise UsageError(f"{option}: no {what} is written", f"add -o {output}, or leave --{option} out")
     if "format" in given and not streamed:
         raise UsageError("format: nothing is written to standard output", "add -o -, or leave --format out")
+
+
+def _check_scalars(formats: Collection[Format]) -> None:
+    """Refuse numbers at points for meshes that cannot hold them."""
+    able = ", ".join(each.extensions[0] for each in FORMATS.values() if each.scalars)
+    for format in formats:
+        if format.kind == "mesh" and not format.scalars:
+            raise UsageError(f"scalar: {format.name.upper()} holds no numbers at points", f"write {able}")
+    if not any(format.scalars for format in formats):
+        raise UsageError("scalar: no mesh is written", f"add an output in {able}, or leave --scalar out")
 
 
 def check_reports(*paths: str | None, overwrite: bool) -> None:

@@ -19,7 +19,8 @@ from mracad_cli.say import json_text
 
 if TYPE_CHECKING:
     from mracad.job.document import Report
-    from mracad.job.produce import Production, Target
+    from mracad.job.output import Target
+    from mracad.job.produce import Production
     from mracad.occ.document import Document
     from mracad.occ.load import Text
     from mracad.spec.recipe import Recipe, Step
@@ -84,7 +85,7 @@ def run_steps(
     if done.made:
         files |= records
         files |= {path: make(done.results[0]) for path, make in beside.items()}  # type: ignore[arg-type]  # it is an edit
-        needs = [reading.file, *needed(steps, recipe), *writing.picture.files()]
+        needs = [reading.file, *needed(steps, recipe), *writing.picture.files(), *writing.scalars.files()]
         files |= {editing.depfile: depfile_text(writing.outputs, needs)} if editing.depfile else {}
     if editing.report_html:
         from mracad_cli.render import pages

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields
 from functools import partial
 from pathlib import Path
@@ -13,12 +13,14 @@ from mracad.api.speech import speaking
 from mracad.errors import UsageError
 from mracad.formats import FORMATS, by_extension
 from mracad.job.document import Report
-from mracad.job.produce import Target, produce
+from mracad.job.output import Target
+from mracad.job.produce import produce
 from mracad.occ import document as kernel
 from mracad.occ.files import Written
 from mracad.occ.files import read as read_file
 from mracad.occ.load import load
 from mracad.output import put
+from mracad.spec.pictures import Scalars
 from mracad.spec.recipe import Step
 
 
@@ -62,14 +64,18 @@ class Document(kernel.Document):
         chord: str | float = "0.02%",
         angle: float | None = None,
         ascii: bool = False,
+        scalar: Sequence[str] = (),
     ) -> Written:
         """Write a file, whole or not at all; the same as :func:`mracad.write`.
 
         An exact file is read back and judged, as on the command line: faces that would make it worse stay as they were
-        before the edits, and ``reports`` then says so.
+        before the edits, and ``reports`` then says so.  ``scalar`` gives the points of meshes numbers, such as
+        ``"curvature:mean"``, ``"deviation"`` (from the model as it was read), ``"deviation:old.step"`` or
+        ``"roughness:10mm"``, and the colours of the first.
         """
         with speaking():
-            wanted = Target(_name(self, target), _format(target, format), schema, str(chord), angle, ascii)
+            name, numbers = _name(self, target), Scalars(scalar=tuple(scalar))
+            wanted = Target(name, _format(target, format), schema, str(chord), angle, ascii, scalars=numbers)
             return self._write(wanted, target)
 
     def _write(self, wanted: Target, target: str | os.PathLike[str] | BinaryIO) -> Written:

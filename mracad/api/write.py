@@ -30,8 +30,8 @@ def write(
     thing : Document or shape
     target : path or binary stream
     format : str
-        ``"step"``, ``"iges"``, ``"brep"``, ``"binbrep"``, ``"stl"``, ``"3mf"``, ``"obj"``, ``"ply"``, ``"gltf"`` or
-        ``"glb"``.  Default: by the extension of a path, STEP for a stream.
+        ``"step"``, ``"iges"``, ``"brep"``, ``"binbrep"``, ``"stl"``, ``"3mf"``, ``"obj"``, ``"ply"``, ``"gltf"``,
+        ``"glb"``, ``"vtp"`` or ``"vtu"``.  Default: by the extension of a path, STEP for a stream.
     schema : str
         STEP: ``"AP203"``, ``"AP214"`` or ``"AP242"``.  Default: that of the file that was read, else AP242.
     chord : str or float

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import os
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
@@ -10,19 +9,17 @@ from functools import cached_property, partial
 from typing import TYPE_CHECKING, BinaryIO
 
 from mracad.errors import EditError, FileError
-from mracad.formats import FORMATS, Kind, by_content
+from mracad.formats import by_content
 from mracad.inspect import accept
 from mracad.inspect.accept import Slack
 from mracad.inspect.faults import Fault, FaultKind, ReadBack
 from mracad.job.document import Progress, Report, play, tell
 from mracad.job.judge import Judged, Original
 from mracad.job.left import Excluded
+from mracad.job.output import Made, Target, pictured, written
 from mracad.job.words import of_fault
 from mracad.model.facts import Facts
-from mracad.spec.pictures import Picture
-from mracad.spec.quantity import length
 from mracad.spec.recipe import title
-from mracad.spec.steps import Selection
 
 if TYPE_CHECKING:
     from mracad.occ.document import Document
@@ -31,37 +28,6 @@ if TYPE_CHECKING:
 
 ROUNDS = 8
 """How often the steps are repeated, each time without the faces that would make the file worse."""
-
-
-@dataclass(frozen=True)
-class Target:
-    """An output: its name, and how it is written (see :func:`mracad.occ.files.write`).
-
-    Attributes
-    ----------
-    chord : str
-        Meshes: largest distance of triangles from the surface, a length or a share of the diagonal.
-    picture : Picture
-        Pictures: what they show.
-    """
-
-    name: str
-    format: str = "step"
-    schema: str = ""
-    chord: str = "0.02%"
-    angle: float | None = None
-    ascii: bool = False
-    picture: Picture = field(default_factory=Picture)
-
-
-@dataclass(frozen=True)
-class Made:
-    """The content of an output, how it differs from the document, and what it is as read back (None: not read back)."""
-
-    target: Target
-    data: bytes = field(repr=False)
-    written: Written
-    read_back: ReadBack | None = None
 
 
 @dataclass(frozen=True)
@@ -137,13 +103,15 @@ def produce(
             return found
         tell(progress, "writing")
         made = tuple(
-            _pictured(found, target, original, steps) if _is(target, "picture") else _made(document, target, header)
+            pictured(document, target, original, list(zip(steps, results, strict=False)))
+            if target.kind == "picture"
+            else written(document, target, header, original)
             for target in targets
         )
         if verify:
             tell(progress, "reading back")
             memory = _Memory(document, results)
-            made = tuple(each if _is(each.target, "picture") else _judged(each, memory, copies) for each in made)
+            made = tuple(each if each.target.kind == "picture" else _judged(each, memory, copies) for each in made)
         faults = tuple((each.target, fault) for each in made if each.read_back for fault in each.read_back.faults)
         if not faults:
             return replace(found, made=made)
@@ -236,13 +204,13 @@ class _Copies:
 
     def mesh(self, target: Target) -> Written:
         """A mesh of the input."""
-        return _made(self.original(), target, "").written
+        return written(self.original(), target).written
 
     def of(self, target: Target) -> tuple[Facts, Facts]:
         """Facts of the input and of its copy; of the input twice if there is no copy: nothing is forgiven."""
         key = target.format, target.schema
         if key not in self._made:
-            data = _made(self.original(), target, "").data
+            data = written(self.original(), target).data
             try:
                 self._made[key] = _read_back(data, target)
             except Exception as error:
@@ -250,57 +218,6 @@ class _Copies:
                     raise
                 self._made[key] = self.input
         return self.input, self._made[key]
-
-
-def _made(document: Document, target: Target, header: str) -> Made:
-    """A document written to a file, not yet judged."""
-    from mracad.occ.files import write
-
-    meshed = _is(target, "mesh")
-    stream = io.BytesIO()
-    written = write(
-        document,
-        stream,
-        target.format,
-        schema=target.schema,
-        chord=length(target.chord, _diagonal(document), "chord") if meshed else None,
-        angle=target.angle,
-        ascii=target.ascii,
-        options_text=header,
-    )
-    return Made(target, stream.getvalue(), written)
-
-
-def _pictured(done: Production, target: Target, original: Original, steps: Sequence[Step]) -> Made:
-    """A picture of a document after its steps; what it is compared with is the document as it was, unless a file is
-    named, and what was done to it is what the last edit did."""
-    from mracad.job import treated
-    from mracad.occ.files import Written, read
-    from mracad.spec.pictures import show_of
-    from mracad.view.picture import render
-
-    picture, show = target.picture, show_of(target.picture.show)
-    before = read(picture.before) if picture.before else original() if picture.wipe else None
-    reference = (read(show.of) if show.of else original()) if show.kind == "deviation" else None
-    told = rings = None
-    for step, result in zip(steps, done.results, strict=False):
-        if isinstance(result, Report) and isinstance(step.options, Selection):
-            told, rings = treated.told(result, step.options), treated.rings(result)
-    shown = render(
-        done.document, picture, before=before, reference=reference, told=told, rings=rings, format=target.format
-    )
-    return Made(target, shown.data, Written())
-
-
-def _is(target: Target, kind: Kind) -> bool:
-    return FORMATS[target.format].kind == kind
-
-
-def _diagonal(document: Document) -> float:
-    """Diagonal of the bounding box of a document, mm."""
-    from mracad.occ.view import view
-
-    return view(document).diagonal
 
 
 def _read_back(data: bytes, target: Target) -> Facts:
@@ -319,7 +236,7 @@ def _unreadable(error: Exception) -> bool:
 
 def _judged(made: Made, memory: _Memory, copies: _Copies) -> Made:
     """An output, read back and judged."""
-    if _is(made.target, "mesh"):
+    if made.target.kind == "mesh":
         torn = made.written.open
         before = copies.mesh(made.target).open if torn and memory.edited else torn
         return replace(made, read_back=accept.meshed(torn, before))

@@ -191,9 +191,13 @@ class Triangles:
     Attributes
     ----------
     points : ndarray (n, 3)
-        Corners that coincide within rounding are one point of their part.
+    uv : ndarray (n, 2)
+        Their parameters on the surface of their face.
     corners : ndarray of int (m, 3)
-        Point numbers, anticlockwise seen from outside.
+        Point numbers, anticlockwise seen from outside; corners that coincide within rounding are one point of their
+        part.
+    own : ndarray of int (m, 3)
+        The corners as points of the triangle's own face.
     faces, parts : ndarray of int (m,)
         Indices of the face and of the part of each triangle.
     missing : tuple of int
@@ -201,7 +205,9 @@ class Triangles:
     """
 
     points: Array
+    uv: Array
     corners: Array
+    own: Array
     faces: Array
     parts: Array
     missing: tuple[int, ...]

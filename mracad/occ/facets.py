@@ -77,13 +77,13 @@ def facets(document: Document, chord: float, angle: float) -> Body:
     size = float(np.linalg.norm(bounds[1] - bounds[0]))
     with quiet():
         whole = compound(part.shape for part in document.parts)
-        grounds = _grounds(document)
+        known = grounds(document)
         every: dict[int, Facets] = {}
         least = np.inf
         for share in _FINER:
             BRepTools.Clean_s(whole)
             BRepMesh_IncrementalMesh(whole, chord * size, False, float(np.radians(share * angle)))
-            found = _collected(document, grounds)
+            found = _collected(document, known)
             off = max((each.off for each in found.values()), default=0.0)
             if off < least:
                 every, least = found, off
@@ -96,13 +96,13 @@ def facets(document: Document, chord: float, angle: float) -> Body:
     return Body(document.name, every, instances, np.array([low.min(axis=0), high.max(axis=0)]))
 
 
-def _collected(document: Document, grounds: list[Ground]) -> dict[int, Facets]:
+def _collected(document: Document, known: list[tuple[Ground, int]]) -> dict[int, Facets]:
     """The triangles that the kernel keeps with the faces."""
     return {
         index: found
         for part in document.parts
         for index in part.numbers
-        if (found := _facets(document, part, index, grounds[index]))
+        if (found := _facets(document, part, index, *known[index]))
     }
 
 
@@ -114,7 +114,7 @@ def _extent(points: Array) -> Array:
     return np.array([points.min(axis=0), points.max(axis=0)])
 
 
-def _facets(document: Document, part: Part, index: int, ground: Ground) -> Facets | None:
+def _facets(document: Document, part: Part, index: int, ground: Ground, outward: int) -> Facets | None:
     """The triangles that the kernel keeps with a face; None if it could not mesh it."""
     face, location = document.faces[index], TopLoc_Location()
     mesh = BRep_Tool.Triangulation_s(face, location)
@@ -122,11 +122,8 @@ def _facets(document: Document, part: Part, index: int, ground: Ground) -> Facet
         return None
     corners = np.array([mesh.Triangle(i).Get() for i in range(1, mesh.NbTriangles() + 1)]) - 1
     uv = np.array([mesh.UVNode(i).Coord() for i in range(1, mesh.NbNodes() + 1)])
-    opposite = face.Orientation() == TopAbs_REVERSED
-    return Facets(
-        index, nodes(mesh, location), uv, corners[:, ::-1] if opposite else corners, ground, -1 if opposite else 1,
-        _rims(part, face, mesh, location),
-    )  # fmt: skip
+    rims = _rims(part, face, mesh, location)
+    return Facets(index, nodes(mesh, location), uv, corners[:, ::outward], ground, outward, rims)
 
 
 def _rims(part: Part, face: TopoDS_Face, mesh: Poly_Triangulation, location: TopLoc_Location) -> dict[int, Array]:
@@ -161,8 +158,8 @@ def _placed(document: Document) -> Iterator[Placed]:
         yield Placed(matrix(usage.frame), faces, colours)
 
 
-def _grounds(document: Document) -> list[Ground]:
-    """The surface under every face."""
+def grounds(document: Document) -> list[tuple[Ground, int]]:
+    """The surface under every face, and 1 where S_u × S_v points outward, otherwise -1."""
     found: list[tuple[Geom_Surface, Array]] = []
     for face in document.faces:
         location = TopLoc_Location()
@@ -171,8 +168,11 @@ def _grounds(document: Document) -> list[Ground]:
     splines = list(dict.fromkeys(surface for surface, _ in found if is_nurbs(surface)))
     known = dict(zip(splines, nets(splines), strict=True))
     return [
-        Spline(known[surface], frame) if surface in known else _other(document.faces[index], surface, frame)
-        for index, (surface, frame) in enumerate(found)
+        (
+            Spline(known[surface], frame) if surface in known else _other(face, surface, frame),
+            -1 if face.Orientation() == TopAbs_REVERSED else 1,
+        )
+        for face, (surface, frame) in zip(document.faces, found, strict=True)
     ]
 
 

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import contextlib
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, BinaryIO
 
 from mracad.errors import EditError, FileError, UsageError
 from mracad.formats import FORMATS, by_content, by_extension
+from mracad.mesh.scene import Legend, Scene
 from mracad.occ.document import Document, named_labels, nested_colours
 from mracad.occ.healed import through_cache
 from mracad.occ.labels import label_name
@@ -58,11 +59,14 @@ class Written:
         Faces that are written as NURBS or in several parts, because readers would misinterpret them as they are.
     open : tuple of int
         Faces of closed bodies that a mesh leaves open.
+    legends : tuple of Legend
+        The numbers at the points of a mesh.
     """
 
     lost: tuple[Lost, ...] = ()
     cut: tuple[CutFace, ...] = ()
     open: tuple[int, ...] = ()
+    legends: tuple[Legend, ...] = ()
 
 
 def read(source: str | os.PathLike | BinaryIO, input_unit: str | None = None, encoding: str | None = None) -> Document:
@@ -119,6 +123,8 @@ class FileOptions:
         Of meshes; see ``scene``.
     ascii : bool
         Write STL as text instead of binary.
+    paint : callable, optional
+        Gives the points of a mesh numbers and colours, such as :func:`mracad.view.scalars.scalars`.
     options_text : str
         Description of the steps, for the header of STEP and IGES files.
     """
@@ -127,6 +133,7 @@ class FileOptions:
     chord: float | None = None
     angle: float | None = None
     ascii: bool = False
+    paint: Callable[[Scene], Scene] | None = None
     options_text: str = ""
 
 
@@ -208,7 +215,12 @@ def _mesh(document: Document, name: str, format: str, how: FileOptions) -> tuple
     seen, missing, torn = scene(document, how.chord, how.angle)
     count, names = len(document.faces), tuple(f"#{face + 1}" for face in missing)
     lost = (Lost("faces", count, count - len(missing), names),) if missing else ()
-    return write_mesh(seen, format, how.ascii), Written(lost, open=torn)
+    if how.paint is not None:
+        if not FORMATS[format].scalars:
+            able = " ".join(each.extensions[0] for each in FORMATS.values() if each.scalars)
+            raise UsageError(f"{format} holds no numbers at points", f"use one of {able}")
+        seen = how.paint(seen)
+    return write_mesh(seen, format, how.ascii), Written(lost, open=torn, legends=seen.legends)
 
 
 _MAKERS = {"step": _step, "iges": _iges, "brep": _brep, "binbrep": _brep}

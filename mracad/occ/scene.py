@@ -11,7 +11,7 @@ from OCP.TopAbs import TopAbs_FACE, TopAbs_SHELL, TopAbs_SOLID
 from OCP.XCAFDoc import XCAFDoc_ShapeTool
 
 from mracad.errors import FileError, UsageError
-from mracad.mesh.scene import Body, Node, Scene
+from mracad.mesh.scene import Body, Node, Places, Scene
 from mracad.model.facts import Triangles
 from mracad.occ.document import Document, nested_colours
 from mracad.occ.document import tint as instance_tint
@@ -94,6 +94,9 @@ class _Bodies:
         if (number, colours) not in self.place:
             self.place[number, colours] = len(self.made)
             used, corners = np.unique(self.mesh.corners[own], return_inverse=True)
+            those, places = np.unique(self.mesh.own[own], return_inverse=True)
+            point = np.empty(len(those), int)
+            point[places] = corners
             self.made.append(
                 Body(
                     name=part.product,
@@ -102,6 +105,7 @@ class _Bodies:
                     faces=self.mesh.faces[own] - part.first,
                     labels=tuple(f"#{part.first + i + 1} {part.face_names.get(i, '')}".strip() for i in range(count)),
                     colours=colours,
+                    places=Places(point, self.mesh.uv[those], places.reshape(-1, 3)),
                 )
             )
         return self.place[number, colours]

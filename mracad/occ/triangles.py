@@ -82,9 +82,11 @@ def _folds(mesh: Triangles) -> int:
 def _collected(document: Document) -> Triangles:
     """The triangles that the kernel keeps with the faces."""
     points: list[Array] = []
+    uv: list[Array] = []
     corners: list[Array] = []
     owners: list[tuple[int, int, int]] = []
     missing = []
+    leaders: list[Array] = []
     count = 0
     for number, part in enumerate(document.parts):
         first = count
@@ -96,22 +98,23 @@ def _collected(document: Document) -> Triangles:
                 missing.append(index)
                 continue
             own.append(nodes(mesh, location))
+            uv.append(np.array([mesh.UVNode(i).Coord() for i in range(1, mesh.NbNodes() + 1)]))
             three = np.array([mesh.Triangle(i).Get() for i in range(1, mesh.NbTriangles() + 1)]) - 1 + count
             corners.append(three[:, ::-1] if face.Orientation() == TopAbs_REVERSED else three)
             owners.append((index, number, len(three)))
             count += len(own[-1])
         if own:
             points.append(np.concatenate(own))
-            leader = _weld(points[-1])
-            for k in range(len(corners)):
-                if owners[k][1] == number:
-                    corners[k] = leader[corners[k] - first] + first
+            leaders.append(_weld(points[-1]) + first)
     if not corners:
-        return Triangles(np.empty((0, 3)), np.empty((0, 3), int), np.empty(0, int), np.empty(0, int), tuple(missing))
-    three = np.concatenate(corners)
+        none, one = np.empty((0, 3), int), np.empty(0, int)
+        return Triangles(np.empty((0, 3)), np.empty((0, 2)), none, none, one, one, tuple(missing))
+    own_three = np.concatenate(corners)
+    three = np.concatenate(leaders)[own_three]
     faces, parts = (np.repeat([o[k] for o in owners], [o[2] for o in owners]) for k in (0, 1))
     whole_ones = (three[:, 0] != three[:, 1]) & (three[:, 1] != three[:, 2]) & (three[:, 2] != three[:, 0])
-    return Triangles(np.concatenate(points), three[whole_ones], faces[whole_ones], parts[whole_ones], tuple(missing))
+    three, own_three, faces, parts = (each[whole_ones] for each in (three, own_three, faces, parts))
+    return Triangles(np.concatenate(points), np.concatenate(uv), three, own_three, faces, parts, tuple(missing))
 
 
 def _weld(points: Array) -> Array:

@@ -45,6 +45,9 @@ SHOWN = (*SHOWS, *(f"curvature:{kind}" for kind in CURVATURES), "deviation:")
 AXES = "xyz"
 """Axes on which planes of sections stand."""
 
+SCALARS = "curvature", "deviation", "roughness"
+"""What the points of meshes show."""
+
 LEAST, MOST = 16, 8192
 """Least and largest width and height, pixels."""
 
@@ -93,6 +96,14 @@ def show_of(text: str, name: str = "show") -> Show:
     return Show(kind, rest)
 
 
+def scalar_of(text: str, name: str = "scalar") -> Show:
+    """The numbers that a text such as ``"curvature:mean"`` asks for; raises UsageError."""
+    kind = text.partition(":")[0]
+    if kind not in SCALARS:
+        raise UsageError(f"{name}: {kind!r} has no numbers", nearest(kind, SCALARS))
+    return show_of(text, name)
+
+
 def views_of(text: str, name: str = "view") -> tuple[str, ...]:
     """The views in a text such as ``"iso,top"`` or ``"1,-2,1"``; raises UsageError."""
     found: list[str] = []
@@ -139,6 +150,9 @@ def section_of(text: str, name: str = "section") -> tuple[int, float]:
 
 ShowText = Annotated[str, Naming(prefix="deviation:"), show_of, Begins(SHOWN)]
 """The type of a field that tells what a picture shows."""
+
+ScalarText = Annotated[str, Naming(prefix="deviation:"), scalar_of, Begins(SCALARS)]
+"""The type of a field that tells which numbers the points of a mesh have."""
 
 ViewText = Annotated[str, views_of, Begins(tuple(VIEWS))]
 """The type of a field that holds views."""
@@ -216,3 +230,29 @@ class Picture(Options, frozen=True, kw_only=True, forbid_unknown_fields=True):
     def views(self) -> tuple[str, ...]:
         """All views, one by one."""
         return tuple(view for text in self.view for view in views_of(text))
+
+
+class Scalars(Options, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """The numbers that the points of meshes have."""
+
+    command: ClassVar[str] = "convert"
+
+    scalar: Annotated[
+        tuple[ScalarText, ...],
+        Meta(
+            description="Numbers at points, as --show of pictures: curvature:max (or :mean, :gauss), "
+            "deviation:REF (for edits deviation alone, from the input), roughness:10mm; repeatable, the first gives "
+            "the colours."
+        ),
+    ] = ()
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        every = [(show.kind, show.of if show.kind == "curvature" else "") for show in self.shows]
+        if len(set(every)) < len(every):
+            raise UsageError("scalar: the same numbers are asked for twice", "give each once")
+
+    @property
+    def shows(self) -> tuple[Show, ...]:
+        """What the numbers are."""
+        return tuple(map(scalar_of, self.scalar))

@@ -147,7 +147,7 @@ def _off(facets: Facets, points: Array, uv: Array, done: float) -> tuple[Array, 
         ee, ff, gg = (su * su).sum(axis=1), (su * sv).sum(axis=1), (sv * sv).sum(axis=1)
         a, b, c = ee + (r * suu).sum(axis=1), ff + (r * suv).sum(axis=1), gg + (r * svv).sum(axis=1)
         bad = ~((a > 0) & (a * c - b * b > 1e-3 * (ee * gg - ff * ff)))
-        a, b, c = np.where(bad, ee, a), np.where(bad, ff, b), np.where(bad, gg, c)
+        a, b, c = np.where(bad, np.maximum(a, ee), a), np.where(bad, ff, b), np.where(bad, np.maximum(c, gg), c)
         determinant = np.maximum(a * c - b * b, 1e-300)
         step = -np.stack([c * gu - b * gv, a * gv - b * gu], axis=1) / determinant[:, None]
         new = np.clip(uv[left] + step, low - beyond, high + beyond)

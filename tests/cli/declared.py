@@ -41,10 +41,11 @@ def options(command: click.Command, without: Container[str] = COVERED_ELSEWHERE)
 
 
 _LEVEL = [(), ("--band", "0mm:8mm"), ("--base", "level", "--band", "0mm:8mm")]
-_OUT = "outputs format schema chord angle ascii_stl show view fit picture_size stripes before wipe section comb"
+_OUT = "outputs format schema chord angle ascii_stl scalar show view fit picture_size stripes before wipe section comb"
 _DONE = [
     ("-o", "out.step", "--schema", "AP242"),
     ("-o", "out.brep", "-o", "out.stl", "--chord", "1mm", "--angle", "30", "--ascii"),
+    ("-o", "out.vtp", "--chord", "1mm", "--scalar", "curvature:gauss", "--scalar", "roughness"),
     ("-o", "-", "--format", "iges"),
     ("-o", "out.png", "--picture-size", "64x48", "--show", "zebra", "--stripes", "10", "--view", "top", "--fit", "#1"),
     ("-o", "out.png", "--picture-size", "96x48", "--show", "treatment", "--section", "x=5mm", "--comb"),

@@ -29,7 +29,7 @@ def completed(*words):
 
 def test_commands_options_and_choices():
     assert completed("smo") == ["smooth"] and completed("feature", "") == ["extract", "list", "make"]
-    assert completed("smooth", "--sc") == ["--scale", "--schema"]
+    assert completed("smooth", "--sc") == ["--scale", "--schema", "--scalar"]
     assert completed("smooth", "--keep", "g") == ["g0", "g1", "g2"]
     assert completed("completion", "z") == ["zsh"]
 

@@ -144,6 +144,7 @@ WAYS = {
     "report_html": ("--report-html a.html",),
     "rotate": ("--rotate 40",),
     "sarif": ("--sarif a.sarif",),
+    "scalar": ("--scalar curvature", "-o a.ply --chord 1mm"),
     "scale": ("--scale 9mm",),
     "schema": ("--schema AP203",),
     "show": ("--show zebra", "-o a.png --picture-size 90x60"),

@@ -8,6 +8,8 @@ import pytest
 from PIL import Image
 
 from tests.cli.test_errors import one_line
+from tests.mesh.readers import arrays
+from tests.occ import shapes
 
 
 def test_a_picture_of_a_model(mracad, samples, tmp_path):
@@ -155,3 +157,42 @@ def test_options_without_an_output_for_them_are_refused(mracad, samples, tmp_pat
 def test_an_edit_refuses_a_picture_before_it_starts(mracad, samples, tmp_path):
     words = ("--scale", "25mm", "-o", tmp_path / "a.png", "--show", "zebras")
     one_line(mracad("smooth", samples / "panel.step", *words), 2)
+
+
+@pytest.mark.parametrize(
+    ("command", "words", "says"),
+    [
+        ("smooth", ["-o", "a.step", "--scalar", "deviation"], "no mesh is written; add an output in .3mf, .ply"),
+        ("smooth", ["-o", "a.ply", "-o", "a.stl", "--scalar", "deviation"], "STL holds no numbers at points; write"),
+        ("convert", ["-o", "a.obj", "--scalar", "curvature"], "OBJ holds no numbers at points; write .3mf, .ply"),
+        ("convert", ["-o", "a.ply", "--scalar", "deviation"], "write deviation:REF.step"),
+        ("convert", ["-o", "a.ply", "--scalar", "zebra"], "'zebra' has no numbers"),
+        ("convert", ["-o", "a.ply", "--scalar", "roughness:wide"], "scalar"),
+        ("convert", ["-o", "a.ply", "--scalar", "roughness", "--scalar", "roughness:2mm"], "asked for twice"),
+    ],
+)
+def test_numbers_at_points_without_a_mesh_for_them_are_refused(
+    mracad, samples, tmp_path, monkeypatch, command, words, says
+):
+    monkeypatch.chdir(tmp_path)
+    result = mracad(command, samples / "panel.step", *(["--scale", "25mm"] if command == "smooth" else []), *words)
+    one_line(result, 2)
+    assert says in result.err and not list(tmp_path.iterdir())
+
+
+def test_deviation_at_the_points_of_an_edit_is_from_the_input(mracad, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    x, y = np.meshgrid(np.linspace(0, 30, 8), np.linspace(0, 20, 8), indexing="ij")
+    shapes.save(shapes.face_on(shapes.bspline(np.stack([x, y, 0.01 * x * y], axis=-1))), tmp_path / "in.step")
+    words = ("offset", "in.step", "--distance", "0.1mm", "-o", "a.ply", "-o", "a.step", "--json", "--overwrite")
+    told = json.loads(mracad(*words, "--scalar", "deviation").out)
+    (legend,) = told["scalars"]["a.ply"]
+    values = arrays((tmp_path / "a.ply").read_bytes(), "ply")["deviation"]
+    assert (values.min(), values.max()) == pytest.approx((legend["lowest"], legend["highest"]), rel=1e-6)
+    assert np.median(values) == pytest.approx(0.1, abs=1e-3) and not told["scalars"]["a.step"]
+    said = mracad("convert", "a.step", "-o", "b.ply", "--scalar", "deviation:in.step").out
+    assert "deviation 0.1 to 0.1 mm" in said
+    assert arrays((tmp_path / "b.ply").read_bytes(), "ply")["deviation"] == pytest.approx(values, abs=1e-6)
+    assert mracad(*words, "--scalar", "deviation:b.step", "--depfile", "a.d").code == 3, "there is no such file"
+    assert mracad(*words, "--scalar", "deviation:in.step", "--depfile", "a.d").code == 0
+    assert (tmp_path / "a.d").read_text().startswith("a.ply a.step: in.step in.step\n")

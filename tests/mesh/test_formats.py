@@ -1,16 +1,22 @@
-"""Mesh formats, read back by trimesh: two instances of a pyramid, one mirrored, under names that are hostile."""
+"""Mesh formats, read back by trimesh and VTK: two pyramids of one part, one mirrored, under names that are hostile."""
 
+import base64
 import io
 import json
 import re
 import zipfile
+from dataclasses import replace
 
 import numpy as np
 import pytest
 import trimesh
 from lxml import etree
+from vtkmodules.util.numpy_support import vtk_to_numpy
+from vtkmodules.vtkCommonCore import vtkDataArray
 
 from mracad.mesh import Body, Node, Scene, write
+from mracad.mesh.scene import Legend, Places
+from tests.mesh import readers
 
 POINTS = np.array([[0, 0, 0], [3, 0, 0], [3, 3, 0], [0, 3, 0], [1.5, 1.5, 2]])
 CORNERS = np.array([[0, 2, 1], [0, 3, 2], [0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]])
@@ -30,24 +36,13 @@ def scene(closed=True):
     return Scene("pyramids.step", (body,), (Node("one", np.eye(4), 0), group))
 
 
-def loaded(format, **options):
-    return trimesh.load_scene(io.BytesIO(write(scene(), format)), file_type=format, **options)
-
-
 @pytest.mark.parametrize(
-    ("format", "unit", "options"),
-    [
-        ("stl", 1.0, {}),
-        ("3mf", 1.0, {}),
-        ("obj", 1.0, {}),
-        ("ply", 1.0, {}),
-        ("gltf", 1e-3, {"merge_primitives": True}),
-        ("glb", 1e-3, {"merge_primitives": True}),
-    ],
+    ("format", "unit"),
+    [("stl", 1.0), ("3mf", 1.0), ("obj", 1.0), ("ply", 1.0), ("gltf", 1e-3), ("glb", 1e-3), ("vtp", 1.0), ("vtu", 1.0)],
 )
-def test_closed_bodies_stay_closed_where_they_stand(format, unit, options):
-    found = loaded(format, **options)
-    mesh = found.to_mesh()
+@pytest.mark.parametrize("made", [scene, lambda: painted()], ids=["plain", "with numbers"])
+def test_closed_bodies_stay_closed_where_they_stand(format, unit, made):
+    mesh = readers.scene(write(made(), format), format).to_mesh()
     mesh.merge_vertices()
     assert len(mesh.faces) == 12 and mesh.is_watertight and mesh.is_winding_consistent
     assert mesh.volume == pytest.approx(2 * VOLUME * unit**3, rel=1e-6)
@@ -57,7 +52,71 @@ def test_closed_bodies_stay_closed_where_they_stand(format, unit, options):
     assert mesh.bounds == pytest.approx(np.array([low, high]), abs=1e-6 * unit)
 
 
-@pytest.mark.parametrize("format", ["stl", "3mf", "obj", "ply", "gltf", "glb"])
+def painted():
+    """The scene with the face's number as the number of its points, its colours shades of red, and a normal each."""
+    plain = scene()
+    (body,) = plain.bodies
+    corners = np.arange(18).reshape(6, 3)  # a place for each corner
+    face = np.repeat(FACES, 3)
+    normals = np.tile([0.0, 0.6, 0.8], (18, 1))
+    colours = np.stack([40 * face, 0 * face, 0 * face], axis=1).astype(np.uint8)
+    places = Places(CORNERS.ravel(), np.zeros((18, 2)), corners, {"height": 1.0 + face}, normals, colours)
+    legend = Legend("height", "height over all", "mm", -6.0, 6.0, 1.0, 5.0)
+    return Scene(plain.name, (replace(body, places=places),), plain.roots, (legend,))
+
+
+@pytest.mark.parametrize("format", ["ply", "glb", "gltf", "vtp", "vtu"])
+def test_numbers_at_points_differ_between_faces(format):
+    found = readers.arrays(write(painted(), format), format)["height"]
+    copies = 1 if format.startswith("gl") else 2
+    assert found.tolist() == np.tile(1.0 + np.repeat(FACES, 3), copies).tolist()
+
+
+@pytest.mark.parametrize("format", ["vtp", "vtu"])
+def test_vtk_files_have_units_normals_and_faces(format):
+    found = readers.vtk(write(painted(), format), format)
+    points, cells = found.GetPointData(), found.GetCellData()
+    assert points.GetScalars().GetName() == "height"
+    assert points.GetScalars().GetInformation().Get(vtkDataArray.UNITS_LABEL()) == "mm"
+    normals = vtk_to_numpy(points.GetNormals())
+    assert normals[0] == pytest.approx([0, 0.6, 0.8]) and normals[-1] == pytest.approx([0, 0.6, 0.8])
+    assert vtk_to_numpy(cells.GetArray("face")).tolist() == [5, 5, 6, 7, 8, 9] * 2
+    bare = readers.vtk(write(scene(), format), format)
+    assert bare.GetNumberOfPoints() == 10 and not bare.GetPointData().GetNumberOfArrays()
+    assert vtk_to_numpy(bare.GetCellData().GetArray("colour"))[4].tolist() == [0, 255, 0, 128]
+
+
+def test_3mf_colours_corners_of_a_closed_mesh():
+    model = zipfile.ZipFile(io.BytesIO(write(painted(), "3mf"))).read("3D/3dmodel.model")
+    root = etree.fromstring(model)
+    core, materials = root.nsmap[None], root.nsmap["m"]
+    shades = [each.get("color") for each in root.iter(f"{{{materials}}}color")]
+    corners = [[shades[int(t.get(p))] for p in ("p1", "p2", "p3")] for t in root.iter(f"{{{core}}}triangle")]
+    assert corners == [[f"#{40 * face:02X}0000"] * 3 for face in FACES]
+    assert len(list(root.iter(f"{{{core}}}vertex"))) == 5 and b'type="model"' in model
+    assert b"colours: height over all from -6 to 6 mm" in model
+
+
+def test_ply_and_gltf_have_colours_and_say_what_they_are():
+    data = write(painted(), "ply")
+    assert b"comment height: height over all, mm\ncomment colours: height over all from -6 to 6 mm\n" in data
+    table = readers.arrays(data, "ply")
+    assert table["red"][:18].tolist() == (40 * np.repeat(FACES, 3)).tolist()
+    assert table["nz"] == pytest.approx(0.8)
+    content = json.loads(write(painted(), "gltf"))
+    scalars = content["scenes"][0]["extras"]
+    assert scalars["scalars"] == {"_HEIGHT": {"title": "height over all", "unit": "mm"}}
+    attributes = content["meshes"][0]["primitives"][0]["attributes"]
+    assert set(attributes) == {"POSITION", "NORMAL", "COLOR_0", "_HEIGHT"}
+    accessor = content["accessors"][attributes["COLOR_0"]]
+    assert (accessor["type"], accessor["normalized"]) == ("VEC4", True)
+    view = content["bufferViews"][accessor["bufferView"]]
+    buffer = base64.b64decode(content["buffers"][0]["uri"].partition(",")[2])
+    light = np.frombuffer(buffer[view["byteOffset"] :], "<u2", 72).reshape(18, 4) / 65535
+    assert light[-1] == pytest.approx([((160 / 255 + 0.055) / 1.055) ** 2.4, 0, 0, 1], abs=1e-4), "linear, not sRGB"
+
+
+@pytest.mark.parametrize("format", ["stl", "3mf", "obj", "ply", "gltf", "glb", "vtp", "vtu"])
 def test_the_same_bytes(format):
     assert write(scene(), format) == write(scene(), format)
 

@@ -7,7 +7,6 @@ import sys
 
 import numpy as np
 import pytest
-import trimesh
 
 from mracad.errors import FileError
 from mracad.formats import FORMATS
@@ -16,6 +15,7 @@ from mracad.occ.files import read, write
 from mracad.occ.load import Text
 from mracad.occ.measure import mass
 from mracad.occ.view import view
+from tests.mesh.readers import scene
 
 EXACT = [name for name, format in FORMATS.items() if format.kind == "exact"]
 MESHES = [name for name, format in FORMATS.items() if format.kind == "mesh"]
@@ -77,10 +77,8 @@ def test_meshes_are_closed_and_fill_the_volume(samples, name):
     model, whole = view(document), mass(document)
     for format in MESHES:
         scale = 1e-3 if format in ("gltf", "glb") else 1.0
-        options = {"merge_primitives": True} if scale != 1.0 else {}
         data = written(document, format, chord=1e-3 * model.diagonal, angle=20.0)
-        scene = trimesh.load_scene(io.BytesIO(data), file_type=format, **options)
-        bodies = scene.dump()
+        bodies = scene(data, format).dump()
         for body in bodies:
             body.merge_vertices()
         assert all((np.unique(np.sort(b.edges, axis=1), axis=0, return_counts=True)[1] == 2).all() for b in bodies), (
@@ -97,8 +95,7 @@ def test_colours_transparency_and_the_tree_reach_the_mesh(samples):
     from tests.occ import shapes
 
     document = read(samples / "assembly.step")
-    scene = trimesh.load_scene(io.BytesIO(written(document, "glb")), file_type="glb", merge_primitives=True)
-    assert {"fixture", "base"} <= set(scene.graph.nodes)
+    assert {"fixture", "base"} <= set(scene(written(document, "glb"), "glb").graph.nodes)
     made = shapes.document(BRepPrimAPI_MakeBox(1, 2, 3).Shape())
     colour = Quantity_ColorRGBA(Quantity_Color(1.0, 0.5, 0.0, Quantity_TOC_sRGB), 0.25)
     tool = XCAFDoc_DocumentTool.ColorTool_s(made.xcaf.Main())

@@ -76,7 +76,8 @@ def test_a_closed_body_whose_mesh_is_open_is_told(monkeypatch):
     def torn(document, chord, angle):
         mesh = whole(document, chord, angle)
         keep = mesh.faces != 2
-        return replace(mesh, corners=mesh.corners[keep], faces=mesh.faces[keep], parts=mesh.parts[keep], missing=(2,))
+        some = {name: getattr(mesh, name)[keep] for name in ("corners", "own", "faces", "parts")}
+        return replace(mesh, **some, missing=(2,))
 
     assert scenes.scene(shapes.document(box))[2] == ()
     monkeypatch.setattr(scenes, "triangles", torn)

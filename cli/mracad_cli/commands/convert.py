@@ -1,9 +1,10 @@
-"""Write a model in another format: STEP, IGES, BREP, BinBREP, or as a mesh (STL, 3MF, OBJ, PLY, glTF)."""
+"""Write a model in another format: STEP, IGES, BREP, BinBREP, or as a mesh (STL, 3MF, OBJ, PLY, glTF, VTK)."""
 
 from __future__ import annotations
 
 import click
 
+from mracad.errors import UsageError
 from mracad_cli import options, running
 from mracad_cli.command import Command
 from mracad_cli.options import Reading, Writing
@@ -20,6 +21,8 @@ def command(reading: Reading, writing: Writing, as_json: bool) -> int:
     from mracad_cli.render import json, text
 
     start = time.perf_counter()
+    if any(show.kind == "deviation" and not show.of for show in writing.scalars.shows):
+        raise UsageError("scalar: deviation needs a file from which it is measured", "write deviation:REF.step")
     targets = check_outputs(writing)
     document, done = produced(reading, load(reading.file), writing, targets, ())
     found = text.found(done.made)

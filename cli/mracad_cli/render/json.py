@@ -19,7 +19,8 @@ if TYPE_CHECKING:
     from mracad.inspect.seams import SeamMeasure
     from mracad.job.document import Report
     from mracad.job.judge import Judged
-    from mracad.job.produce import Made, Production
+    from mracad.job.output import Made
+    from mracad.job.produce import Production
     from mracad.model.facts import Validity
     from mracad.seam.natural import Treatment
     from mracad.spec.recipe import Step
@@ -109,6 +110,7 @@ def written(made: Sequence[Made]) -> dict[str, Any]:
         "cut": {
             name: [{"face": cut.face + 1, "parts": cut.parts} for cut in one.written.cut] for name, one in each.items()
         },
+        "scalars": {name: [asdict(legend) for legend in one.written.legends] for name, one in each.items()},
         "read_back": {name: read_back(one.read_back) for name, one in each.items()},
     }
 

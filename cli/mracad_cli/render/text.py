@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from mracad.job.batch.run import Outcome
     from mracad.job.document import Report
     from mracad.job.judge import Judged
-    from mracad.job.produce import Made
+    from mracad.job.output import Made
     from mracad.seam.natural import Treatment
     from mracad.spec.recipe import Step
 
@@ -263,5 +263,6 @@ def batch_lines(outcomes: Sequence[Outcome], seconds: float) -> list[str]:
 
 
 def sizes(made: Sequence[Made]) -> str:
-    """The outputs: names, sizes, and the faces that are in parts."""
-    return ", ".join(", ".join([m.target.name, size(len(m.data)), *map(str, m.written.cut)]) for m in made)
+    """The outputs: names, sizes, the faces that are in parts, and numbers at points."""
+    each = (", ".join([m.target.name, size(len(m.data)), *map(str, m.written.cut)]) for m in made)
+    return ", ".join([*each, *dict.fromkeys(str(legend) for m in made for legend in m.written.legends)])

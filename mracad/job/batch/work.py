@@ -136,7 +136,8 @@ def do(work: Work) -> Product:
     MracadError
         When a step cannot be done, or the page cannot be made.
     """
-    from mracad.job.produce import Target, produce
+    from mracad.job.output import Target
+    from mracad.job.produce import produce
 
     start = time.perf_counter()
     for name, version in versions().items():
