@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from inspect import Parameter, Signature, cleandoc
 from typing import Any
 
@@ -15,15 +15,15 @@ from mracad.api.values import chosen, described, parameters
 from mracad.job.document import Report, play
 from mracad.output import put
 from mracad.spec.recipe import Step
-from mracad.spec.steps import STEPS, Selection
+from mracad.spec.steps import STEPS, Options, Selection
 
 PROGRESS = Parameter("progress", Parameter.KEYWORD_ONLY, default=None, annotation="Progress")
 DETAILS = Parameter("details", Parameter.KEYWORD_ONLY, default=None, annotation="Path | None")
 
 
-def edits() -> dict[str, type[Selection]]:
+def edits(steps: Mapping[str, type[Options]] = STEPS) -> dict[str, type[Selection]]:
     """The options of each edit, by the name of its function."""
-    return {use: struct for use, struct in STEPS.items() if issubclass(struct, Selection)}
+    return {use: struct for use, struct in steps.items() if issubclass(struct, Selection)}
 
 
 def signature(use: str) -> Signature:

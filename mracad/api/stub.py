@@ -12,6 +12,7 @@ from inspect import Parameter, Signature
 from mracad.api import looks
 from mracad.api.edits import edits, signature
 from mracad.api.write import write
+from mracad.spec.steps import OWN
 
 HEAD = '''"""Types of the public names of mracad; made by ``make docs`` from the structs of options."""
 
@@ -72,7 +73,7 @@ __version__: str
 def stub() -> str:
     """The content of the file."""
     lines = [HEAD]
-    for use in edits():
+    for use in edits(OWN):
         for given, returned in (("File", "Document"), ("Thing", "Thing")):
             first, *rest = signature(use).parameters.values()
             taken = Signature([first.replace(annotation=given), *rest], return_annotation=returned)

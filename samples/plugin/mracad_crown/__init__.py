@@ -1,0 +1,1 @@
+"""An edit of its own for mracad: faces that rise towards their middles."""
