@@ -29,8 +29,8 @@ GALLERY = (
     ("A document as it is", f"mracad render samples/assembly.step -o assembly.png {SMALL}"),
     (
         "Noise, seen in reflections: a panel as it comes, and as it should be",
-        "mracad render samples/panel_clean.step -o noise.png --before samples/panel.step --show zebra --stripes 60 "
-        "--view top --size 1200x450",
+        "mracad render samples/panel_clean.step -o noise.png --before samples/panel.step --wipe --show zebra "
+        "--stripes 60 --view top --size 900x600",
     ),
     (
         "What smoothing moved",
@@ -39,6 +39,16 @@ GALLERY = (
     (
         "Curvature of the surfaces themselves, not of triangles",
         f"mracad render samples/bottle.step -o curvature.png --show curvature:gauss {SMALL}",
+    ),
+    (
+        "Sections with their curvature as combs: noise of 0.02 mm that no eye sees on the surface",
+        "mracad render samples/panel.step -o comb.png --section x=150mm --section y=100mm --comb --view=-1,-2,2 "
+        "--size 900x500",
+    ),
+    (
+        "What an edit did: faces by outcome, edges that moved or stayed",
+        "mracad smooth samples/shell.step --scale 8mm --hold '#6' --faces '!#1' -o treatment.png --show treatment "
+        "--picture-size 900x500",
     ),
     (
         "The spectrum of a face: its heights by wavelength, the noise floor, where its shape begins",

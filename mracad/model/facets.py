@@ -19,6 +19,14 @@ Jet = tuple[Array, ...]
 """S, S_u, S_v and, of order 2, S_uu, S_uv, S_vv at points, each ``(q, 3)``, in the part's frame, mm."""
 
 
+def carried(jet: Jet, frame: Array) -> Jet:
+    """A jet in the frame to which a map ``(4, 4)`` leads."""
+    if (frame == np.eye(4)).all():
+        return jet
+    point, *slopes = (each @ frame[:3, :3].T for each in jet)
+    return point + frame[:3, 3], *slopes
+
+
 class Ground(Protocol):
     """The surface under a face, evaluated as it is."""
 
@@ -41,8 +49,7 @@ class Spline:
     frame: Array
 
     def jets(self, uv: Array, order: int) -> Jet:
-        point, *slopes = (each @ self.frame[:3, :3].T for each in self.net.evaluate(uv, order))
-        return point + self.frame[:3, 3], *slopes
+        return carried(self.net.evaluate(uv, order), self.frame)
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,8 +122,7 @@ class Swept:
             found = self.centre + arm, su, sv
             if more:
                 found = *found, cross(self.way, su), cross(self.way, sv), *more
-        s, *every = (each @ self.frame[:3, :3].T for each in found)
-        return s + self.frame[:3, 3], *every
+        return carried(found, self.frame)
 
     def _turned(self, vectors: Array, angle: Array) -> Array:
         """Vectors turned about the axis (Rodrigues)."""

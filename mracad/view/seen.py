@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from mracad.model.facets import Body, Facets, Placed
+from mracad.model.facets import Body, Facets, Placed, carried
 from mracad.view.camera import Camera
 from mracad.view.raster import Triangles, rasterised
 from mracad.view.runs import groups
@@ -21,7 +21,7 @@ FINE = 2
 
 _OFF = 2.0  # pixels: depths that differ by more within a pixel are two places of a face
 _TURN = 0.9  # cosine of the angle of a normal by which it turns when moved, beyond which the place is not moved
-_CLOSE, _STEP, _NEAR = 0.1, 8.0, 2.0  # pixels: nearer and farther places are not sought again; length of a step
+_CLOSE, _STEP, _NEAR = 0.25, 8.0, 2.0  # pixels: nearer and farther places are not sought again; length of a step
 _ROUNDS = 4
 
 
@@ -225,9 +225,8 @@ def _jet(stage: Stage, entry: tuple[Placed, int, Facets], which: Array, uv: Arra
         middle = stage.triangles.corners[which[some]].mean(axis=1).T
         return np.stack([stage.triangles.at(plane, which[some], *middle) for plane in (1, 2)], axis=1)
 
-    turned = steady(facets.ground, uv, order, inner) @ place.frame[:3, :3].T
-    turned[0] += place.frame[:3, 3]
-    return np.asarray(turned.swapaxes(1, 2))
+    jet = carried(tuple(steady(facets.ground, uv, order, inner)), place.frame)
+    return np.asarray(jet).swapaxes(1, 2)
 
 
 def _bent(camera: Camera, jets: Array, outward: Array, at: Array) -> tuple[Array, Array, Array, Array]:

@@ -76,7 +76,7 @@ def bends(shape: Array, outward: Array) -> Array:
 
 def dot(a: Array, b: Array) -> Array:
     """Scalar products of vectors ``(2 or 3, q)``."""
-    return np.asarray(sum(x * y for x, y in zip(a, b, strict=True)))
+    return np.asarray(np.einsum("iq,iq->q", a, b))
 
 
 def cross(a: Array, b: Array) -> Array:
