@@ -91,7 +91,8 @@ class Pen:
         self._ruler(box, 0, length / pixel, f"{length:g} mm")
         if comb:
             cut = f", cut at {comb.most:.3g}" if np.isfinite(comb.most) else ""
-            self._ruler(box, 1, comb.unit * comb.length / pixel, f"comb: {comb.unit:.3g} 1/mm{cut}")
+            said = f"{comb.unit:.3g} 1/mm{cut}" if comb.unit else "nothing bends"
+            self._ruler(box, 1, comb.unit * comb.length / pixel, f"comb: {said}")
 
     def _ruler(self, box: Box, row: int, length: float, text: str) -> None:
         unit = int(self.font.size)

@@ -176,7 +176,7 @@ class Comb:
     length : float
         Length of a tooth for a curvature of 1/mm, mm².
     unit : float
-        A round curvature, 1/mm.
+        A round curvature, 1/mm; 0 where nothing bends.
     most : float
         Larger curvatures are cut, 1/mm; infinite where there are none.
     """
@@ -191,13 +191,13 @@ class Comb:
         return np.asarray(self.length * bends * np.minimum(1.0, self.most / np.maximum(size, 1e-300)))
 
 
-def combed(found: Sequence[Curve], longest: float) -> Comb | None:
-    """A scale at which nearly all teeth are no longer than a length, mm; None where nothing bends."""
+def combed(found: Sequence[Curve], longest: float) -> Comb:
+    """A scale at which nearly all teeth are no longer than a length, mm."""
     every = np.concatenate([np.linalg.norm(curve.bends[curve.teeth], axis=1) for curve in found] or [np.empty(0)])
     reach = max((float(np.abs(curve.points).max()) for curve in found), default=0.0)
     every = np.sort(every[every * reach > _STRAIGHT])
     if not len(every):
-        return None
+        return Comb(0.0, 0.0, np.inf)
     usual = float(every[int(_SHARE * (len(every) - 1))])
     return Comb(longest / usual, rounded(0.5 * usual), _CUT * usual if every[-1] > _CUT * usual else np.inf)
 
