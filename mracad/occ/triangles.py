@@ -13,6 +13,7 @@ from OCP.TopLoc import TopLoc_Location
 from mracad.errors import UsageError
 from mracad.model.facts import Triangles
 from mracad.occ.document import Document
+from mracad.occ.geometry import basis, is_nurbs
 from mracad.occ.settings import quiet
 from mracad.occ.topology import box, compound, nodes
 
@@ -26,6 +27,7 @@ _ALGORITHMS = (
     IMeshTools_MeshAlgoType.IMeshTools_MeshAlgoType_Watson,
     IMeshTools_MeshAlgoType.IMeshTools_MeshAlgoType_Delabella,
 )
+_MANY = 5_000  # knot cells of a surface, beyond which the first takes minutes
 _WELD = 2e-7  # of a part's diagonal: about the resolution of 32-bit numbers
 
 
@@ -58,7 +60,7 @@ def triangles(document: Document, chord: float | None = None, angle: float | Non
         settings.Deflection = chord or _CHORD * size
         settings.Angle = float(np.radians(angle or _ANGLE))
         best: Triangles | None = None
-        for algorithm in _ALGORITHMS:
+        for algorithm in _ALGORITHMS[:: -1 if _cells(document) > _MANY else 1]:
             settings.MeshAlgo = algorithm
             BRepTools.Clean_s(whole)
             BRepMesh_IncrementalMesh(whole, settings)
@@ -70,6 +72,12 @@ def triangles(document: Document, chord: float | None = None, angle: float | Non
         BRepTools.Clean_s(whole)
     assert best is not None
     return best
+
+
+def _cells(document: Document) -> int:
+    """The largest number of knot cells of a surface."""
+    surfaces = (basis(BRep_Tool.Surface_s(face, TopLoc_Location())) for face in document.faces)
+    return max(((s.NbUKnots() - 1) * (s.NbVKnots() - 1) for s in surfaces if is_nurbs(s)), default=0)
 
 
 def _folds(mesh: Triangles) -> int:

@@ -56,10 +56,9 @@ def matched(nets: Mapping[int, Net], seams: Sequence[Seam]) -> dict[int, Net]:
         for seam in seams:
             a, b = (_inner(_along(result[border.surface], border), border) for border in (seam.a, seam.b))
             for border, own, other in ((seam.a, a, b), (seam.b, b, a)):
-                for share, count in other.items():
-                    have = max((n for x, n in own.items() if abs(x - share) <= SAME), default=0)
-                    at = border.start + share * (border.stop - border.start)
-                    wanted[border.surface][1 - border.axis].extend([_near(result, border, at)] * (count - have))
+                share = np.array([*other], float)
+                missing = np.maximum(np.array([*other.values()], int) - _counts(own, share), 0)
+                wanted[border.surface][1 - border.axis].extend(_near(result, border, np.repeat(share, missing)))
         if not any(u or v for u, v in wanted.values()):
             break
         for i, new in wanted.items():
@@ -80,9 +79,9 @@ def doubled(nets: Mapping[int, Net], seams: Sequence[Seam]) -> dict[int, Net]:
             for border in (seam.a, seam.b):
                 net = result[border.surface]
                 if _along(net, border).degree > 1:
-                    more = _double(_inner(_along(net, border), border), seam.joint.pieces)
-                    places = [_near(result, border, border.start + x * (border.stop - border.start)) for x in more]
-                    result[border.surface] = net.refined(*(np.array(places), [])[:: 1 if border.axis else -1])
+                    more = np.array([*_double(_inner(_along(net, border), border), seam.joint.pieces)])
+                    places = _near(result, border, more)
+                    result[border.surface] = net.refined(*(places, [])[:: 1 if border.axis else -1])
     return result
 
 
@@ -120,14 +119,21 @@ def _inner(knots: KnotVector, border: Border) -> dict[float, int]:
     return {float(x): int(n) for x, n in zip(share[order], counts[order], strict=True) if SAME < x < 1 - SAME}
 
 
-def _near(nets: Mapping[int, Net], border: Border, at: float) -> float:
-    """The knot of the border that equals ``at`` to rounding, or ``at`` itself."""
+def _counts(inner: Mapping[float, int], share: Array) -> Array:
+    """Multiplicities of the knots of a side at fractions; 0 where it has none."""
+    have, counts = (np.array([*each, 0.0]) for each in (inner.keys(), inner.values()))
+    index = np.abs(have[:-1, None] - share).argmin(axis=0) if inner else np.full(len(share), -1)
+    return np.where(np.abs(have[index] - share) <= SAME, counts[index], 0).astype(int)
+
+
+def _near(nets: Mapping[int, Net], border: Border, share: Array) -> Array:
+    """Parameters at fractions of a border: knots where they equal these to rounding."""
     knots = _along(nets[border.surface], border)
-    breaks = knots.breaks
-    if knots.periodic:
-        at = float(knots.wrap(np.array([at]))[0])
-    nearest = float(breaks[np.argmin(np.abs(breaks - at))])
-    return nearest if abs(nearest - at) <= SAME * abs(border.stop - border.start) else at
+    at = knots.wrap(border.start + share * (border.stop - border.start))
+    place = np.clip(np.searchsorted(knots.breaks, at), 1, knots.spans)
+    low, high = knots.breaks[place - 1], knots.breaks[place]
+    nearest = np.where(at - low <= high - at, low, high)
+    return np.where(np.abs(nearest - at) <= SAME * abs(border.stop - border.start), nearest, at)
 
 
 def _most(values: Iterable[float], apart: float) -> Array:
