@@ -59,9 +59,9 @@ bench: $(VENV)/dev
 	$(BIN)/python benchmarks/features.py
 	$(BIN)/python benchmarks/seams.py
 
-# Dimples all over a ball of six patches: minutes and gigabytes, most of them for seams
+# 5 000 dimples all over a ball of six patches, to a closed mesh
 bench-fill: $(VENV)/dev
-	$(BIN)/python benchmarks/fill.py 300
+	$(BIN)/python benchmarks/fill.py
 
 # Batches: what workers gain, kills, a lost cluster worker; some minutes
 bench-batch: $(VENV)/dev

@@ -27,7 +27,7 @@ _ALGORITHMS = (
     IMeshTools_MeshAlgoType.IMeshTools_MeshAlgoType_Watson,
     IMeshTools_MeshAlgoType.IMeshTools_MeshAlgoType_Delabella,
 )
-_MANY = 5_000  # knot cells of a surface, beyond which the first takes minutes
+_MANY = 5_000  # knot cells of a surface, beyond which the first is slow: it takes the square of their number
 _WELD = 2e-7  # of a part's diagonal: about the resolution of 32-bit numbers
 
 

@@ -7,14 +7,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox, BRepPrimAPI_MakeSphere
+from OCP.IMeshTools import IMeshTools_MeshAlgoType_Delabella, IMeshTools_MeshAlgoType_Watson
 
+from mracad.bspline.knots import KnotVector
+from mracad.bspline.surface import Net
 from mracad.errors import FileError, UsageError
 from mracad.inspect import accept
 from mracad.occ import scene as scenes
+from mracad.occ import triangles as triangulation
 from mracad.occ.files import Lost, write
 from mracad.occ.select import select_cq
 from mracad.occ.step import read_step
 from mracad.occ.view import view
+from tests.edit.feature import grounds
 from tests.occ import shapes
 
 
@@ -58,6 +63,22 @@ def test_finer_settings_give_more_triangles_and_text_says_the_same(tmp_path):
     write(document, tmp_path / "text.stl", ascii=True)
     text = (tmp_path / "text.stl").read_text()
     assert text.startswith("solid mracad\n") and text.count("facet normal") == sizes[3]
+
+
+def test_faces_of_many_knots_are_meshed_by_the_algorithm_that_suits_them(monkeypatch):
+    """The kernel's default takes the square of their number."""
+    used = []
+    mesh = triangulation.BRepMesh_IncrementalMesh
+    monkeypatch.setattr(
+        triangulation, "BRepMesh_IncrementalMesh", lambda shape, how: (used.append(how.MeshAlgo), mesh(shape, how))
+    )
+    for spans in (10, 80):
+        k = KnotVector.clamped(np.linspace(0.0, 1.0, spans + 1), 3)
+        x, y = np.meshgrid(k.greville(), k.greville(), indexing="ij")
+        found = triangulation.triangles(grounds.sewn([Net(k, k, np.stack([x, y, x * y], axis=-1))]))
+        area = np.linalg.norm(np.cross(*np.diff(found.points[found.corners], axis=1).swapaxes(0, 1)), axis=1).sum() / 2
+        assert area == pytest.approx(1.281, abs=2e-3)
+    assert used == [IMeshTools_MeshAlgoType_Watson, IMeshTools_MeshAlgoType_Delabella]
 
 
 def test_a_face_that_cannot_be_meshed_is_named(tmp_path):
