@@ -39,6 +39,7 @@ def test_pairs_of_options(command, mracad, small, tmp_path, monkeypatch, pytestc
     monkeypatch.setattr("mracad.job.batch.pool.Pool", declared.Here)
     for name, value in (("SIZE", "96x64"), ("PAIR", "96x64"), ("ALONE", {})):
         monkeypatch.setattr(f"mracad.report.figures.{name}", value)
+    monkeypatch.setattr("mracad.report.shades.SAMPLES", 100)
     codes = Counter()
     for number, words in enumerate(rows(command, small, pytestconfig.getoption("--long"))):
         folder = tmp_path / str(number)

@@ -25,6 +25,7 @@ def test_a_model_is_compared_with_a_reference(mracad, samples, tmp_path, small_p
 def small_pictures(monkeypatch):
     for name in ("SIZE", "PAIR"):
         monkeypatch.setattr(f"mracad.report.figures.{name}", "96x64")
+    monkeypatch.setattr("mracad.report.shades.SAMPLES", 500)
 
 
 def agree(table, records):

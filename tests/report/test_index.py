@@ -47,6 +47,7 @@ def batched(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         for name in ("SIZE", "PAIR"):
             patch.setattr(f"mracad.report.figures.{name}", "96x64")
+        patch.setattr("mracad.report.shades.SAMPLES", 5000)
         face = shapes.face_on(shapes.bspline(shapes.wavy_poles(14, 12)))
         package.write(shapes.document(face, names={0: HOSTILE}), folder / "in" / NAMES[0])
         (folder / "in" / NAMES[1]).write_bytes((folder / "in" / NAMES[0]).read_bytes())
