@@ -619,4 +619,5 @@ def write(
     chord: str | float = "0.02%",
     angle: float | None = None,
     ascii: bool = False,
+    scalar: str | Sequence[str] = (),
 ) -> Written: ...

@@ -64,7 +64,7 @@ class Document(kernel.Document):
         chord: str | float = "0.02%",
         angle: float | None = None,
         ascii: bool = False,
-        scalar: Sequence[str] = (),
+        scalar: str | Sequence[str] = (),
     ) -> Written:
         """Write a file, whole or not at all; the same as :func:`mracad.write`.
 
@@ -74,12 +74,20 @@ class Document(kernel.Document):
         ``"roughness:10mm"``, and the colours of the first.
         """
         with speaking():
-            name, numbers = _name(self, target), Scalars(scalar=tuple(scalar))
-            wanted = Target(name, _format(target, format), schema, str(chord), angle, ascii, scalars=numbers)
+            name, format = _name(self, target), _format(target, format)
+            numbers = Scalars(scalar=(scalar,) if isinstance(scalar, str) else tuple(scalar))
+            if numbers.scalar and not FORMATS[format].scalars:
+                known = ", ".join(name for name, each in FORMATS.items() if each.scalars)
+                raise UsageError(f"scalar: {format.upper()} holds no numbers at points", f"write {known}")
+            wanted = Target(name, format, schema, str(chord), angle, ascii, scalars=numbers)
             return self._write(wanted, target)
 
+    def original(self) -> kernel.Document:
+        """The document as it was before all edits."""
+        return self.origin() if self.origin else self
+
     def _write(self, wanted: Target, target: str | os.PathLike[str] | BinaryIO) -> Written:
-        made = produce(self, self.origin or (lambda: self), self.steps, [wanted], done=self.reports)
+        made = produce(self, self.original, self.steps, [wanted], done=self.reports)
         if made.document is not self:
             self.changed()
             vars(self).update(vars(made.document))

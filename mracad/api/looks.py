@@ -13,6 +13,7 @@ from mracad.api.progress import Progress, shown
 from mracad.api.speech import speaking
 from mracad.api.things import Source, opened
 from mracad.api.values import chosen, described, parameters
+from mracad.errors import UsageError
 from mracad.spec.pictures import Picture
 from mracad.spec.places import spot
 from mracad.spec.steps import Check, Compare, Options, Selection
@@ -135,6 +136,8 @@ def render(thing: Any, given: dict[str, Any], tell: Function) -> Rendered:
     Parameters
     ----------
     thing : path, binary stream, Document or shape
+        Of a Document that edits have made, ``deviation`` alone is from the input, and ``treatment`` shows what became
+        of its faces.
     {options}
     progress : callable or bool, optional
         As for edits.
@@ -142,8 +145,7 @@ def render(thing: Any, given: dict[str, Any], tell: Function) -> Rendered:
     Returns
     -------
     Rendered
-        ``data`` is the PNG; ``lowest`` and ``highest`` are the extreme numbers of a map, in its ``unit``.  A notebook
-        shows it.
+        ``data`` is the PNG; ``lowest`` and ``highest`` are the extreme numbers of a map, in its ``unit``.
 
     Raises
     ------
@@ -158,20 +160,21 @@ def render(thing: Any, given: dict[str, Any], tell: Function) -> Rendered:
     >>> picture.unit, picture.data[1:4]
     ('1/mm²', b'PNG')
     """
-    from mracad.occ.files import read
+    from mracad.job.output import drawn
     from mracad.spec.pictures import show_of
-    from mracad.view.picture import render
 
     whole = opened(thing, change=False)
-    wanted = chosen(Picture, given, whole)
+    document, wanted = whole.document, chosen(Picture, given, whole)
     show = show_of(wanted.show)
+    if not document.reports:
+        if show.kind == "deviation" and not show.of:
+            raise UsageError("show: deviation needs a file from which it is measured", "write deviation:REF.step")
+        if show.kind == "treatment":
+            raise UsageError("show: treatment is what an edit did", "give a Document that an edit returned")
+        if wanted.wipe and not wanted.before:
+            raise UsageError("wipe: there is no other model", "add --before REF.step")
     tell("drawing", 0, 1)
-    return render(
-        whole.document,
-        wanted,
-        before=read(wanted.before) if wanted.before else None,
-        reference=read(show.of) if show.kind == "deviation" and show.of else None,
-    )
+    return drawn(document, wanted, document.original, list(zip(document.steps, document.reports, strict=True)))
 
 
 @_declared(Selection, THING, without=("instance", "hold", "keep", "edges"))

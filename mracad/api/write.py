@@ -3,23 +3,18 @@
 from __future__ import annotations
 
 import os
-from typing import BinaryIO
+from inspect import Parameter, signature
+from typing import Any, BinaryIO, TypeAlias
 
+from mracad.api.document import Document
 from mracad.api.speech import speaking
 from mracad.api.things import Source, opened
 from mracad.occ.files import Written
 
+Target: TypeAlias = str | os.PathLike[str] | BinaryIO
 
-def write(
-    thing: Source,
-    target: str | os.PathLike[str] | BinaryIO,
-    *,
-    format: str = "",
-    schema: str = "",
-    chord: str | float = "0.02%",
-    angle: float | None = None,
-    ascii: bool = False,
-) -> Written:
+
+def write(thing: Source, target: Target, **how: Any) -> Written:
     """Write a model, whole or not at all; the same bytes every time.
 
     An exact file is read back and judged, as on the command line.  Faces that would make it worse stay as they were
@@ -40,6 +35,9 @@ def write(
         Meshes: largest angle between triangles, degrees.
     ascii : bool
         STL: write text.
+    scalar : str or sequence of str
+        Meshes: numbers at their points, ``"curvature:mean"``, ``"deviation"`` (from the input of edits),
+        ``"roughness:10mm"``, ...; the first gives the colours.
 
     Returns
     -------
@@ -64,4 +62,13 @@ def write(
     """
     with speaking():
         document = opened(thing, change=False).document
-    return document.write(target, format=format, schema=schema, chord=chord, angle=angle, ascii=ascii)
+    return document.write(target, **how)
+
+
+_OF_DOCUMENT = signature(Document.write)
+vars(write)["__signature__"] = _OF_DOCUMENT.replace(
+    parameters=[
+        Parameter("thing", Parameter.POSITIONAL_OR_KEYWORD, annotation="Source"),
+        *list(_OF_DOCUMENT.parameters.values())[1:],
+    ]
+)

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from mracad.occ.document import Document
     from mracad.occ.files import Written
     from mracad.spec.recipe import Step
+    from mracad.view.picture import Rendered
 
 
 @dataclass(frozen=True)
@@ -91,22 +92,34 @@ def pictured(
     original: Original,
     done: Sequence[tuple[Step, Report | Judged]] = (),
 ) -> Made:
+    """A picture of a document after its steps as an output; see :func:`drawn`."""
+    from mracad.occ.files import Written
+
+    return Made(target, drawn(document, target.picture, original, done, target.format).data, Written())
+
+
+def drawn(
+    document: Document,
+    picture: Picture,
+    original: Original,
+    done: Sequence[tuple[Step, Report | Judged]] = (),
+    format: str = "png",
+) -> Rendered:
     """A picture of a document after its steps; what it is compared with is the document as it was, unless a file is
     named, and what was done to it is what the last edit did."""
     from mracad.job import treated
-    from mracad.occ.files import Written, read
+    from mracad.occ.files import read
     from mracad.spec.pictures import show_of
     from mracad.view.picture import render
 
-    picture, show = target.picture, show_of(target.picture.show)
+    show = show_of(picture.show)
     before = read(picture.before) if picture.before else original() if picture.wipe else None
     reference = _reference([show], original)
     told = rings = None
     for step, result in done:
         if isinstance(result, Report) and isinstance(step.options, Selection):
             told, rings = treated.told(result, step.options), treated.rings(result)
-    shown = render(document, picture, before=before, reference=reference, told=told, rings=rings, format=target.format)
-    return Made(target, shown.data, Written())
+    return render(document, picture, before=before, reference=reference, told=told, rings=rings, format=format)
 
 
 def _reference(shows: Sequence[Show], original: Original) -> Document | None:

@@ -37,7 +37,7 @@ def texts():
                 for part in node.values if isinstance(node, ast.JoinedStr) else [node]:
                     text = part.value if isinstance(part, ast.Constant) and isinstance(part.value, str) else ""
                     said += text or ("scale" if said.endswith("--") else "7" if said else "")
-                if re.search(r"--(?!help|all)[a-z]", said) and "\n" not in said:
+                if re.search(r"--(?!help|all)[a-z]", said) and "\n" not in said and not said.startswith("mracad "):
                     yield said
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import sys
 import warnings
 from glob import glob
-from pathlib import Path
 
 from mracad.spec.steps.base import Selection
 
@@ -34,4 +33,8 @@ def plugged() -> dict[str, type[Selection]]:
 def _any() -> bool:
     """Whether a package has such entry points."""
     files = (file for folder in sys.path for file in glob(f"{folder or '.'}/*.*-info/entry_points.txt"))
-    return any(f"[{GROUP}]" in Path(file).read_text(errors="replace") for file in files)
+    for file in files:
+        with open(file, errors="replace") as stream:
+            if f"[{GROUP}]" in stream.read():
+                return True
+    return False
