@@ -177,10 +177,11 @@ def rows(
     from scipy.sparse import csr_array
 
     first, total = laid_out(nets)
+    implied = _implied(seams)
     spaces = coarse or {i: (net.u, net.v) for i, net in nets.items()}
     entries: list[tuple[Array, Array, Array]] = [(np.empty(0, int), np.empty(0, int), np.empty(0))]
     count, mended = 0, [np.empty(0, bool)]
-    for seam in seams:
+    for number, seam in enumerate(seams):
         for order in range(seam.joint.order + 1):
             knots = _asked(spaces, seam, order if everywhere else 0)
             share = knots.greville()
@@ -188,11 +189,42 @@ def rows(
             column = np.concatenate([begin + index for (index, _), begin in sides], axis=1)
             value = np.concatenate(_terms(seam.joint, order, share, knots.breaks, sides), axis=1)
             row, column, value = _plain(knots, column, value)
+            if order == 1:
+                asked = ~np.isin(row, [len(share) - 1 if end else 0 for k, end in implied if k == number])
+                row, column, value = row[asked], column[asked], value[asked]
             entries.append((count + row, column, value))
             mended.append(np.full(len(share), (seam.joint.close, seam.joint.fit, False)[order]))
             count += len(share)
     row, column, value = (np.concatenate(part) for part in zip(*entries, strict=True))
     return csr_array((value, (row, column)), shape=(count, total)), np.concatenate(mended)
+
+
+def _implied(seams: Sequence[Seam]) -> list[tuple[int, int]]:
+    """Ends of seams (number, 0 or 1) at which the condition of first order follows from those of other seams.
+
+    All round a corner, the tangents of n seams are combinations of two, so that n − 2 of the n conditions, one after
+    another, imply the rest.  Laws that are only close contradict each other a little, and the corner could not tilt.
+    """
+    corners: dict[tuple[int, float, float], list[tuple[int, int]]] = {}
+    for number, seam in enumerate(seams):
+        if seam.joint.pieces:
+            for border in (seam.a, seam.b):
+                for end, (u, v) in enumerate(border.places(np.array([0.0, 1.0])).tolist()):
+                    corners.setdefault((border.surface, u, v), []).append((number, end))
+    beside: dict[tuple[int, int], list[tuple[int, int]]] = {}
+    for one, other in (ends for ends in corners.values() if len(ends) == 2):
+        beside.setdefault(one, []).append(other)
+        beside.setdefault(other, []).append(one)
+    found: list[tuple[int, int]] = []
+    seen: set[tuple[int, int]] = set()
+    for start in beside:
+        around = [start]
+        while start not in seen and (ahead := [each for each in beside[around[-1]] if each not in around]):
+            around.append(ahead[0])
+        if start not in seen and len(around) > 2 and start in beside[around[-1]]:
+            found += around[:2]
+        seen.update(around)
+    return found
 
 
 def _plain(knots: KnotVector, column: Array, value: Array) -> tuple[Array, Array, Array]:

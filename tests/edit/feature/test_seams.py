@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
 
+from mracad.bspline.fit import interpolated
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
 from mracad.edit.feature.edits import repeat
@@ -175,3 +176,21 @@ def test_copies_cross_the_seams_and_corners_of_a_ball(feature, way, faces):
         wanted = bump(far, 0.2 * HEIGHT, 0.25 * SIGMA)
         moved = np.linalg.norm(two.net.evaluate(uv), axis=1) - np.linalg.norm(points, axis=1)
         assert np.abs(moved - wanted).max() <= 5e-3 * 0.2 * HEIGHT
+
+
+def test_a_copy_tilts_a_corner_at_which_the_laws_of_three_seams_all_but_agree(feature):
+    """Splines through a warped ball, a micron off it: what three seams asked of a corner would hold it as it was."""
+
+    def warped(p):
+        x, y, z = np.moveaxis(np.asarray(p), -1, 0) / BALL
+        return BALL * np.stack([x + 0.15 * x * z + 0.1 * y * y, 1.1 * y + 0.1 * x * x, 0.9 * z + 0.12 * x * y], axis=-1)
+
+    nets = grounds.ball(BALL, 24)
+    k = nets[0].u
+    points = [warped(net.grid(k.greville(), k.greville())) for net in nets]
+    model = view(grounds.sewn([Net(k, k, interpolated(k, k, each)) for each in points]))
+    place = warped(on_ball((1, -0.95, 0.85)))
+    edit = repeat(model, Repeat(feature=feature, at=(",".join(map(repr, place.tolist())),), size=0.25, height=0.2))
+    (copy,) = edit.copies
+    assert [t.how for t in edit.edges if t.how != "frozen"] == ["to tolerance"] * 3 and len(copy.faces) == 3
+    assert copy.deviation <= 2e-3 * 0.2 * HEIGHT
