@@ -57,21 +57,21 @@ def read_silently(reading: Reading, text: Text) -> Document:
     return read_file(text, reading.input_unit, reading.encoding)
 
 
-def check_outputs(writing: Writing, beside: Iterable[str | None] = (), *, needed: bool = True) -> list[Target]:
+def check_outputs(writing: Writing, beside: Collection[str | None] = (), *, dry: bool = False) -> list[Target]:
     """The outputs to write; refuses outputs, and files ``beside`` them, that could not be written.
 
     Raises
     ------
     UsageError
-        When none is named although one is ``needed``, a file is named twice or exists, or options are given for
-        formats in which nothing is written.
+        When none is named, or an output exists, except for a ``dry`` run; when a file is named twice, one beside them
+        exists, or options are given for formats in which nothing is written.
     FileError
         For an unknown file extension, or a folder that cannot be written to.
     """
     from mracad.job.output import Target
 
     paths = writing.outputs
-    if needed and not paths:
+    if not (dry or paths):
         raise UsageError("no output is named", "name a file with -o OUT.step, or - for standard output")
     if paths.count("-") > 1:
         raise UsageError("- is named twice", "give each -o once")
@@ -80,7 +80,9 @@ def check_outputs(writing: Writing, beside: Iterable[str | None] = (), *, needed
     if writing.scalars.scalar:
         _check_scalars(formats.values())
     files = [path for path in paths if path != "-"]
-    check_reports(*files, *beside, overwrite=writing.overwrite or writing.if_changed)
+    replaces = writing.overwrite or writing.if_changed
+    check_reports(*files, *beside, overwrite=replaces or dry)
+    check_reports(*beside, overwrite=replaces)
     mesh = writing.chord, writing.angle, writing.ascii_stl
     how = (writing.schema or "").upper(), *mesh, writing.picture, writing.scalars
     return [

@@ -75,7 +75,7 @@ def run_steps(
     places = [f"{path}.toml" for path in writing.outputs if editing.record and path != "-"]
     check_page(editing.report_html)
     others = (editing.report, editing.report_html, editing.depfile, *places, *beside)
-    targets = check_outputs(writing, others, needed=not editing.dry_run)
+    targets = check_outputs(writing, others, dry=editing.dry_run)
     records = {place: record_of(steps, place) for place in places}
     text = load(reading.file)
     document, done = produced(reading, text, writing, [] if editing.dry_run else targets, steps)

@@ -57,8 +57,8 @@ class Mesh:
     shades: Shades | None = None
 
 
-def mesh(document: Document, names: Mapping[int, str], reference: Document | None = None) -> Mesh:
-    """The mesh of a document.
+def mesh(document: Document, names: Mapping[int, str], reference: Document | None = None) -> Mesh | None:
+    """The mesh of a document; None where even the coarsest has more triangles than a browser should be given.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ def mesh(document: Document, names: Mapping[int, str], reference: Document | Non
     Raises
     ------
     FileError
-        When nothing can be meshed, or only in more triangles than a browser should be given.
+        When nothing can be meshed.
     """
     chord, angle = CHORD, ANGLE
     for _ in range(_TRIES):
@@ -84,7 +84,7 @@ def mesh(document: Document, names: Mapping[int, str], reference: Document | Non
             shown = shades(body, sorted(body.facets), other) if other and other.facets else None
             return replace(_packed(body, names, count, chord * body.diagonal), shades=shown)
         chord, angle = chord * _COARSER, min(angle * _COARSER, 90.0)
-    raise FileError(f"'{document.name}' has too many faces to turn in a browser: {count} triangles", "take fewer parts")
+    return None
 
 
 def _packed(body: Body, names: Mapping[int, str], count: int, chord: float) -> Mesh:

@@ -87,8 +87,8 @@ class Page:
     verdicts : sequence of Verdict
     still : Figure
         The model where it cannot be turned, and on paper.
-    mesh : Mesh
-        The model to turn.
+    mesh : Mesh or None
+        The model to turn; None if it has too many faces for that.
     figures : sequence of Figure
     tables : sequence of Table
     reference : str
@@ -103,7 +103,7 @@ class Page:
     lines: Sequence[str]
     verdicts: Sequence[Verdict]
     still: Figure
-    mesh: Mesh
+    mesh: Mesh | None
     figures: Sequence[Figure] = ()
     tables: Sequence[Table] = ()
     reference: str = ""
@@ -112,11 +112,12 @@ class Page:
 
 def html(page: Page) -> bytes:
     """A page as one HTML file that needs nothing else; the same bytes for the same content."""
+    mesh = page.mesh
     return rendered(
         "page.html",
         page,
-        mesh=_base64(page.mesh.data),
-        shades=_base64(page.mesh.shades.data) if page.mesh.shades else "",
+        mesh=_base64(mesh.data) if mesh else "",
+        shades=_base64(mesh.shades.data) if mesh and mesh.shades else "",
         three=_base64(_three()),
         model=_data("model.js"),
         licence=_data("three.LICENSE"),

@@ -106,6 +106,10 @@ def test_dry_run_writes_only_the_report(mracad, samples, tmp_path):
     result = mracad("smooth", samples / "panel.step", "--scale", "16mm", "--dry-run", "-o", out, "--report", report)
     assert result.code == 0 and "dry run, nothing written" in result.out
     assert report.exists() and not out.exists()
+    out.touch()
+    words = ["smooth", samples / "panel.step", "--scale", "16mm", "--dry-run", "-o", out]
+    assert mracad(*words).code == 0 and not out.read_bytes()
+    assert mracad(*words, "--report", report).code == 2
 
 
 def test_the_report_says_everything(mracad, samples, tmp_path):

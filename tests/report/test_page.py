@@ -14,6 +14,7 @@ from OCP.BRepPrimAPI import BRepPrimAPI_MakeSphere
 
 from mracad.report import mesh as meshes
 from mracad.report.mesh import mesh
+from mracad.report.page import Figure, Page, html
 from mracad.report.table import MOST, Column, Table
 from tests.occ import shapes
 from tests.report.conftest import HOSTILE
@@ -157,6 +158,16 @@ def test_large_models_get_coarser_triangles(monkeypatch):
     monkeypatch.setattr(meshes, "MOST", fine.triangles // 2)
     coarse = mesh(document, {})
     assert coarse.triangles <= fine.triangles // 2 and coarse.chord > fine.chord
+
+
+def test_a_page_without_a_model_to_turn_says_so(monkeypatch):
+    document = shapes.document(BRepPrimAPI_MakeSphere(10.0).Shape())
+    monkeypatch.setattr(meshes, "MOST", 1)
+    assert mesh(document, {}) is None
+    page = Page("ball", "Report", (), (), (), Figure("The ball", b"picture"), None)
+    found = Read(html(page).decode())
+    assert "too many faces to turn" in " ".join(found.texts)
+    assert not {given.get("id") for given, _ in found.scripts} & {"head", "mesh", "three"}
 
 
 def test_long_tables_end_and_say_so():

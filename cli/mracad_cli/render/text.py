@@ -238,11 +238,12 @@ def seam_line(new: SeamSummary, old: SeamSummary | None = None) -> str:
 
 
 def verdict_lines(found: Verdict, failed: Sequence[Layer]) -> list[str]:
-    """A verdict, layer by layer."""
+    """A verdict, layer by layer; what was found without being asked to fail is noted."""
     width = max(len(layer.name) for layer in found.layers)
     lines = [f"{found.subject}: valid: {verdict(found.valid)}"]
     for layer in found.layers:
-        lines.append(f"{layer.name.ljust(width)}  {layer.status.ljust(7)}  {layer.text}".rstrip())
+        status = "noted" if layer.status == "fail" and layer not in failed else layer.status
+        lines.append(f"{layer.name.ljust(width)}  {status.ljust(7)}  {layer.text}".rstrip())
         lines += [f"  {placed(finding)}" for finding in layer.findings[:FINDINGS]]
         if len(layer.findings) > FINDINGS:
             lines.append(f"  and {len(layer.findings) - FINDINGS} more")
