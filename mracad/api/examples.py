@@ -14,9 +14,9 @@ EXAMPLES = {
 ['edited']
 """,
     "offset": """
->>> grown = mracad.offset("panel.step", distance=0.5)
+>>> grown = mracad.offset("assembly.step", distance=0.5, refine="never")
 >>> len(mracad.report_of(grown).edit.faces("edited"))
-6
+1
 """,
     "equalize": """
 >>> weaker = mracad.equalize("assembly.step", band="2mm:10mm=0.5")
@@ -42,7 +42,7 @@ EXAMPLES = {
 True
 """,
     "move": """
->>> moved = mracad.move("shell.step", feature="near:90,-2,39,radius:20", to="#1@32,35")
+>>> moved = mracad.move("assembly.step", feature="near:15,12,9,radius:3", to="#7@35,12")
 >>> len(mracad.report_of(moved).edit.copies)
 1
 """,
@@ -52,8 +52,8 @@ True
 2
 """,
     "transfer": """
->>> rough = mracad.transfer("panel.step", source="assembly.step", from_="#7", to="#1", band=":3mm")
+>>> rough = mracad.transfer("assembly.step", source="assembly.step", map="place", band=":3mm")
 >>> [each.face for each in mracad.report_of(rough).edit.faces("edited")]
-[0]
+[6]
 """,
 }

@@ -181,12 +181,12 @@ def test_a_document_is_not_changed_and_its_copy_has_the_same_bits(samples):
 def test_pictures_and_meshes_of_a_result_know_what_was_done(samples, tmp_path):
     fair = mracad.smooth(samples / "assembly.step", scale=10)
     off = mracad.report_of(fair).deviations[0].largest
-    drawn = mracad.render(fair, show="deviation", view="top", size="300x200")
-    assert max(drawn.highest, -drawn.lowest) > 0.5 * off and mracad.render(fair, show="treatment", size="300x200").data
+    drawn = mracad.render(fair, show="deviation", view="top", size="150x100")
+    assert max(drawn.highest, -drawn.lowest) > 0.5 * off and mracad.render(fair, show="treatment", size="60x40").data
     for show in ("deviation", "treatment"):
         with pytest.raises(UsageError, match=f"show: {show}"):
             mracad.render(samples / "assembly.step", show=show)
-    mracad.write(fair, tmp_path / "fair.vtp", scalar="deviation")
+    mracad.write(fair, tmp_path / "fair.vtp", scalar="deviation", chord="1mm")
     assert b"deviation" in (tmp_path / "fair.vtp").read_bytes()
     with pytest.raises(UsageError, match="scalar: STL holds no numbers"):
         mracad.write(fair, tmp_path / "fair.stl", scalar="deviation")
