@@ -83,6 +83,20 @@ def wavelets(coarse: KnotVector, fine: KnotVector, vanish: tuple[int, int] = (0,
     ``M = PᵀG`` is a totally positive staircase, so its structural rank tells which runs of columns are dependent; each
     minimal run gives one wavelet, the null vector of a small block.  Lyche, Mørken and Quak, *Theory and algorithms
     for non-uniform spline wavelets*; Kazinnik and Elber 1997.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from mracad.bspline.gram import gram
+    >>> from mracad.bspline.knots import KnotVector
+    >>> from mracad.bspline.refine import refinement
+    >>> from mracad.wavelet import wavelets
+    >>> fine, coarse = KnotVector.clamped([0, 1, 3, 4, 9], 3), KnotVector.clamped([0, 3, 9], 3)
+    >>> q = wavelets(coarse, fine)
+    >>> q.shape
+    (7, 2)
+    >>> bool(np.abs(refinement(coarse, fine).apply_transposed(gram(fine).apply(q.toarray()))).max() < 1e-12)
+    True
     """
     start, end = vanish
     if min(vanish) < 0 or start + end >= coarse.count or (fine.periodic and any(vanish)):

@@ -43,6 +43,13 @@ def rungs_by_level(
     list of KnotVector
         ``kv`` first.  If there are multiple knots or clusters, the second rung makes all of them simple.
         The last has no free interior knots; a periodic one keeps its end knot and at least ``max(d + 1, 3)`` spans.
+
+    Examples
+    --------
+    >>> from mracad.bspline.knots import KnotVector
+    >>> from mracad.wavelet import rungs_by_level
+    >>> [rung.breaks.tolist() for rung in rungs_by_level(KnotVector.clamped([0, 1, 2, 4, 5, 9], 3))]
+    [[0.0, 1.0, 2.0, 4.0, 5.0, 9.0], [0.0, 2.0, 4.0, 9.0], [0.0, 2.0, 9.0], [0.0, 9.0]]
     """
     if lengths is None:
         lengths, tolerance = np.diff(kv.breaks), 0.0
@@ -89,6 +96,14 @@ def ladder_for_scale(
     -------
     KnotVector
         ``kv`` itself if nothing in it is finer than the scale.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from mracad.bspline.knots import KnotVector
+    >>> from mracad.wavelet import ladder_for_scale
+    >>> ladder_for_scale(KnotVector.clamped(np.arange(17.0), 3), np.ones(16), scale=4.0).breaks
+    array([ 0.,  2.,  4.,  6.,  8., 10., 12., 14., 16.])
 
     Notes
     -----

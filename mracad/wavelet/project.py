@@ -165,6 +165,15 @@ def projection(coarse: KnotVector, fine: KnotVector, weights: Array | None = Non
     Normal equations are used up to degree 5 on moderately uneven knots.  Beyond that, where they would square a large
     condition number, ``√W B'`` is triangularised orthogonally (QR) block by block, with ``B'`` the coarse basis at the
     Gauss points.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from mracad.bspline.knots import KnotVector
+    >>> from mracad.wavelet import projection
+    >>> smooth = projection(KnotVector.clamped([0, 2], 1), KnotVector.clamped([0, 1, 2], 1))
+    >>> smooth.apply(np.array([[0.0], [1.0], [0.0]])).ravel().round(12)
+    array([0.5, 0.5, 0.5])
     """
     key = None if weights is None else tuple(checked_weights(fine, weights).tolist())
     return _cached(coarse, fine, key)

@@ -21,8 +21,9 @@ import numpy as np
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
 from mracad.wavelet.ladder import rungs_by_level
+from mracad.wavelet.pyramid import LevelBands
 from mracad.wavelet.step import step
-from mracad.wavelet.transform import LevelBands, decompose, reconstruct
+from mracad.wavelet.transform import decompose, reconstruct
 
 Array = np.ndarray
 

@@ -27,19 +27,23 @@ class TwoScale:
     Attributes
     ----------
     coarse, fine : KnotVector
+    pinned : int
+        Number of derivatives, the value included, that the coarse spline shares with the fine one at each end.
     exact : bool
         Whether solving for control points and details reproduces a signal to rounding.  If not, the coarse ones come
         from the projection, which is better conditioned, details that would make it worse are left out, and
         :func:`mracad.wavelet.transform.decompose` keeps a residual.
     """
 
-    def __init__(self, coarse: KnotVector, fine: KnotVector) -> None:
-        self.coarse, self.fine = coarse, fine
+    def __init__(self, coarse: KnotVector, fine: KnotVector, pinned: int = 0) -> None:
+        self.coarse, self.fine, self.pinned = coarse, fine, pinned
         self._m, n = coarse.count, fine.count
         # Some functions of an unclamped vector may be all but zero within the domain: take their whole support.
-        q_matrix = wavelets(coarse.closed()[0], *fine.closed())
-        p, q = refinement(coarse, fine).coo(), q_matrix.coo()
+        closed, vanish = fine.closed()
+        self._wavelets = wavelets(coarse.closed()[0], closed, (pinned, pinned) if pinned else vanish)
+        p, q = refinement(coarse, fine).coo(), self._wavelets.coo()
         row, column, value = (np.concatenate(pair) for pair in zip(p, q, strict=True))
+        row[len(p[0]) :] += pinned
         column[len(p[0]) :] += self._m
         row_order, column_order = _orders(row, column, n, fine.periodic)
         self._row_order, self._column_order = row_order, column_order
@@ -62,13 +66,27 @@ class TwoScale:
         both = self._solver.solve(probe)
         return bool(np.abs(probe - self.synthesise(both[: self._m], both[self._m :])).max() < 0.1 * EXACT)
 
+    @cached_property
+    def places(self) -> Array:
+        """Where each wavelet is, ``(n − m,)``: the mean Greville abscissa of its control points by their squares."""
+        index = self._wavelets.start[:, None] + np.arange(self._wavelets.values.shape[1]) + self.pinned
+        turn, index = np.divmod(index, self.fine.count)
+        at = self.fine.unrolled().greville()[index] + turn * self.fine.period
+        weight = self._wavelets.values**2
+        return self.fine.wrap((weight * at).sum(axis=1) / weight.sum(axis=1))
+
+    @cached_property
+    def heights(self) -> Array:
+        """The largest control point of each wavelet, ``(n − m,)``."""
+        return np.asarray(np.abs(self._wavelets.values).max(axis=1, initial=0.0))
+
     def analyse(self, c: Array, axis: int = 0, overwrite: bool = False) -> tuple[Array, Array]:
         """Coarse control points and details of ``c`` along ``axis``; with ``overwrite`` they may take its place."""
         c = np.asarray(c, dtype=float)
         if c.shape[axis] != self.fine.count:
             raise UsageError(f"{c.shape[axis]} control points along axis {axis}, but the knots need {self.fine.count}")
         coarse, detail = slice(None, self._m), slice(self._m, None)
-        if self.exact:
+        if self.exact or self.pinned:
             both = self._solver.solve(c, axis, overwrite)
             return _part(both, axis, coarse), _part(both, axis, detail)
         best = projection(self.coarse, self.fine).coarse(c, axis)
@@ -113,6 +131,16 @@ class Chain:
     def exact(self) -> bool:
         return all(each.exact for each in self.steps)
 
+    @property
+    def places(self) -> Array:
+        """Where each wavelet is, see :attr:`TwoScale.places`."""
+        return np.concatenate([each.places for each in self.steps])
+
+    @property
+    def heights(self) -> Array:
+        """The largest control point of each wavelet, over the knots of its own step."""
+        return np.concatenate([each.heights for each in self.steps])
+
     def analyse(self, c: Array, axis: int = 0, overwrite: bool = False) -> tuple[Array, Array]:
         """Coarse control points and details of ``c`` along ``axis``; with ``overwrite`` they may take its place."""
         details = []
@@ -134,14 +162,24 @@ class Chain:
 
 
 @kept(128)
-def step(coarse: KnotVector, fine: KnotVector) -> TwoScale | Chain:
+def step(coarse: KnotVector, fine: KnotVector, pinned: int = 0) -> TwoScale | Chain:
     """The step between two nested spaces, factored once and cached.
 
     If neighbouring knots are removed, or several copies of one, the step is a chain of steps that each remove
     alternate ones: a single step would be badly conditioned.
+
+    Parameters
+    ----------
+    coarse, fine : KnotVector
+        Clamped, if ``pinned``.
+    pinned : int
+        Number of derivatives, the value included, that coarse splines share with fine ones at each end: wavelets vanish
+        there, and are orthogonal to the coarse splines that do.
     """
     between = _between(coarse, fine)
-    return Chain([TwoScale(b, a) for a, b in pairwise(between)]) if len(between) > 2 else TwoScale(coarse, fine)
+    if len(between) == 2:
+        return TwoScale(coarse, fine, pinned)
+    return Chain([TwoScale(b, a, pinned) for a, b in pairwise(between)])
 
 
 def _between(coarse: KnotVector, fine: KnotVector) -> list[KnotVector]:

@@ -1,90 +1,26 @@
 """Analysis and synthesis of curves and nets on nested knots, exactly.
 
-Coefficient order.  A *step* turns ``n`` control points into ``m`` coarse ones followed by ``n − m`` details.  A
-*pyramid* holds the coarsest control points and its levels from the finest to the coarsest.  A level has the bands
-``LH`` (coarse in u, detail in v), ``HL`` (detail in u, coarse in v) and ``HH``, without those of a direction that does
-not change there; a curve, or a level where v does not change, has only ``HL``.
+A *step* turns ``n`` control points into ``m`` coarse ones followed by ``n − m`` details; a level of a pyramid
+(:mod:`mracad.wavelet.pyramid`) is a step in u and one in v.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise, zip_longest
 
 import numpy as np
 
 from mracad.bspline.knots import Array, KnotVector
 from mracad.errors import UsageError
+from mracad.wavelet.pyramid import LevelBands, Pyramid
 from mracad.wavelet.step import EXACT, Chain, TwoScale, step
 
 
-@dataclass(frozen=True, eq=False)
-class LevelBands:
-    """The detail that one level adds to the next coarser surface.
-
-    Attributes
-    ----------
-    u, v : TwoScale or Chain or None
-        The steps taken; None where a direction does not change.
-    bands : dict
-        ``"LH"``, ``"HL"``, ``"HH"``: details (see the module).
-    residual : ndarray or None
-        The rounding loss, in control points of the finer net, if it is more than 1e-13 of the whole net.
-    """
-
-    u: TwoScale | Chain | None
-    v: TwoScale | Chain | None
-    bands: dict[str, Array]
-    residual: Array | None = None
-
-    def scaled(self, gain: float) -> LevelBands:
-        """The level with its details times ``gain``."""
-        bands = {name: gain * band for name, band in self.bands.items()}
-        return replace(self, bands=bands, residual=None if self.residual is None else gain * self.residual)
-
-    def synthesise(self, coarse: Array) -> Array:
-        """Control points of the finer net from those of the coarser one."""
-        if self.u is not None and self.v is not None:
-            poles = np.empty((self.u.fine.count, self.v.fine.count, *coarse.shape[2:]))
-            low, high = poles[: len(coarse)], poles[len(coarse) :]
-            self.v.synthesise(coarse, self.bands["LH"], 1, low)
-            self.v.synthesise(self.bands["HL"], self.bands["HH"], 1, high)
-            self.u.synthesise(low, high, 0, poles)
-        elif self.u is not None:
-            poles = self.u.synthesise(coarse, self.bands["HL"], 0)
-        elif self.v is not None:
-            poles = self.v.synthesise(coarse, self.bands["LH"], 1)
-        if self.residual is not None:
-            poles += self.residual
-        return poles
-
-
-@dataclass(frozen=True, eq=False)
-class Pyramid:
-    """A curve or net in wavelet space.
-
-    Attributes
-    ----------
-    coarse : ndarray
-        Control points of the coarsest net, centroid subtracted.
-    levels : tuple of LevelBands
-        From the finest to the coarsest.
-    centroid : ndarray (k,)
-    """
-
-    coarse: Array
-    levels: tuple[LevelBands, ...]
-    centroid: Array
-
-    def scaled(self, gains: Sequence[float]) -> Pyramid:
-        """The pyramid with the details of each level (the finest first) times a gain."""
-        if len(gains) != len(self.levels):
-            raise UsageError(f"{len(gains)} gains for {len(self.levels)} levels")
-        return replace(self, levels=tuple(level.scaled(g) for level, g in zip(self.levels, gains, strict=True)))
-
-
-def decompose(poles: Array, ladder_u: Sequence[KnotVector], ladder_v: Sequence[KnotVector] | None = None) -> Pyramid:
+def decompose(
+    poles: Array, ladder_u: Sequence[KnotVector], ladder_v: Sequence[KnotVector] | None = None, *, pinned: int = 0
+) -> Pyramid:
     """Nonstandard decomposition of the control points of a net, or of a curve.
 
     Parameters
@@ -93,6 +29,9 @@ def decompose(poles: Array, ladder_u: Sequence[KnotVector], ladder_v: Sequence[K
     ladder_u, ladder_v : sequence of KnotVector
         Nested, from the net's own knots to the coarsest.  One level is one step in u and one in v; the shorter ladder
         ends early.
+    pinned : int
+        Number of derivatives, the value included, that all levels share at each end of a direction that is not
+        periodic; it must be clamped.
 
     Returns
     -------
@@ -102,19 +41,31 @@ def decompose(poles: Array, ladder_u: Sequence[KnotVector], ladder_v: Sequence[K
     ------
     UsageError
         Ladders that do not fit the poles or are not nested.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from mracad.bspline.knots import KnotVector
+    >>> from mracad.wavelet import decompose, reconstruct, rungs_by_level
+    >>> u, v = KnotVector.clamped([0, 1, 3, 4, 9], 3), KnotVector.clamped([0, 2, 3], 2)
+    >>> pyramid = decompose(np.arange(84.0).reshape(7, 4, 3) ** 2, rungs_by_level(u), rungs_by_level(v))
+    >>> [{name: band.shape for name, band in level.bands.items()} for level in pyramid.levels]
+    [{'HL': (2, 3, 3), 'LH': (5, 1, 3), 'HH': (2, 1, 3)}, {'HL': (1, 3, 3)}]
+    >>> bool(np.allclose(reconstruct(pyramid), np.arange(84.0).reshape(7, 4, 3) ** 2))
+    True
     """
     poles = np.asarray(poles, dtype=float)
     ladders = [ladder_u] if ladder_v is None else [ladder_u, ladder_v]
     if poles.shape[:-1] != tuple(ladder[0].count for ladder in ladders):
         raise UsageError(f"control points of shape {poles.shape} do not fit the finest knots of the ladders")
-    steps = [[step(b, a) for a, b in pairwise(ladder)] for ladder in ladders]
+    steps = [[step(b, a, 0 if a.periodic else pinned) for a, b in pairwise(ladder)] for ladder in ladders]
     flat = poles.reshape(-1, poles.shape[-1])
     centroid = np.full(len(flat), 1.0 / len(flat)) @ flat
     c = np.array(poles, order="C")
     _move(c, -centroid)
     pairs = [(pair[0], pair[1] if len(pair) > 1 else None) for pair in zip_longest(*steps)]
     c, levels = _analysed(c, pairs)
-    return Pyramid(c, tuple(levels), centroid)
+    return Pyramid(c, tuple(levels), centroid, tuple(tuple(ladder) for ladder in ladders))
 
 
 def reconstruct(pyramid: Pyramid, level: float = 0.0) -> Array:
@@ -122,12 +73,30 @@ def reconstruct(pyramid: Pyramid, level: float = 0.0) -> Array:
 
     ``level = k + t`` leaves out the ``k`` finest levels and a share ``t`` of the next one's details, which blends
     the two surfaces between which it lies: ``t f^j + (1 − t) f^{j+1}``.
-    The result always has as many control points as the finest net.
+    Parameters
+    ----------
+    pyramid : Pyramid
+    level : float
+
+    Returns
+    -------
+    ndarray (nu, nv, k), or (n, k) for a curve
+        Over the finest knots, whatever the level.
 
     Raises
     ------
     UsageError
         ``level`` outside 0 … number of levels.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from mracad.bspline.knots import KnotVector
+    >>> from mracad.wavelet import decompose, reconstruct, rungs_by_level
+    >>> pyramid = decompose(np.eye(7), rungs_by_level(KnotVector.clamped([0, 1, 3, 4, 9], 3)))
+    >>> half = (reconstruct(pyramid, 1) + reconstruct(pyramid, 2)) / 2
+    >>> bool(np.allclose(reconstruct(pyramid, 1.5), half))
+    True
     """
     if not 0 <= level <= len(pyramid.levels):
         raise UsageError(f"level {level} is outside 0 … {len(pyramid.levels)}")
