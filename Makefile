@@ -4,6 +4,7 @@
 #   make example smooth, sweep, emboss and knurl a shell of a dozen patches, step by step (docs/example.md)
 #   make test    set everything up and run the tests
 #   make test-long  at more scales, with the largest real models everywhere
+#   make site    build the documentation as a site, in build/site
 #   make regress compare every sample with the reference figures in samples/figures.json
 #   make fresh   build wheel and sdist, install each in an empty environment and try it
 #   make fuzz    feed the commands 2 000 damaged files and kill 200 writers (half an hour)
@@ -21,7 +22,7 @@ export SOURCE_DATE_EPOCH ?= 0
 
 SAMPLES := $(wildcard samples/*.step)
 
-.PHONY: demo example test test-long regress fuzz lint bench bench-batch bench-fill docs pictures samples smooth wheel fresh man clean
+.PHONY: demo example test test-long regress fuzz lint bench bench-batch bench-fill docs site pictures samples smooth wheel fresh man clean
 
 demo: $(VENV)/ready
 	@mkdir -p build
@@ -67,15 +68,22 @@ bench-fill: $(VENV)/dev
 bench-batch: $(VENV)/dev
 	$(BIN)/python benchmarks/batch.py
 
-# The page of steps, from their declaration, and the picture of the rooms, from the imports
+# The pages of steps and commands, from their declarations, and the picture of the rooms, from the imports
 docs: $(VENV)/ready
 	$(BIN)/python -c 'from mracad.spec.schema import page; print(page(), end="")' > docs/steps.md
+	$(BIN)/python docs/commands.py > docs/commands.md
 	$(BIN)/python -c 'from mracad.api.stub import stub; print(stub(), end="")' > mracad/__init__.pyi
 	$(BIN)/python docs/house.py > docs/house.svg
+
+# The documentation as a site; a link or an anchor that leads nowhere is an error
+site: $(VENV)/dev
+	$(BIN)/python -m sphinx -q -W --keep-going -c docs -d build/site.read . build/site
+	@echo 'The site lies in build/site; begin with build/site/docs/index.html.'
 
 # All other pictures of the documentation, and the gallery, by mracad itself
 pictures: $(VENV)/ready
 	$(BIN)/python docs/pictures.py
+	$(BIN)/python docs/curves.py
 
 samples: $(VENV)/ready
 	$(BIN)/python samples/make.py samples
