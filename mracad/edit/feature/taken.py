@@ -54,7 +54,8 @@ def clipped(
     volume = float(np.abs(copies.feature.table[..., 2]).sum()) * cell
     every = volume * copies.sizes**2 * np.abs(copies.heights)
     lost = np.array([copy.lost for copy in found]) > SLIGHT * copies.feature.height * np.abs(copies.heights)
-    some = np.flatnonzero(lost | _beside(copies, still))
+    held = any((~each.free & each.offset.any(axis=2)).any() for each in wanted.values())
+    some = np.flatnonzero(lost & held | _beside(copies, still))
     count = int(np.clip(POINTS // max(len(some), 1), LEAST, MOST))
     shares = np.zeros(len(found))
     for batch in np.array_split(some, math.ceil(len(some) * count / BATCH)) if len(some) else ():
