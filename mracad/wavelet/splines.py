@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from mracad.bspline.knots import KnotVector
 from mracad.errors import UsageError
 from mracad.wavelet.ladder import rungs_by_level
-from mracad.wavelet.lift import Spline, lifted
+from mracad.wavelet.lift import Form, Spline, lifted
 from mracad.wavelet.patches import matched
 from mracad.wavelet.pyramid import Pyramid
 from mracad.wavelet.transform import decompose, reconstruct
@@ -56,7 +58,7 @@ def wavedec(spline: Spline, levels: int | None = None) -> Pyramid:
     return replace(pyramid, form=form)
 
 
-def waverec(pyramid: Pyramid, level: float = 0.0) -> Spline:
+def waverec(pyramid: Pyramid, level: float = 0.0, coarse: Spline | None = None) -> Spline:
     """The spline of a pyramid, of the type and over the knots of the one that was decomposed.
 
     Parameters
@@ -66,6 +68,8 @@ def waverec(pyramid: Pyramid, level: float = 0.0) -> Spline:
     level : float
         How many of the finest levels to leave out; ``k + t`` blends the splines without ``k`` and ``k + 1`` of them.
         ``waverec(pyramid.coarser(k))`` is that without ``k``, over fewer knots.
+    coarse : BSpline, NdBSpline, Curve or Net, optional
+        Another coarse shape, over the knots of ``pyramid.coarser(k)``, on which the ``k`` finest levels are put.
 
     Returns
     -------
@@ -74,7 +78,7 @@ def waverec(pyramid: Pyramid, level: float = 0.0) -> Spline:
     Raises
     ------
     UsageError
-        A level outside 0 … number of levels, or a pyramid that is not from a spline.
+        A level outside 0 … number of levels, a pyramid that is not from a spline, or a coarse spline over other knots.
 
     Examples
     --------
@@ -85,10 +89,27 @@ def waverec(pyramid: Pyramid, level: float = 0.0) -> Spline:
     >>> pyramid = wavedec(make_interp_spline(x, np.sin(x)))
     >>> waverec(pyramid, 1.5).t.shape, waverec(pyramid.coarser(2)).t.shape
     ((45,), (17,))
+    >>> coarse = waverec(pyramid.coarser(2))
+    >>> coarse.c = coarse.c + 3.0
+    >>> bool(np.allclose(waverec(pyramid, coarse=coarse)(x), np.sin(x) + 3.0))
+    True
     """
-    if pyramid.form is None:
+    form = pyramid.form
+    if form is None:
         raise UsageError("this pyramid was not made from a spline: take mracad.wavelet.reconstruct")
-    return pyramid.form.spline(reconstruct(pyramid, level))
+    if coarse is not None:
+        pyramid = _on(pyramid, form, coarse)
+    return form.spline(reconstruct(pyramid, level))
+
+
+def _on(pyramid: Pyramid, form: Form, coarse: Spline) -> Pyramid:
+    """The finest levels of a pyramid on another coarse shape."""
+    own, poles = lifted(coarse)
+    for finer in range(len(pyramid.levels) + 1):
+        if form.over(pyramid.ladders, pyramid.knots(finer)).knots == own.knots:
+            zero = np.zeros(poles.shape[-1])
+            return replace(pyramid, coarse=form.flipped(poles), levels=pyramid.levels[:finer], centroid=zero)
+    raise UsageError("the coarse spline is not over the knots of a level of this pyramid")
 
 
 def wavedec_patches(splines: Sequence[Spline], levels: int | None = None, order: int = 0) -> list[Pyramid]:

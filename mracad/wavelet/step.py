@@ -68,12 +68,15 @@ class TwoScale:
 
     @cached_property
     def places(self) -> Array:
-        """Where each wavelet is, ``(n − m,)``: the mean Greville abscissa of its control points by their squares."""
+        """Where each wavelet is, ``(n − m,)``: the mean Greville abscissa of its control points by their squares (round
+        the loop if it is periodic)."""
+        kv = self.fine
         index = self._wavelets.start[:, None] + np.arange(self._wavelets.values.shape[1]) + self.pinned
-        turn, index = np.divmod(index, self.fine.count)
-        at = self.fine.unrolled().greville()[index] + turn * self.fine.period
-        weight = self._wavelets.values**2
-        return self.fine.wrap((weight * at).sum(axis=1) / weight.sum(axis=1))
+        at, weight = kv.greville()[index % kv.count], self._wavelets.values**2
+        if not kv.periodic:
+            return np.asarray((weight * at).sum(axis=1) / weight.sum(axis=1))
+        turn = np.angle((weight * np.exp(2j * np.pi * (at - kv.breaks[0]) / kv.period)).sum(axis=1)) / (2 * np.pi)
+        return kv.wrap(kv.breaks[0] + turn * kv.period)
 
     @cached_property
     def heights(self) -> Array:

@@ -9,7 +9,7 @@ from mracad.bspline.knots import KnotVector
 from mracad.bspline.refine import refinement
 from mracad.bspline.surface import Net
 from mracad.errors import UsageError
-from mracad.wavelet import decompose, wavedec, waverec
+from mracad.wavelet import decompose, wavedec, wavedec_patches, waverec
 from mracad.wavelet.transform import reconstruct
 from tests.bspline.spaces import KINDS, random_knots
 
@@ -161,3 +161,16 @@ def test_plots_have_a_panel_for_each_level():
         shown = found.axes[0].collections[0]
         drawn = shown.get_offsets() if bars else shown.get_segments()
         assert len(drawn) == sum(each.size for each in pyramid.levels[0].heights.values())
+
+
+def test_details_on_another_coarse_shape():
+    u, v = random_knots(3, "clamped", 20, 1, most=2), random_knots(2, "periodic", 7, 2, most=1)
+    poles = np.random.default_rng(0).standard_normal((u.count, v.count, 3))
+    by = np.arange(3.0)
+    for pyramid in (wavedec(Net(u, v, poles)), *wavedec_patches([Net(v, u, poles.swapaxes(0, 1)[:, ::-1])])):
+        for level in (0, 1, len(pyramid.levels)):
+            coarse = waverec(pyramid.coarser(level))
+            moved = waverec(pyramid, coarse=coarse.with_poles(coarse.poles + by)).poles - by
+            np.testing.assert_allclose(moved, waverec(pyramid).poles, atol=1e-12)
+        with pytest.raises(UsageError, match="not over the knots"):
+            waverec(pyramid, coarse=curve_over(spans=23))
