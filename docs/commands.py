@@ -6,7 +6,6 @@ Usage: python docs/commands.py > docs/commands.md
 from __future__ import annotations
 
 import inspect
-import re
 from collections.abc import Iterator
 
 import click
@@ -66,8 +65,15 @@ def _tables(command: click.Command, context: click.Context) -> Iterator[tuple[st
     """The options under the titles of the help."""
     if isinstance(command, Command):
         for title, params in command.sections(context).items():
-            records = filter(None, (param.get_help_record(context) for param in params))
-            yield str(title), [(re.sub(r"\|", r"\\|", option), text.replace("|", "\\|")) for option, text in records]
+            records = (param.get_help_record(context) for param in params)
+            yield str(title), [_row(*record) for record in records if record]
+
+
+def _row(option: str, text: str) -> Row:
+    """An option and its text, which begins with the values to choose from."""
+    option, _, choices = option.partition(" [")
+    words = ", ".join(f"`{word}`" for word in choices.rstrip("]").split("|") if word)
+    return option, f"{words}: {text}".removeprefix(": ").replace("|", "\\|")
 
 
 if __name__ == "__main__":

@@ -39,10 +39,10 @@ def blocks(text, *kinds):
 def commands(text):
     """The words of every mracad command in a page's blocks, up to a pipe or another file."""
     found = []
-    for block in blocks(text, "sh", "console"):
+    for block in blocks(text, "sh", "console", "yaml"):
         lines = block.replace("\\\n", " ").splitlines()
         for line in [line[2:] for line in lines if line.startswith("$ ")] if "$ " in block else lines:
-            lexer = shlex.shlex(re.sub(r"(^|\s)#\s.*", "", line), posix=True, punctuation_chars="|<>&")
+            lexer = shlex.shlex(re.sub(r"^ *- run: |(^|\s)#\s.*", "", line), posix=True, punctuation_chars="|<>&")
             lexer.whitespace_split, lexer.commenters = True, ""
             words = list(itertools.takewhile(lambda word: word not in {"|", "<", ">", "&&"}, lexer))
             found += [words] if words[:1] == ["mracad"] else []
