@@ -128,6 +128,8 @@ def _knots(t: Array, degree: int, periodic: bool) -> KnotVector:
 
 
 def _real(c: Array) -> Array:
+    if not c.size:
+        raise UsageError("the spline has no values")
     if np.iscomplexobj(c):
         raise UsageError("control points are complex: give the real and the imaginary part as two coordinates")
     return np.asarray(c, dtype=float)

@@ -65,9 +65,9 @@ def matched(patches: Sequence[tuple[Form, Array]]) -> Iterator[tuple[Form, Array
     own = [[_clamped(knots) for knots in form.knots] for form, _ in patches]
     groups = _Groups([(i, axis) for i, each in enumerate(own) for axis in range(len(each))])
     if patches and len(own[0]) == 2:
-        sides = [side for i, (form, poles) in enumerate(patches) for side in _sides(i, form, poles, own[i])]
-        size = max(float(np.ptp(poles, axis=(0, 1)).max()) for _, poles in patches)
-        for one, two, turned in _meeting(sides, SAME * size):
+        apart = SAME * max(float(np.ptp(poles, axis=(0, 1)).max()) for _, poles in patches)
+        sides = [side for i, (form, poles) in enumerate(patches) for side in _sides(i, form, poles, own[i], apart)]
+        for one, two, turned in _meeting(sides, apart):
             groups.link(one, two, turned)
     distinct = {id(group): group for group in groups.of.values()}
     shared = {key: _union([own[i][axis] for i, axis in g], list(g.values())) for key, g in distinct.items()}
@@ -94,17 +94,20 @@ def _clamped(knots: KnotVector) -> KnotVector:
     return KnotVector.from_multiplicities(knots.breaks, counts, knots.degree, knots.periodic)
 
 
-def _sides(i: int, form: Form, poles: Array, knots: Sequence[KnotVector]) -> Iterator[_Side]:
+def _sides(i: int, form: Form, poles: Array, knots: Sequence[KnotVector], apart: float) -> Iterator[_Side]:
     net = _over(form, poles, tuple(knots))
     for across in (0, 1):
-        if not knots[across].periodic:
-            for end in (0, -1):
+        for end in () if knots[across].periodic else (0, -1):
+            poles = net.poles.take(end, across)
+            if np.ptp(poles, axis=0).max() > apart:  # a point stays one, and runs no way
                 weights = None if net.weights is None else net.weights.take(end, across)
-                yield _Side((i, 1 - across), Curve(knots[1 - across], net.poles.take(end, across), weights))
+                yield _Side((i, 1 - across), Curve(knots[1 - across], poles, weights))
 
 
 def _meeting(sides: Sequence[_Side], apart: float) -> Iterator[tuple[Direction, Direction, bool]]:
     """Directions along sides that coincide, and whether they run against each other."""
+    if not sides:
+        return
     ends = np.array([side.curve.poles[[0, 0 if side.curve.knots.periodic else -1]] for side in sides])
     for i, one in enumerate(sides):
         for turned in (False, True):

@@ -130,7 +130,8 @@ def wavedec_patches(splines: Sequence[Spline], levels: int | None = None, order:
         Largest number of levels.
     order : int
         Number of derivatives across sides that are kept on all levels in the same way: with 1, patches whose first
-        derivatives across a seam are in a constant proportion keep it, so the seam stays smooth.
+        derivatives across a seam are in a constant proportion keep it, so the seam stays smooth.  At most the lowest
+        degree.
 
     Returns
     -------
@@ -140,7 +141,7 @@ def wavedec_patches(splines: Sequence[Spline], levels: int | None = None, order:
     Raises
     ------
     UsageError
-        What is given are no such splines, or patches form a band with a half twist.
+        What is given are no such splines, ``order`` is above a degree, or patches form a band with a half twist.
 
     Examples
     --------
@@ -160,6 +161,8 @@ def wavedec_patches(splines: Sequence[Spline], levels: int | None = None, order:
     """
     found = []
     for form, poles, common in matched([lifted(spline) for spline in splines]):
+        if not 0 <= order <= min(knots.degree for knots in common):
+            raise UsageError(f"order {order} is not between 0 and the degree of every patch")
         ladders = [_ladder(knots, levels, order + 1) for knots in common]
         found.append(replace(decompose(form.flipped(poles), *ladders, pinned=order + 1), form=form))
     return found

@@ -105,6 +105,7 @@ def test_what_is_no_spline_is_refused():
         (np.zeros(5), "ndarray is no spline"),
         (BSpline(np.arange(5.0), np.arange(4.0), 0), "degree 0"),
         (BSpline(np.arange(8.0), np.arange(4) * 1j, 3), "complex"),
+        (BSpline(np.arange(8.0), np.ones((4, 0)), 3), "no values"),
         (NdBSpline((cube,) * 3, np.zeros((2, 2, 2)), 1), "3 variables"),
     ):
         with pytest.raises(UsageError, match=words):

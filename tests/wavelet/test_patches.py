@@ -192,6 +192,22 @@ def test_places_of_patches_are_over_their_own_parameters():
     assert back.plot().axes[0].get_ylim() == turned(other.v).domain
 
 
+def test_sides_that_are_points_stay_points():
+    u, v = knots(1), knots(2)
+    nets = [noisy(u, v, seed) for seed in (1, 2, 3)]
+    for net, after in zip(nets, [*nets[1:], nets[0]], strict=True):
+        net.poles[:, 0], net.poles[:, -1] = 0.0, 5.0
+        after.poles[0] = net.poles[-1]
+    for net in nets:
+        net.poles[:, 0], net.poles[:, -1] = 0.0, 5.0
+    for those, level in alike(wavedec_patches(nets)):
+        found = waverec_patches(those, level)
+        for net, after in zip(found, [*found[1:], found[0]], strict=True):
+            np.testing.assert_allclose(net.poles[-1], after.poles[0], atol=1e-12)
+            np.testing.assert_allclose(net.poles[:, 0], 0.0, atol=1e-12)
+            np.testing.assert_allclose(net.poles[:, -1], 5.0, atol=1e-12)
+
+
 def test_a_half_twist_and_a_mixture_are_refused():
     u, v = knots(1), KnotVector.clamped([0, 1, 2, 3, 4.0], 3)
     band = noisy(u, v, 1)
@@ -202,6 +218,9 @@ def test_a_half_twist_and_a_mixture_are_refused():
         wavedec_patches([band, Curve(v, band.poles[0])])
     with pytest.raises(UsageError, match="outside"):
         waverec_patches(wavedec_patches([noisy(u, v, 1)]), 50)
+    for order in (-1, 4):
+        with pytest.raises(UsageError, match="order"):
+            wavedec_patches([noisy(u, v, 1)], order=order)
     assert wavedec_patches([]) == [] == waverec_patches([])
 
 
