@@ -6,7 +6,7 @@ from enum import IntEnum
 
 
 class Code(IntEnum):
-    """Exit codes of the command line (``docs/design.md``)."""
+    """Exit codes of the command line (``docs/commands.md``)."""
 
     FAILED_CHECK = 1
     USAGE = 2

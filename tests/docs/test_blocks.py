@@ -82,6 +82,17 @@ def test_recipes_and_python_of_a_page_are_right(path, tmp_path):
         compile(block, str(path), "exec")
 
 
+def test_files_and_targets_that_pages_name_are_there():
+    made = (ROOT / "Makefile").read_text()
+    for path in [*PAGES, ROOT / "CONTRIBUTING.md"]:
+        text = path.read_text()
+        files = re.findall(r"\b(?:tests|benchmarks)/[\w/]++(?:\.py)?(?!<)", text)
+        assert [name for name in files if not (ROOT / name).exists()] == [], path
+        shown = "\n".join([*blocks(text, "sh"), *re.findall(r"`make [^`]+`|^ {4}make .*", text, re.MULTILINE)])
+        targets = re.findall(r"^[` ]*make ([a-z][a-z ]*[a-z])", shown, re.MULTILINE)
+        assert [name for name in " ".join(targets).split() if f"\n{name}: " not in made] == [], path
+
+
 @pytest.fixture
 def folder(request, samples, tmp_path, monkeypatch):
     """A folder with the samples that a page names, in which it runs."""
