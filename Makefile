@@ -7,6 +7,7 @@
 #   make site    build the documentation as a site, in build/site
 #   make regress compare every sample with the reference figures in samples/figures.json
 #   make fresh   build wheel and sdist, install each in an empty environment and try it
+#   make random  take features from 200 random places to others, against the closed form (ten minutes)
 #   make fuzz    feed the commands 2 000 damaged files and kill 200 writers (half an hour)
 #
 # The pattern rule below is the use the tool is for: copy it into a Makefile beside your own models.
@@ -22,7 +23,7 @@ export SOURCE_DATE_EPOCH ?= 0
 
 SAMPLES := $(wildcard samples/*.step)
 
-.PHONY: demo example test test-long regress fuzz lint bench bench-batch bench-fill docs site pictures samples smooth wheel fresh man clean
+.PHONY: demo example test test-long regress random fuzz lint bench bench-batch bench-fill docs site pictures samples smooth wheel fresh man clean
 
 demo: $(VENV)/ready
 	@mkdir -p build
@@ -47,6 +48,9 @@ regress: $(VENV)/ready
 fuzz: $(VENV)/dev
 	$(BIN)/python -m tests.robust.mutate 2000
 	$(BIN)/python -m tests.robust.kill 200
+
+random: $(VENV)/dev
+	$(BIN)/python -m tests.edit.feature.random_places 200
 
 lint: $(VENV)/dev
 	$(BIN)/ruff check .
