@@ -59,10 +59,8 @@ def placed(number: int, seed: int, folder: Path) -> tuple[str, int, float, float
     top = [np.stack(grounds.GROUNDS[name](*np.zeros((3, 1))), axis=1)[0] for name in (source, target)]
     words = [",".join(repr(float(x)) for x in point) for point in (top[0], top[1] + FAR)]
     out = folder / "out.step"
-    code = mracad(
-        ["repeat", str(path), "-o", str(out), "--overwrite", "--quiet"]
-        + ["--feature", f"near:{words[0]},radius:{REACH}", "--at", words[1], "--rotate", f"{turn:.1f}"]
-    )
+    where = "--feature", f"near:{words[0]},radius:{REACH}", "--at", words[1], "--rotate", f"{turn:.1f}"
+    code = mracad(["repeat", str(path), "-o", str(out), "--overwrite", "--quiet", *where])
     what = f"{source} to {target}, seams at {np.round(cuts, 1).tolist()}"
     if code:
         return what, code, np.nan, np.nan
@@ -89,10 +87,12 @@ def main(arguments: list[str]) -> None:
             what, code, off, rise = placed(number, seed, Path(folder))
             every.append((code, off, rise))
             print(f"{number:4d} exit {code}  error {off:.1e}  height {rise:.4f}  {what}", flush=True)
-    done = np.array([each[1:] for each in every if not each[0]])
+    codes, off, rise = np.transpose(every)
+    there = codes == 0
     print(
-        f"{len(done)} of {count} placed, exit codes {sorted({each[0] for each in every})}; largest error "
-        f"{done[:, 0].max():.1e} of the height; heights {done[:, 1].min():.4f} to {done[:, 1].max():.4f} of the true one"
+        f"{there.sum()} of {count} placed, exit codes {sorted(set(codes.astype(int).tolist()))}; "
+        f"largest error {off[there].max():.1e} of the height; "
+        f"heights {rise[there].min():.4f} to {rise[there].max():.4f} of the true one"
     )
 
 
