@@ -52,8 +52,21 @@ class Document(kernel.Document):
 
     def __repr__(self) -> str:
         count = len(self.reports)
-        done = f", {count} edit{'s' * (count > 1)}" if count else ""
-        return f"<Document {self.name!r}: {len(self.faces)} faces, unit {self.unit}{done}>"
+        return self.told(f"{count} edit{'s' * (count > 1)}" if count else "")
+
+    def _repr_html_(self) -> str:
+        """A table and the model to turn, in notebooks."""
+        from mracad.report.notebook import cell
+
+        facts = [
+            ("Model", self.name),
+            ("Faces", f"{len(self.faces)}, of which {self.nurbs} NURBS"),
+            ("Products", ", ".join(part.product for part in self.parts if part.product) or "–"),
+            ("Length unit", self.unit),
+            ("Schema", self.schema or "–"),
+        ]
+        edits = [(_called(step), report.told) for step, report in zip(self.steps, self.reports, strict=True)]
+        return cell(facts, ("Edit", "Result"), edits, self)
 
     def write(
         self,
@@ -128,12 +141,17 @@ def read(
     Examples
     --------
     >>> mracad.read("assembly.step")
-    <Document 'assembly.step': 15 faces, unit in>
+    Document(assembly.step: 1 NURBS face of 15, in, AP214)
     """
     with speaking():
         text = load(source)
         again = partial(read_file, text, input_unit, encoding)
         return of(again(), again)
+
+
+def _called(step: Step) -> str:
+    """A step as Python calls it."""
+    return f"{step.use}({', '.join(f'{name}={value!r}' for name, value in step.options.given().items())})"
 
 
 def _name(document: kernel.Document, target: str | os.PathLike[str] | BinaryIO) -> str:

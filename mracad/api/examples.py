@@ -4,7 +4,7 @@ EXAMPLES = {
     "smooth": """
 >>> fair = mracad.smooth("assembly.step", scale="5mm")
 >>> fair
-<Document 'assembly.step': 15 faces, unit in, 1 edit>
+Document(assembly.step: 1 NURBS face of 15, in, AP214, 1 edit)
 >>> [round(each.largest, 2) for each in mracad.report_of(fair).deviations]  # mm
 [0.06]
 """,

@@ -28,7 +28,7 @@ def write(thing: Source, target: Target, **how: Any) -> Written:
         ``"step"``, ``"iges"``, ``"brep"``, ``"binbrep"``, ``"stl"``, ``"3mf"``, ``"obj"``, ``"ply"``, ``"gltf"``,
         ``"glb"``, ``"vtp"`` or ``"vtu"``.  Default: by the extension of a path, STEP for a stream.
     schema : str
-        STEP: ``"AP203"``, ``"AP214"`` or ``"AP242"``.  Default: that of the file that was read, else AP242.
+        STEP: ``"AP203"``, ``"AP214"`` or ``"AP242"``.  Default: AP242 for a file that was read as such, else AP214.
     chord : str or float
         Meshes: largest distance of triangles from the surface, a length.
     angle : float, optional

@@ -10,6 +10,7 @@ from math import comb
 
 import numpy as np
 
+from mracad.brief import line
 from mracad.bspline.basis import jet
 from mracad.bspline.knots import Array, KnotVector, Side
 from mracad.bspline.refine import refinement
@@ -32,6 +33,8 @@ class Curve:
     knots: KnotVector
     poles: Array
     weights: Array | None = None
+
+    __repr__ = line
 
     def __post_init__(self) -> None:
         if self.poles.ndim != 2 or len(self.poles) != self.knots.count:

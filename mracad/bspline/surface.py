@@ -10,6 +10,7 @@ from typing import Literal, overload
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mracad.brief import line
 from mracad.bspline.basis import jet
 from mracad.bspline.curve import check_weights, euclidean, homogeneous
 from mracad.bspline.knots import Array, KnotVector, Side
@@ -38,6 +39,8 @@ class Net:
     v: KnotVector
     poles: Array
     weights: Array | None = None
+
+    __repr__ = line
 
     def __post_init__(self) -> None:
         if self.poles.ndim != 3 or self.poles.shape[:2] != (self.u.count, self.v.count):

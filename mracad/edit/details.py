@@ -19,6 +19,7 @@ from itertools import zip_longest
 
 import numpy as np
 
+from mracad.brief import line
 from mracad.bspline.surface import Net
 from mracad.model.brep import Face, Model, Surface
 from mracad.model.displacement import Displacement, Offset
@@ -63,6 +64,8 @@ class Detail:
     faces: tuple[int, ...] = ()
     product: str = ""
     names: tuple[str, ...] = ()
+
+    __repr__ = line
 
     @classmethod
     def of(cls, net: Net, offset: Array) -> Detail:
@@ -111,6 +114,8 @@ class Details:
     diagonal: float
     made: str
     surfaces: tuple[Detail, ...]
+
+    __repr__ = line
 
     @classmethod
     def of(cls, model: Model, displacement: Displacement, made: str = "") -> Details:

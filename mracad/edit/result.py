@@ -10,6 +10,7 @@ from typing import Literal
 
 import numpy as np
 
+from mracad.brief import line
 from mracad.edit.feature.score import Copy
 from mracad.inspect.roughness import Roughness
 from mracad.model.brep import Face
@@ -95,6 +96,8 @@ class FaceOutcome:
     noise: float | None = None
     taken: float | None = None
 
+    __repr__ = line
+
     @property
     def words(self) -> str:
         """The reason with its details."""
@@ -121,6 +124,8 @@ class Edit:
     scale: float | None = None
     notes: tuple[str, ...] = ()
     restored: bool = False
+
+    __repr__ = line
 
     def faces(self, *status: Status) -> list[FaceOutcome]:
         """Outcomes with one of the given statuses."""

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from mracad.brief import line
 from mracad.inspect.roughness import Growth
 from mracad.model.brep import Edge, Model
 from mracad.spec.quantity import length
@@ -66,6 +67,8 @@ class Tolerances:
     growth: Growth = GROWTH
     deviation: float = np.inf
     fairer: bool = True
+
+    __repr__ = line
 
     def contact(self, width: float) -> tuple[float, float, float]:
         """Gap (mm), angle and curvature (1/mm) of a seam along a trim curve, for an edit of a wavelength (mm)."""

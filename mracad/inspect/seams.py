@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mracad.brief import line
 from mracad.bspline.vectors import between
 from mracad.model.adjacency import GAP, TORN, coinciding
 from mracad.model.brep import Edge, Model, Side
@@ -63,6 +64,8 @@ class SeamMeasure:
     relative_bend: float
     where: tuple[float, float, float]
     sewn: bool = True
+
+    __repr__ = line
 
     @property
     def smooth(self) -> bool:

@@ -23,6 +23,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from mracad.brief import line
 from mracad.bspline.surface import Net
 from mracad.inspect.evidence import noises
 from mracad.inspect.floor import floor
@@ -101,6 +102,8 @@ class Direction:
     bands: tuple[Band, ...]
     shape: float
 
+    __repr__ = line
+
     @property
     def waves(self) -> tuple[Band, ...]:
         """The bands of waves shorter than the shape."""
@@ -142,6 +145,8 @@ class Spectrum:
     u: Direction
     v: Direction
     noise: float
+
+    __repr__ = line
 
     @property
     def scale(self) -> float | None:

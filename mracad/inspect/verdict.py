@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
+from mracad.brief import line
+
 Status = Literal["pass", "fail", "time limit", "skipped"]
 Figure = float | int | str | bool | None
 
@@ -34,6 +36,8 @@ class Finding:
     where: tuple[float, float, float] | None = None
     figures: Mapping[str, Figure] = field(default_factory=dict)
 
+    __repr__ = line
+
 
 @dataclass(frozen=True)
 class Layer:
@@ -59,6 +63,8 @@ class Layer:
     figures: Mapping[str, object] = field(default_factory=dict)
     notes: tuple[Finding, ...] = ()
 
+    __repr__ = line
+
 
 @dataclass(frozen=True)
 class Verdict:
@@ -76,6 +82,8 @@ class Verdict:
     subject: str
     layers: tuple[Layer, ...]
     valid: bool | None
+
+    __repr__ = line
 
     def failed(self, *names: str) -> tuple[Layer, ...]:
         """The layers that failed: of those named, or of all."""

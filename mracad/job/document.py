@@ -12,6 +12,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from mracad import note
+from mracad.brief import named_line
 from mracad.edit.result import Edit, Reason
 from mracad.edit.tolerances import Tolerances, tolerances
 from mracad.edit.torn import gaps, torn
@@ -63,6 +64,25 @@ class Report:
     tolerances: Tolerances
     unmended: tuple[Mending, ...]
     seconds: float
+
+    def __repr__(self) -> str:
+        return named_line("Report", self.model.name, self.told)
+
+    def _repr_html_(self) -> str:
+        from mracad.report.notebook import cell
+
+        heads = "Face", "Status", "Reason", "Moved, mm"
+        rows = [
+            (f"#{each.face + 1}", each.status, each.words, f"{each.moved:.3g}" if each.moved else "")
+            for each in sorted(self.edit.outcomes, key=lambda each: each.status != "edited")
+        ]
+        return cell([("Model", self.model.name), ("Result", self.told)], heads, rows)
+
+    @property
+    def told(self) -> str:
+        """What it did, in a few words."""
+        edited, largest = len(self.edit.faces("edited")), max((each.largest for each in self.deviations), default=0.0)
+        return f"{edited} of {len(self.edit.outcomes)} faces edited, deviation up to {largest:.3g} mm"
 
     @property
     def control_points(self) -> tuple[int, int]:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from mracad.brief import named_line
 from mracad.edit.feature.locate import face_number
 from mracad.inspect.scales import FaceScales, scales
 from mracad.inspect.seams import SeamMeasure, seams
@@ -45,15 +47,33 @@ class Info:
         The places that were asked for.
     """
 
-    document: Document = field(repr=False)
-    model: Model = field(repr=False)
+    document: Document
+    model: Model
     width: float
     keep: str
-    scales: Mapping[int, FaceScales] = field(repr=False)
-    seams: list[SeamMeasure] = field(repr=False)
-    valid: Validity = field(repr=False)
-    sizes: Sequence[tuple[Mass, Spot]] = field(repr=False)
-    spots: Sequence[Spot] = field(repr=False)
+    scales: Mapping[int, FaceScales]
+    seams: list[SeamMeasure]
+    valid: Validity
+    sizes: Sequence[tuple[Mass, Spot]]
+    spots: Sequence[Spot]
+
+    def __repr__(self) -> str:
+        return named_line("Info", self.model.name, ", ".join(f"{name.lower()}: {text}" for name, text in self._facts()))
+
+    def _repr_html_(self) -> str:
+        from mracad.report.notebook import cell
+
+        return cell([("Model", self.model.name), *self._facts()], document=self.document)
+
+    def _facts(self) -> list[tuple[str, str]]:
+        kinds = Counter(face.kind for face in self.model.faces)
+        return [
+            ("Diagonal", f"{self.model.diagonal:.6g} mm"),
+            ("Solids", str(self.valid.solids)),
+            ("Shapes", "valid" if self.valid.valid else "not valid"),
+            ("Seams", f"{len(self.seams)} of NURBS faces"),
+            ("Faces", ", ".join(f"{count} {kind}" for kind, count in kinds.most_common())),
+        ]
 
 
 def info(

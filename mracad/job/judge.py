@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from mracad.brief import named_line
 from mracad.inspect.verdict import Layer, Verdict
 from mracad.job.words import of_finding
 
@@ -22,6 +23,20 @@ class Judged:
 
     verdict: Verdict
     failed: tuple[Layer, ...]
+
+    def __repr__(self) -> str:
+        return named_line("Judged", self.verdict.subject, self.told)
+
+    @property
+    def told(self) -> str:
+        """What came out, in a few words."""
+        return "passed" if self.passed else f"failed ({', '.join(layer.name for layer in self.failed)})"
+
+    def _repr_html_(self) -> str:
+        from mracad.report.notebook import cell
+
+        heads, facts = ("What", "Status", "Found"), [("Model", self.verdict.subject), ("Result", self.told)]
+        return cell(facts, heads, [(layer.name, layer.status, layer.text) for layer in self.verdict.layers])
 
     @property
     def passed(self) -> bool:

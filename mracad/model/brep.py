@@ -11,6 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
+from mracad.brief import line, model_line
 from mracad.bspline.curve import Curve
 from mracad.bspline.surface import Net
 from mracad.model.rails import Rails
@@ -42,6 +43,8 @@ class Surface:
     faces: tuple[int, ...]
     origin: str = "bspline"
 
+    __repr__ = line
+
 
 @dataclass(frozen=True, eq=False)
 class Trim:
@@ -57,6 +60,8 @@ class Trim:
 
     edge: int
     curve: Curve
+
+    __repr__ = line
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,6 +105,8 @@ class Face:
     product: str = ""
     colour: str = ""
     instances: int = 1
+
+    __repr__ = line
 
     @property
     def outward(self) -> int:
@@ -148,6 +155,8 @@ class Side:
     normals: Array | None = None
     curvatures: Array | None = None
 
+    __repr__ = line
+
 
 @dataclass(frozen=True, eq=False)
 class Edge:
@@ -176,6 +185,8 @@ class Edge:
     tolerance: float
     degenerate: bool = False
     part: int = 0
+
+    __repr__ = line
 
     @property
     def free(self) -> bool:
@@ -220,6 +231,11 @@ class Model:
     products: tuple[str, ...] = ()
     places: tuple[tuple[Array, ...], ...] = ()
     rails: Rails = field(default_factory=Rails)
+
+    def __repr__(self) -> str:
+        nurbs = sum(face.surface is not None for face in self.faces)
+        more = f"{len(self.edges)} edges", self.unit, self.schema
+        return model_line("Model", self.name, (nurbs, len(self.faces)), *more)
 
     @cached_property
     def spaces(self) -> tuple[int, ...]:

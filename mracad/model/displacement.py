@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from mracad.brief import line
 from mracad.bspline.closest import feet
 from mracad.bspline.surface import Net
 from mracad.bspline.vectors import cross, unit
@@ -36,6 +37,8 @@ class Offset:
     u_knots: Array = field(default_factory=lambda: np.empty(0))
     v_knots: Array = field(default_factory=lambda: np.empty(0))
     degrees: tuple[int, int] = (0, 0)
+
+    __repr__ = line
 
     @classmethod
     def of(cls, own: Net, fine: Net, poles: Array) -> Offset:
@@ -70,6 +73,8 @@ class Displacement:
 
     offsets: dict[int, Offset] = field(default_factory=dict)
     slid: dict[int, int] = field(default_factory=dict)
+
+    __repr__ = line
 
     def scaled(self, factor: float) -> Displacement:
         """The displacement multiplied by ``factor``."""

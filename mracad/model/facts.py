@@ -8,6 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
+from mracad.brief import line
 from mracad.model.brep import Model
 
 Array = np.ndarray
@@ -63,6 +64,8 @@ class Spot:
     normal: Array | None
     along: Array | None
     bends: tuple[tuple[float, Array], ...]
+
+    __repr__ = line
 
 
 @dataclass(frozen=True)

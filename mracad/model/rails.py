@@ -15,6 +15,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from mracad.brief import line
+
 Array = np.ndarray
 
 
@@ -44,6 +46,8 @@ class Elementary:
     radius: float = 0.0
     minor: float = 0.0
     slope: float = 0.0
+
+    __repr__ = line
 
     def off(self, points: Array) -> tuple[Array, Array]:
         """Signed distances (mm) of points ``(q, 3)`` and the unit normals at their feet, ``(q,)`` and ``(q, 3)``."""
@@ -153,6 +157,8 @@ class Path:
     radius: float
     length: float
 
+    __repr__ = line
+
     def feet(self, points: Array) -> tuple[Array, Array]:
         """The nearest points ``(q, 3)`` of the path and its unit tangents there, ``(q, 3)``."""
         local = (points - self.frame[:3, 3]) @ self.frame[:3, :3]
@@ -184,3 +190,5 @@ class Rails:
     grounds: Mapping[int, Elementary] = field(default_factory=dict)
     ends: Mapping[int, tuple[int, int]] = field(default_factory=dict)
     paths: Mapping[int, Path] = field(default_factory=dict)
+
+    __repr__ = line

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 from OCP.BRep import BRep_Tool
-from OCP.Geom import Geom_BSplineSurface
+from OCP.Geom import Geom_BezierSurface, Geom_BSplineSurface
 from OCP.Geom2d import Geom2d_Curve
 from OCP.TCollection import TCollection_ExtendedString
 from OCP.TDataStd import TDataStd_Name
@@ -20,6 +20,7 @@ from OCP.TopoDS import TopoDS, TopoDS_Edge, TopoDS_Face, TopoDS_Shape
 from OCP.TopTools import TopTools_IndexedMapOfShape
 from OCP.XCAFDoc import XCAFDoc_DocumentTool, XCAFDoc_ShapeTool
 
+from mracad.brief import model_line
 from mracad.errors import FileError
 from mracad.occ.labels import Title, components, label_colour, label_key, label_name, labels, usages
 from mracad.occ.units import Units, metres
@@ -141,6 +142,13 @@ class Document:
     moved: set[str] = field(default_factory=set)
     origins: dict[str, str] = field(default_factory=dict)
 
+    def __repr__(self) -> str:
+        return self.told()
+
+    def told(self, *more: str) -> str:
+        """What it is, and more, in one line."""
+        return model_line("Document", self.name, (self.nurbs, len(self.faces)), self.unit, self.schema, *more)
+
     def checked(self) -> Document:
         """The document, if it has faces, all on surfaces; raises FileError."""
         if not any(part.faces.Extent() for part in self.parts):
@@ -205,6 +213,12 @@ class Document:
     def faces(self) -> list[TopoDS_Face]:
         """All faces, in their part's frame, in the order of ``Model.faces``."""
         return [TopoDS.Face_s(part.faces.FindKey(i)) for part in self.parts for i in range(1, part.faces.Extent() + 1)]
+
+    @property
+    def nurbs(self) -> int:
+        """The number of faces on NURBS surfaces."""
+        grounds = (BRep_Tool.Surface_s(face, TopLoc_Location()) for face in self.faces)
+        return sum(isinstance(each, Geom_BSplineSurface | Geom_BezierSurface) for each in grounds)
 
     def part_of(self, face: int) -> Part:
         """The part that a face belongs to."""

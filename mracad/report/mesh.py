@@ -20,7 +20,7 @@ from mracad.view.colours import CLAY, rgb
 Array = np.ndarray
 
 MOST = 150_000
-"""Largest number of triangles, each face once; coarser ones are made beyond that."""
+"""Largest number of triangles in pages; coarser ones are made beyond that."""
 
 CHORD, ANGLE = 4e-4, 18.0
 """Distance of the first triangles from the surface, as a share of the diagonal, and their turn, degrees."""
@@ -57,7 +57,9 @@ class Mesh:
     shades: Shades | None = None
 
 
-def mesh(document: Document, names: Mapping[int, str], reference: Document | None = None) -> Mesh | None:
+def mesh(
+    document: Document, names: Mapping[int, str], reference: Document | None = None, most: int = MOST
+) -> Mesh | None:
     """The mesh of a document; None where even the coarsest has more triangles than a browser should be given.
 
     Parameters
@@ -67,6 +69,8 @@ def mesh(document: Document, names: Mapping[int, str], reference: Document | Non
         What faces are called, by index.
     reference : Document, optional
         What deviation is measured from.
+    most : int
+        Largest number of triangles, each face once.
 
     Raises
     ------
@@ -79,7 +83,7 @@ def mesh(document: Document, names: Mapping[int, str], reference: Document | Non
         count = sum(len(each.corners) for each in body.facets.values())
         if not count:
             raise FileError(f"'{document.name}' cannot be meshed", "check its geometry")
-        if count <= MOST:
+        if count <= most:
             other = facets(reference, chord, angle) if reference else None
             shown = shades(body, sorted(body.facets), other) if other and other.facets else None
             return replace(_packed(body, names, count, chord * body.diagonal), shades=shown)

@@ -110,11 +110,14 @@ class Page:
     row: Mapping[str, Any] = field(default_factory=dict)
 
 
-def html(page: Page) -> bytes:
-    """A page as one HTML file that needs nothing else; the same bytes for the same content."""
+def html(page: Page, template: str = "page.html") -> bytes:
+    """A page as one HTML file that needs nothing else; the same bytes for the same content.
+
+    ``"frame.html"`` holds the model alone.
+    """
     mesh = page.mesh
     return rendered(
-        "page.html",
+        template,
         page,
         mesh=_base64(mesh.data) if mesh else "",
         shades=_base64(mesh.shades.data) if mesh and mesh.shades else "",

@@ -25,6 +25,7 @@ from typing import Any
 
 from msgspec import structs
 
+from mracad.brief import line
 from mracad.errors import FileError, UsageError
 from mracad.spec.fields import dashed, fields, named, nearest
 from mracad.spec.steps import STEPS, Options
@@ -42,6 +43,8 @@ class Step:
     id: str
     use: str
     options: Options
+
+    __repr__ = line
 
     def text(self) -> str:
         """The step as text for ``mracad pipeline``; files by name, without their folders."""

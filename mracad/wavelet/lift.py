@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from mracad.brief import line
 from mracad.bspline.curve import Curve
 from mracad.bspline.knots import Array, KnotVector
 from mracad.bspline.surface import Net
@@ -41,6 +42,8 @@ class Form:
     weights: Array | None
     make: Callable[[Knots, Array, Array | None], Spline]
     turned: tuple[bool, ...]
+
+    __repr__ = line
 
     @property
     def domains(self) -> list[tuple[float, float]]:

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from mracad.brief import line
 from mracad.bspline.knots import Array, KnotVector
 from mracad.errors import UsageError
 from mracad.wavelet.lift import Form
@@ -40,6 +41,8 @@ class LevelBands:
     v: TwoScale | Chain | None
     bands: dict[str, Array]
     residual: Array | None = None
+
+    __repr__ = line
 
     def scaled(self, gain: float) -> LevelBands:
         """The level with its details times ``gain``."""

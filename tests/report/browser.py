@@ -47,7 +47,7 @@ class Browser:
         self.events: list[dict[str, Any]] = []
         self._numbers = itertools.count(1)
         port = folder / "DevToolsActivePort"
-        self._until(lambda: port.exists() and port.read_text().count("\n"))
+        self.wait(lambda: port.exists() and port.read_text().count("\n"))
         where = port.read_text().split()[0]
         with urllib.request.urlopen(f"http://127.0.0.1:{where}/json/list") as answer:
             page = next(each for each in json.load(answer) if each["type"] == "page")
@@ -105,9 +105,10 @@ class Browser:
     def open(self, path: Path, ready: str) -> None:
         """Open a file and wait until an expression is true."""
         self.do("Page.navigate", url=path.as_uri())
-        self._until(lambda: self.ask(ready))
+        self.wait(lambda: self.ask(ready))
 
-    def _until(self, true: Any) -> None:
+    def wait(self, true: Any) -> None:
+        """Wait until a function says so."""
         end = time.monotonic() + PATIENCE
         while not true():
             assert time.monotonic() < end, "the browser does not get ready"

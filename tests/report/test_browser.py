@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+import mracad
 from tests.report.browser import CHROMIUM, Browser
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium on this machine")
@@ -114,3 +115,21 @@ def test_paper_gets_the_picture_instead_of_the_model(page):
 def test_names_are_text(page, made):
     shown = page.ask("document.body.innerText")
     assert "<script>alert(1)</script>" in shown and "</script><!--" in shown
+
+
+def test_a_notebook_shows_the_model_to_turn_apart_from_itself(page, made, tmp_path):
+    """The last test: the page is another one then."""
+    path = tmp_path / "cell.html"
+    path.write_text("<!doctype html><meta charset=utf-8>" + mracad.read(made.model)._repr_html_(), encoding="utf-8")
+    page.open(path, "document.querySelector('iframe') !== null")
+
+    def turned():
+        before = page.seen("iframe")
+        page.drag("iframe", (90, 30))
+        return changed(before, page.seen("iframe")) > 0.02
+
+    page.wait(turned)
+    assert turned(), "not only the picture has been replaced"
+    assert page.ask("document.querySelector('iframe').contentDocument") is None
+    assert page.complaints() == []
+    assert {each.partition(":")[0] for each in page.requests()} <= {"file", "data", "blob"}

@@ -144,12 +144,12 @@ def test_an_index_in_a_browser(batched, tmp_path):
         assert browser.ask(f"{shown}.map((row) => row.cells[1].textContent.split('/').pop())") == [NAMES[2]]
         browser.ask(f"{field}.value = '<script>'; {field}.dispatchEvent(new Event('input'))")
         browser.ask(f"{shown}[0].cells[1].querySelector('a').click()")
-        browser._until(lambda: browser.ask("document.querySelector('#stage.live canvas') !== null"))
+        browser.wait(lambda: browser.ask("document.querySelector('#stage.live canvas') !== null"))
         assert NAMES[1] in browser.ask("document.querySelector('h1').textContent")
         assert browser.ask("document.querySelector('.bar').hidden")
         plain = browser.seen("canvas")
         browser.ask("document.querySelector('[data-show=deviation]').click()")
-        browser._until(lambda: not browser.ask("document.querySelector('.bar').hidden"))
+        browser.wait(lambda: not browser.ask("document.querySelector('.bar').hidden"))
         mapped = browser.seen("canvas")
         assert (np.ptp(mapped, axis=2) > 60).mean() > 0.02 > (np.ptp(plain, axis=2) > 60).mean(), "red and blue"
         browser.ask("document.querySelector('[data-show=shaded]').click()")

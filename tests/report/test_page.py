@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 from OCP.BRepPrimAPI import BRepPrimAPI_MakeSphere
 
-from mracad.report import mesh as meshes
 from mracad.report.mesh import mesh
 from mracad.report.page import Figure, Page, html
 from mracad.report.table import MOST, Column, Table
@@ -152,18 +151,16 @@ def test_a_packed_sphere_is_a_sphere():
     assert volume == pytest.approx(4 / 3 * np.pi * 1000, rel=0.01), "triangles look outward"
 
 
-def test_large_models_get_coarser_triangles(monkeypatch):
+def test_large_models_get_coarser_triangles():
     document = shapes.document(BRepPrimAPI_MakeSphere(10.0).Shape())
     fine = mesh(document, {})
-    monkeypatch.setattr(meshes, "MOST", fine.triangles // 2)
-    coarse = mesh(document, {})
+    coarse = mesh(document, {}, most=fine.triangles // 2)
     assert coarse.triangles <= fine.triangles // 2 and coarse.chord > fine.chord
 
 
-def test_a_page_without_a_model_to_turn_says_so(monkeypatch):
+def test_a_page_without_a_model_to_turn_says_so():
     document = shapes.document(BRepPrimAPI_MakeSphere(10.0).Shape())
-    monkeypatch.setattr(meshes, "MOST", 1)
-    assert mesh(document, {}) is None
+    assert mesh(document, {}, most=1) is None
     page = Page("ball", "Report", (), (), (), Figure("The ball", b"picture"), None)
     found = Read(html(page).decode())
     assert "too many faces to turn" in " ".join(found.texts)

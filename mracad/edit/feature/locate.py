@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mracad.brief import line
 from mracad.bspline.surface import Net
 from mracad.edit.feature.ground import SIDEWAYS, Feet, Ground
 from mracad.edit.feature.patch import Patch
@@ -62,6 +63,8 @@ class Place:
     size: float = 1.0
     height: float = 1.0
     direction: Array | None = None
+
+    __repr__ = line
 
 
 def place(ground: Ground, given: Point | OnFace, label: str) -> Place:

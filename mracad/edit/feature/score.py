@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from mracad.brief import line
 from mracad.edit.feature.detail import LOST
 from mracad.edit.feature.fit import between
 from mracad.edit.feature.ideal import Copies
@@ -69,6 +70,8 @@ class Copy:
     taken: float = 0.0
     radius: float = 0.0
 
+    __repr__ = line
+
 
 @dataclass(frozen=True, eq=False)
 class Figures:
@@ -79,6 +82,8 @@ class Figures:
     lost: Array
     short: Array
     faces: Array
+
+    __repr__ = line
 
 
 def compared(copies: Copies, wanted: Mapping[int, Wanted], done: Mapping[int, Array], exact: Array) -> list[Copy]:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mracad.brief import line
 from mracad.bspline.closest import distances
 from mracad.inspect.compare.subject import EQUAL, Array, CompareLimits, Match, Point, Subject, layer, paired
 from mracad.inspect.verdict import Finding, Layer
@@ -58,6 +59,8 @@ class FaceDeviation:
     bound: float | None
     outline: Spread
     tolerance: float
+
+    __repr__ = line
 
     @property
     def worst(self) -> Spread:
