@@ -5,7 +5,7 @@ from html.parser import HTMLParser
 import pytest
 from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
 
-import mracad as package
+from mracad.api.document import of
 from mracad.report import notebook
 from mracad.report.notebook import ROWS, cell
 from tests.occ import shapes
@@ -33,8 +33,9 @@ def framed(text):
     return frame["srcdoc"]
 
 
-def test_the_frame_is_a_whole_page_of_its_own(made):
-    text = package.read(made.model)._repr_html_()
+def test_the_frame_is_a_whole_page_of_its_own():
+    document = shapes.document(BRepPrimAPI_MakeBox(1.0, 2.0, 3.0).Shape(), names={0: HOSTILE})
+    text = of(document, lambda: document)._repr_html_()
     assert len(text) < 600_000
     inner = framed(text)
     read = Read(inner)
