@@ -112,7 +112,7 @@ fresh: $(VENV)/dev
 	$(BIN)/python -m build --outdir build/fresh
 	for package in build/fresh/*.whl build/fresh/*.tar.gz; do \
 	  rm -rf build/fresh/venv && $(PYTHON) -m venv build/fresh/venv && \
-	  build/fresh/venv/bin/pip install --quiet $$package && \
+	  build/fresh/venv/bin/pip install --quiet "$$package[view]" && \
 	  (cd build/fresh && PATH="$$PWD/venv/bin:$$PATH" sh -e ../../packaging/try.sh ../../samples) || exit 1; \
 	done
 
@@ -123,7 +123,7 @@ man: $(VENV)/ready
 $(VENV)/ready: pyproject.toml constraints.txt
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "mracad needs Python 3.11 or newer: make PYTHON=python3.11")'
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/pip install --quiet --editable .
+	$(BIN)/pip install --quiet --editable '.[cadquery,features,view]'
 	@touch $@
 
 $(VENV)/dev: $(VENV)/ready

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from enum import IntEnum
 
 
@@ -54,6 +56,21 @@ class MracadError(Exception):
 
     def __reduce__(self) -> tuple[object, ...]:
         return _again, (type(self), self.message, self.hint, self.code)
+
+
+@contextmanager
+def needing(extra: str, what: str) -> Iterator[None]:
+    """Name the extra that ``what`` needs where a package that is imported in the block is not installed.
+
+    Raises
+    ------
+    UsageError
+    """
+    try:
+        yield
+    except ModuleNotFoundError as error:
+        missing = (error.name or "a package").partition(".")[0]
+        raise UsageError(f"{what}: {missing} is not installed", f"pip install 'mracad[{extra}]'") from error
 
 
 def _again(kind: type[MracadError], message: str, hint: str, code: Code) -> MracadError:

@@ -6,6 +6,7 @@ import shlex
 import subprocess
 import sys
 import tomllib
+from itertools import chain
 from pathlib import Path
 
 import pytest
@@ -62,7 +63,8 @@ def test_one_version():
 
 def test_conda_needs_what_pip_needs():
     recipe = yaml.safe_load((ROOT / "packaging" / "conda" / "meta.yaml").read_text())
-    needs = {CONDA.get(name, name) for name in PROJECT["dependencies"]}
+    extras = (PROJECT["optional-dependencies"][name] for name in ("cadquery", "features", "view"))
+    needs = {CONDA.get(name, name) for name in chain(PROJECT["dependencies"], *extras)}
     assert set(recipe["requirements"]["run"]) == needs | {f"python {PROJECT['requires-python']}"}
 
 

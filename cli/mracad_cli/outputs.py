@@ -12,7 +12,7 @@ import click
 from click.core import ParameterSource
 
 from mracad import note
-from mracad.errors import FileError, UsageError
+from mracad.errors import FileError, UsageError, needing
 from mracad.formats import FORMATS, Format, by_extension
 from mracad.spec.fields import dashed
 from mracad_cli.options import PAGES, PICTURES, Reading, Reports, Writing
@@ -76,6 +76,9 @@ def check_outputs(writing: Writing, beside: Collection[str | None] = (), *, dry:
     if paths.count("-") > 1:
         raise UsageError("- is named twice", "give each -o once")
     formats = {path: FORMATS[writing.format] if path == "-" else by_extension(path) for path in paths}
+    if any(format.name == "mp4" for format in formats.values()):
+        with needing("video", "cannot write MP4"):
+            import imageio_ffmpeg  # noqa: F401
     _check_options(formats.values(), "-" in paths)
     if writing.scalars.scalar:
         _check_scalars(formats.values())
@@ -126,9 +129,14 @@ def check_reports(*paths: str | None, overwrite: bool) -> None:
 
 
 def check_page(path: str | None) -> None:
-    """Refuse a page that is not HTML."""
-    if path is not None and not path.lower().endswith(PAGES):
+    """Refuse a page that is not HTML, or cannot be made here."""
+    if path is None:
+        return
+    if not path.lower().endswith(PAGES):
         raise UsageError(f"cannot write {path}: reports with pictures are HTML", "name a file that ends in .html")
+    with needing("view", "cannot make a report"):
+        import jinja2  # noqa: F401
+        import matplotlib  # noqa: F401
 
 
 def check_junit(path: str, overwrite: bool) -> None:

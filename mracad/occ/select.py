@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from mracad.errors import UsageError
+from mracad.errors import UsageError, needing
 from mracad.occ.document import Document
 
 
@@ -26,8 +26,9 @@ def select_cq(document: Document, expression: str) -> set[int]:
     UsageError
         For an expression that CadQuery does not understand.
     """
-    from cadquery import Face, StringSyntaxSelector  # takes seconds to import
-    from pyparsing import ParseException
+    with needing("cadquery", f"cannot select 'cq:{expression}'"):
+        from cadquery import Face, StringSyntaxSelector  # takes seconds to import
+        from pyparsing import ParseException
 
     placed = [
         (Face(document.faces[index].Moved(placement)), index)

@@ -13,6 +13,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from mracad.errors import needing
 from mracad.report.table import Table
 from mracad.spec.pictures import VIEWS
 
@@ -146,7 +147,8 @@ def row_of(path: Path) -> dict[str, Any]:
 
 @cache
 def _environment() -> Environment:
-    from jinja2 import Environment, FunctionLoader, StrictUndefined
+    with needing("view", "cannot make a report"):
+        from jinja2 import Environment, FunctionLoader, StrictUndefined
 
     return Environment(
         autoescape=True, loader=FunctionLoader(_data), undefined=StrictUndefined, finalize=_clean, trim_blocks=True,

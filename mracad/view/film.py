@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from mracad.errors import FileError
+from mracad.errors import needing
 
 RATE = 12
 """Pictures in a second."""
@@ -20,7 +20,7 @@ _MP4 = "-crf 18 -preset medium -threads 1 -fflags +bitexact -flags:v +bitexact -
 
 
 def packed(frames: Sequence[Image.Image], format: str) -> bytes:
-    """The file of pictures: of the first alone as PNG, of all as GIF or MP4; raises FileError."""
+    """The file of pictures: of the first alone as PNG, of all as GIF or MP4; raises UsageError."""
     if format == "mp4":
         return _mp4(frames)
     stream = io.BytesIO()
@@ -36,11 +36,8 @@ def packed(frames: Sequence[Image.Image], format: str) -> bytes:
 
 
 def _mp4(frames: Sequence[Image.Image]) -> bytes:
-    try:
+    with needing("video", "cannot write MP4"):
         import imageio_ffmpeg
-    except ImportError as error:
-        hint = "pip install 'mracad[video]', or write a .gif"
-        raise FileError("cannot write MP4: imageio-ffmpeg is not installed", hint) from error
     width, height = (side // 2 * 2 for side in frames[0].size)  # the format holds colours of every second pixel
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "a.mp4"

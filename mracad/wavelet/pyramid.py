@@ -15,7 +15,7 @@ import numpy as np
 
 from mracad.brief import line
 from mracad.bspline.knots import Array, KnotVector
-from mracad.errors import UsageError
+from mracad.errors import UsageError, needing
 from mracad.wavelet.lift import Form
 from mracad.wavelet.step import Chain, TwoScale
 
@@ -271,7 +271,8 @@ class Pyramid:
         >>> len(wavedec(make_interp_spline(x, np.sin(x)), levels=3).plot().axes)
         3
         """
-        from mracad.wavelet.plot import figure
+        with needing("view", "cannot plot"):
+            from mracad.wavelet.plot import figure
 
         levels = [(self.places(i), level.heights) for i, level in enumerate(self.levels)]
         domains = [ladder[0].domain for ladder in self.ladders] if self.form is None else self.form.domains

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from mracad.errors import Code, MracadError
+from mracad.errors import Code, MracadError, needing
 from mracad.formats import FORMATS
 from mracad.job.batch.settings import Limits, Settings
 from mracad.spec.quantity import MEMORY, TIME
@@ -143,6 +143,9 @@ def command(
     steps = load(recipe).with_values(assignments)
     steps.steps("model.step")  # errors in it are reported before anything is read
     check_page(reports.report_html)
+    if place.cluster:
+        with needing("cluster", "no cluster"):
+            import distributed  # noqa: F401
     check_reports(reports.report, reports.report_html, reports.junit, reports.depfile, overwrite=True)
     words = [word for given in sources for word in (_listed() if given == "-" else [given])]
     items = find(words, Path(place.folder), place.format or "")

@@ -7,6 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from mracad.errors import needing
+
 if TYPE_CHECKING:
     from mracad.inspect.scalogram import Scalogram
     from mracad.inspect.spectrum import Direction, Spectrum
@@ -24,7 +26,8 @@ def picture(name: str, each: Sequence[Spectrum], scalograms: Mapping[str, Scalog
     Heights by band along u and v: the model in black, with its noise floor, where its shape begins and the scale that
     leaves the shape; each face in grey.  Under them scalograms, by direction, if there are any.
     """
-    from matplotlib.figure import Figure
+    with needing("view", "cannot plot spectra"):
+        from matplotlib.figure import Figure
 
     from mracad.inspect.spectrum import together
 
@@ -44,7 +47,8 @@ def picture(name: str, each: Sequence[Spectrum], scalograms: Mapping[str, Scalog
 
 def compared(name: str, before: Sequence[Spectrum], after: Sequence[Spectrum], scales: Mapping[str, float]) -> bytes:
     """Spectra of the same faces before and after an edit as SVG; noise and shape are those before; scales in mm."""
-    from matplotlib.figure import Figure
+    with needing("view", "cannot plot spectra"):
+        from matplotlib.figure import Figure
 
     from mracad.inspect.spectrum import together
 

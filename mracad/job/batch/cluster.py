@@ -13,7 +13,7 @@ from collections.abc import Callable
 from concurrent.futures import CancelledError, Executor, Future
 from typing import Any
 
-from mracad.errors import CrashError, FileError, UsageError
+from mracad.errors import CrashError, FileError
 from mracad.job.batch.pool import Pool
 from mracad.job.batch.settings import Limits
 from mracad.job.batch.work import warm
@@ -38,18 +38,14 @@ class Cluster(Executor):
 
     Raises
     ------
-    UsageError
-        When Dask is not installed.
     FileError
         When the cluster cannot be reached or has no workers.
     """
 
     def __init__(self, address: str, limits: Limits, workers: int = 1, patience: float = 30) -> None:
-        try:
-            import dask
-            import distributed
-        except ImportError as error:
-            raise UsageError(f"a cluster needs Dask ({error})", "pip install 'mracad[cluster]'") from error
+        import dask
+        import distributed
+
         dask.config.set({"distributed.admin.large-graph-warning-threshold": "1TB"})  # the models travel with the tasks
         self._limits = limits
         self._own = None

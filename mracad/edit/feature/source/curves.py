@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from mracad.errors import FileError
+from mracad.errors import FileError, needing
 
 Array = np.ndarray
 
@@ -91,8 +91,9 @@ def _svg(file: Path) -> list[Shape]:
     """Filled shapes of an SVG file; if nothing is filled, its closed strokes by the even-odd rule."""
     from xml.etree import ElementTree
 
-    from svgelements import SVG
-    from svgelements import Shape as Drawn
+    with needing("features", f"cannot read '{file}'"):
+        from svgelements import SVG
+        from svgelements import Shape as Drawn
 
     try:
         if _expanded(ElementTree.parse(file).getroot()) > MOST_PARTS:
@@ -156,8 +157,9 @@ def _loops(drawn: Any) -> Iterator[Array]:
 def _dxf(file: Path) -> tuple[list[Shape], tuple[str, ...]]:
     """The closed curves of a DXF file, by the even-odd rule, and a note if it states no unit; lines and arcs that meet
     are joined."""
-    import ezdxf
-    from ezdxf import disassemble, path, units
+    with needing("features", f"cannot read '{file}'"):
+        import ezdxf
+        from ezdxf import disassemble, path, units
 
     try:
         document = ezdxf.readfile(file)
