@@ -18,7 +18,15 @@ include_patterns = ["docs/*.md", "docs/start/*.md", "*.md", "samples/README.md",
 exclude_patterns = [".*", "build", "dist"]
 
 CONTENTS = {
-    "Start": ["install", "start/surfaces", "start/scans", "start/textures", "start/ci", "start/cadquery", "start/research"],
+    "Start": [
+        "install",
+        "start/surfaces",
+        "start/scans",
+        "start/textures",
+        "start/ci",
+        "start/cadquery",
+        "start/research",
+    ],
     "Whole faces": ["edits", "spectrum", "mra"],
     "Details": ["features", "example", "gallery"],
     "Looking": ["checks", "pictures", "report"],
