@@ -49,8 +49,8 @@ def told(report: Report, options: Selection) -> Told:
 
 
 def rings(report: Report) -> list[Ring] | None:
-    """The copies of a feature that an edit made; None if it made none."""
-    return [Ring(copy.faces[0], copy.at, copy.radius) for copy in report.edit.copies if copy.faces] or None
+    """The copies of a feature that an edit made, on the faces that they touch; None if it made none."""
+    return [Ring(copy.faces[0], copy.at, copy.radius, copy.faces) for copy in report.edit.copies if copy.faces] or None
 
 
 def _kind(outcome: FaceOutcome) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -31,11 +31,14 @@ class Ring:
     middle : (float, float, float)
         In the part's frame, mm.
     radius : float
+    on : collection of int, optional
+        The faces on which it is drawn; all if not given.
     """
 
     face: int
     middle: tuple[float, float, float]
     radius: float
+    on: Collection[int] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,11 +47,15 @@ class Rings:
 
     Attributes
     ----------
+    rings : sequence of Ring
+        What is placed.
     number : ndarray of int (n,)
+        Which of them, from 1.
     middles, normals : ndarray (n, 3)
     radii : ndarray (n,)
     """
 
+    rings: Sequence[Ring]
     number: Array
     middles: Array
     normals: Array
@@ -69,7 +76,9 @@ class Rings:
                     middles.append(np.array(ring.middle) @ turn + place.frame[:3, 3])
                     normals.append((facets.outward * unit(cross(su, sv)))[0])
                     radii.append(ring.radius)
-        return cls(np.array(number, int), np.reshape(middles, (-1, 3)), np.reshape(normals, (-1, 3)), np.array(radii))
+        return cls(
+            rings, np.array(number, int), np.reshape(middles, (-1, 3)), np.reshape(normals, (-1, 3)), np.array(radii)
+        )
 
     def look(self, stage: Stage, seen: Seen) -> Array:
         """The document's colours, with rings."""
@@ -77,10 +86,13 @@ class Rings:
         pixel, (width, _) = stage.camera.pixel, stage.camera.size
         row, column = np.divmod(seen.pixel, width)
         at = stage.camera.project(self.middles)
+        face = np.array([place.faces[own] for place, own, _ in stage.entries])[seen.entry]
         for k, radius in enumerate(self.radii):
             reach = radius / pixel + HALF + 1.0
             near = np.flatnonzero((np.abs(row - at[k, 1]) <= reach) & (np.abs(column - at[k, 0]) <= reach))
             near = near[self.normals[k] @ seen.normal[:, near] > 0.0]
+            on = self.rings[self.number[k] - 1].on
+            near = near if on is None else near[np.isin(face[near], list(on))]
             arm = seen.point[:, near] - self.middles[k][:, None]
             away = np.sqrt((arm * arm).sum(axis=0))
             slope = _slope(stage, seen.normal[:, near], arm / np.maximum(away, 1e-300))

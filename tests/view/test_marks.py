@@ -69,6 +69,22 @@ def test_a_ring_is_as_far_from_its_middle_as_it_says_and_on_its_side_alone():
             assert not there or (own * off).sum() / own.sum() == pytest.approx(0.0, abs=0.1)
 
 
+def test_a_ring_is_drawn_on_its_faces_alone():
+    """The tops of two cubes side by side, of which it keeps to one."""
+    document = row_of_cubes(2)
+    tops = sorted((f for f in snapshot(document).faces if f.box[0, 2] > 9), key=lambda f: f.box[0, 0])
+    x, y = tops[0].box[1, 0], tops[0].box[:, 1].mean()
+    options = Picture(show="features", view=("top",), size="300x160")
+    seen = []
+    for on in (None, (tops[0].index,)):
+        ring = Ring(tops[0].index, (x, y, 10.0), 3.0, on)
+        picture = image(render(document, options, rings=[ring]).data)
+        red = picture[..., 0] > picture[..., 1:].max(axis=-1) + 60
+        seen.append([red[:, :148].sum(), red[:, 152:].sum()])
+    (left, right), (own, other) = seen
+    assert own == left > 50 and right > 50 and other == 0
+
+
 def test_a_wipe_is_the_left_of_one_and_the_right_of_the_other():
     one, other = (shapes.document(BRepPrimAPI_MakeBox(size, size, 10.0).Shape()) for size in (10.0, 9.9))
     options = {"show": "isophotes", "view": ("1,-2,1.5",), "size": "300x200"}

@@ -19,9 +19,9 @@ from mracad.edit.feature.fit import NARROWEST
 from mracad.edit.feature.ground import Ground
 from mracad.edit.feature.ideal import copies
 from mracad.edit.feature.lay import Laid, laid
-from mracad.edit.feature.locate import Place, place, standing
+from mracad.edit.feature.locate import Place, place, standing, told
 from mracad.edit.feature.pattern import places
-from mracad.edit.feature.score import lumpy
+from mracad.edit.feature.score import CUT_OFF, HELD_BADLY, Unfit, lumpy
 from mracad.edit.result import Edit, FaceOutcome, Reason, untouched
 from mracad.errors import EditError
 from mracad.model.brep import Face, Model
@@ -38,6 +38,17 @@ Array = np.ndarray
 
 PIECES = 64
 """Largest number of pieces of the law of a joint that moves with copies."""
+
+ROUNDS = 4
+"""How often a fill is laid at most: each time without the places that cannot take a copy."""
+
+LARGE, BYTES = 100_000, 115
+"""Control points that a surface grows by beyond which a note says so, and what one takes in a STEP file."""
+
+FILLED = {
+    HELD_BADLY: "make copies smaller with --size, or select other faces",
+    CUT_OFF: "make copies smaller with --size, keep borders clear with --margin, or allow that with --clip",
+}
 
 FACE = "write a face as #3, or its name"
 
@@ -80,8 +91,9 @@ def repeat(
     ground = Ground.of(model, chosen).without(feature.origin.offsets if feature.origin else {})
     note.doing("finding places")
     found, skipped = places(ground, feature, options, _wishes(options, scope))
-    edit = _edit(model, scope, _laid(ground, feature, found, options, scope, {}))
-    return replace(edit, notes=(*feature.notes, *skipped, *edit.notes))
+    laid, left = _filled(ground, feature, found, options, scope)
+    edit = _edit(model, scope, laid)
+    return replace(edit, notes=(*feature.notes, *skipped, *left, *edit.notes))
 
 
 def transferred(model: Model, options: Transfer, source: Model, scope: Scope) -> Edit:
@@ -108,6 +120,29 @@ def _refuse_held(model: Model, offsets: Mapping[int, Array], scope: Scope) -> No
 def _target(ground: Ground, text: str, options: Copied | Transfer) -> Place:
     found = place(ground, spot(text, "to"), f"place ({text})")
     return replace(found, rotate=math.radians(options.rotate), size=options.size, height=options.height)
+
+
+def _filled(
+    ground: Ground, feature: Feature, found: Sequence[Place], options: Repeat, scope: Scope
+) -> tuple[Laid, tuple[str, ...]]:
+    """Copies, for a fill at those places that can take them, and notes on the others; raises EditError."""
+    left: dict[str, list[str]] = {}
+    rest = found
+    for again in reversed(range(ROUNDS)):
+        try:
+            laid = _laid(ground, feature, rest, options, scope, {})
+            break
+        except Unfit as error:
+            if not options.fill:
+                raise
+            bad = {k for some in error.bad.values() for k in some}
+            if not again or len(bad) == len(rest):
+                raise EditError(error.message, FILLED[next(why for why, some in error.bad.items() if some)]) from error
+            for why, some in error.bad.items():
+                left.setdefault(why, []).extend(some.values())
+            rest = [each for k, each in enumerate(rest) if k not in bad]
+    count = len(found)
+    return laid, tuple(f"{len(x)} of {count} places left out, because {why}: {told(x)}" for why, x in left.items() if x)
 
 
 def _laid(
@@ -149,7 +184,20 @@ def _edit(model: Model, scope: Scope, laid: Laid) -> Edit:
         Treatment(e, tuple(s.face for s in model.edges[e].sides), how, laid.frozen[e] if how == "frozen" else None)
         for e, how in sorted(ways.items())
     )
-    return Edit(Displacement(laid.offsets), outcomes, edges=edges, copies=laid.copies, notes=lumpy(laid.copies))
+    notes = lumpy(laid.copies) + _large(outcomes, len(laid.copies))
+    return Edit(Displacement(laid.offsets), outcomes, edges=edges, copies=laid.copies, notes=notes)
+
+
+def _large(outcomes: Sequence[FaceOutcome], copies: int) -> tuple[str, ...]:
+    """A note on the face that grows most, if copies make it large."""
+    most = max(outcomes, key=lambda each: each.added)
+    if most.added <= LARGE:
+        return ()
+    fewer = ", a larger spacing, or rows along its knot lines (--fill grid, --align)" if copies > 1 else ""
+    return (
+        f"#{most.face + 1} grows from {most.points - most.added} to {most.points} control points, by about "
+        f"{most.added * BYTES / 1e6:.0f} MB in a STEP file: a larger or smoother feature{fewer} needs fewer",
+    )
 
 
 def _outcome(model: Model, face: Face, laid: Laid, touched: Collection[int]) -> FaceOutcome:

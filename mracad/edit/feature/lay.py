@@ -130,13 +130,17 @@ def laid(copies: Copies, wishes: Wishes, coupled: bool, clip: bool, removed: Map
 
     Raises
     ------
-    EditError
-        If held control points cut off too much of a copy.
+    Unfit
+        If control points cannot hold a copy, or held ones cut off too much of it.
     """
     shifts = shifted(copies)
     task = _task(copies, shifts, wishes, removed)
+    crossed = _crossings(task, copies) if coupled else []
+    if crossed:  # what control points cannot hold is known before seams are fitted, which takes longest
+        bare = _attempt(task, ())
+        refuse(compared(copies, bare.wanted, bare.done, shifts.matched), clip=True)
     note.doing("fitting seams under copies")
-    attempt, moving, given_up = _settled(task, _crossings(task, copies) if coupled else [])
+    attempt, moving, given_up = _settled(task, crossed)
     note.doing("comparing copies with the feature")
     found = compared(copies, attempt.wanted, attempt.done, shifts.matched)
     refuse(found, clip)

@@ -11,6 +11,7 @@ from mracad.brief import line
 from mracad.edit.feature.detail import LOST
 from mracad.edit.feature.fit import between
 from mracad.edit.feature.ideal import Copies
+from mracad.edit.feature.locate import told
 from mracad.edit.feature.patch import Patch
 from mracad.edit.feature.seams import Wanted
 from mracad.errors import EditError
@@ -19,7 +20,6 @@ Array = np.ndarray
 
 SHORT = 0.2
 """Share of its height by which a copy may deviate from the ideal if nothing is held."""
-
 
 NOTED = 0.05
 """The same share beyond which a note says so."""
@@ -171,25 +171,47 @@ def lumpy(found: Sequence[Copy]) -> tuple[str, ...]:
     return (f"{some} by more than {100 * NOTED:.0f} % of the height, because the surface is not smooth there: {most}",)
 
 
+HELD_BADLY, CUT_OFF = "the faces there cannot hold a copy", "edges or holes that stay in place would cut off a copy"
+
+
+class Unfit(EditError):
+    """Copies that their places cannot take.
+
+    Attributes
+    ----------
+    bad : dict of str to dict of int to str
+        By cause (:data:`HELD_BADLY`, :data:`CUT_OFF`), their positions and names.
+    """
+
+    bad: Mapping[str, Mapping[int, str]] = {}
+
+
 def refuse(found: Sequence[Copy], clip: bool) -> None:
-    """Raise EditError for a copy that the ground cannot hold, or that loses too much to held control points.
+    """Raise Unfit for copies that the ground cannot hold, or that lose too much to held control points.
 
     ``clip`` allows the latter.
     """
-    for copy in found:
-        if copy.short > SHORT * copy.height:
-            raise EditError(
-                f"{_at(copy)}: the faces there cannot hold the copy: it would deviate by "
-                f"{100 * copy.short / copy.height:.0f} % of its height ({_numbers(copy)})",
-                "make it smaller with --size, or choose other places",
-            )
-    for copy in found:
-        if copy.lost > LOST * copy.height and not clip:
-            raise EditError(
-                f"{_at(copy)}: edges or holes that stay in place cut off "
-                f"{100 * min(copy.lost / copy.height, 1):.0f} % of the copy's height ({_numbers(copy)})",
-                "move it away from them, make it smaller with --size, or allow that with --clip",
-            )
+    short = {k: copy for k, copy in enumerate(found) if copy.short > SHORT * copy.height}
+    lost = {k: copy for k, copy in enumerate(found) if copy.lost > LOST * copy.height and not clip}
+    bad = short | lost
+    if not bad:
+        return
+    first, *others = bad.values()
+    if short:
+        share = 100 * first.short / first.height
+        what = f"the faces there cannot hold the copy: it would deviate by {share:.0f} % of its height"
+        hint = "make it smaller with --size, or choose other places"
+    else:
+        share = 100 * min(first.lost / first.height, 1)
+        what = f"edges or holes that stay in place cut off {share:.0f} % of the copy's height"
+        hint = "move it away from them, make it smaller with --size, or allow that with --clip"
+    also = f"; no better: {told([_at(copy) for copy in others])}" if others else ""
+    error = Unfit(f"{_at(first)}: {what} ({_numbers(first)}){also}", hint)
+    error.bad = {
+        HELD_BADLY: {k: _at(c) for k, c in short.items()},
+        CUT_OFF: {k: _at(lost[k]) for k in sorted(lost.keys() - short)},
+    }
+    raise error
 
 
 def _numbers(copy: Copy) -> str:

@@ -538,6 +538,11 @@ def test_copies_that_are_off_by_a_fifth_of_their_height_are_named():
     with pytest.raises(EditError, match=r"two \(0,0,0\): .* cannot hold the copy: .* by 21 % .* .#5.") as caught:
         refuse([copy("one", 0.59, 3.0), copy("two", 1.26, 6.0)], clip=True)
     assert caught.value.code == Code.CANNOT_EDIT
+    with pytest.raises(EditError, match=r"two \(0,0,0\): .* no better: four \(0,0,0\); one \(0,0,0\);") as caught:
+        refuse(
+            [copy(name, short, 6.0) for name, short in zip(("one", "two", "four"), (0, 1.3, 1.3), strict=True)], False
+        )
+    assert [list(some) for some in caught.value.bad.values()] == [[1, 2], [0]]
 
 
 @pytest.mark.parametrize("angle", [0.0, 1.0])

@@ -1,11 +1,14 @@
 """Places all over grounds of known geometry: their distances, borders, seams."""
 
+import re
+
 import numpy as np
 import pytest
 
 from mracad.bspline.fit import interpolated as at_greville
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
+from mracad.edit.feature import edits
 from mracad.edit.feature.clear import parts
 from mracad.edit.feature.detail import Feature
 from mracad.edit.feature.fill import Room, random
@@ -207,3 +210,23 @@ def test_too_many_places_are_refused_before_they_are_made():
     with pytest.raises(MracadError, match="more than") as caught:
         filled(view(grounds.sewn([grounds.uneven(60.0)])), fill="poisson,spacing:0.01mm")
     assert caught.value.code == Code.LIMIT
+
+
+def test_places_that_cannot_take_a_copy_are_left_out_and_told(monkeypatch):
+    """Two planes that meet in the ridge x = 15 of one surface: nothing smooth bends over it."""
+    k, h = KnotVector.clamped([0, 5, 10, 15, 15, 15, 20, 25, 30], 3), KnotVector.clamped(np.linspace(0, 20, 5), 3)
+    x, y = np.meshgrid(k.greville(), h.greville(), indexing="ij")
+    model = view(grounds.sewn([Net(k, h, np.stack([x, y, -1.5 * np.abs(x - 15)], axis=-1))]))
+    options = Repeat(feature="formula:0.2*exp(-(x*x+y*y)/1),radius:2mm", fill="hexagons,spacing:5mm")
+    monkeypatch.setattr(edits, "LARGE", 1000)
+    edit = edits.repeat(model, options)
+    assert len(edit.copies) > 20 and max(copy.short for copy in edit.copies) < 0.05 * 0.2
+    left, large = edit.notes
+    assert re.match(
+        r"1 of \d+ places left out, because the faces there cannot hold a copy: place \d+ of \d+ \(15\.", left
+    )
+    (face,) = edit.outcomes
+    assert large.startswith(f"#1 grows from {face.points - face.added} to {face.points} control points, by about ")
+    monkeypatch.setattr(edits, "ROUNDS", 1)
+    with pytest.raises(EditError, match=r"cannot hold the copy: .*select other faces"):
+        edits.repeat(model, options)
