@@ -104,12 +104,14 @@ class Rings:
         """The numbers of rings whose middle is seen."""
         width, height = panel.stage.camera.size
         at = panel.stage.camera.project(self.middles)
-        entry = np.full(width * height, -1)
-        entry[panel.pixel] = panel.entry
+        face = np.full(width * height, -1)
+        face[panel.pixel] = np.array([place.faces[own] for place, own, _ in panel.stage.entries])[panel.entry]
         found: dict[int, Label] = {}
         for k, (x, y, _) in enumerate(at.tolist()):
             inside = 0 <= x < width and 0 <= y < height
-            if inside and self.normals[k] @ panel.stage.camera.toward > 0 and entry[int(y) * width + int(x)] >= 0:
+            ring = self.rings[self.number[k] - 1]
+            seen = inside and face[int(y) * width + int(x)] in (ring.face, *(ring.on or ()))
+            if seen and self.normals[k] @ panel.stage.camera.toward > 0:
                 found.setdefault(self.number[k], Label(str(self.number[k]), at[k : k + 1, :2]))
         return [found[number] for number in sorted(found)], 0
 
