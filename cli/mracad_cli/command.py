@@ -66,7 +66,17 @@ class Command(click.Command):
         ctx.meta["mracad.arguments"] = [*ctx.command_path.split()[1:], *args]
         if self.defaulted and not ctx.resilient_parsing:
             self._take_defaults(ctx, {*args} & {*ctx.help_option_names})
+            self._refuse_repeated(ctx, args)
         return super().parse_args(ctx, args)
+
+    def _refuse_repeated(self, ctx: click.Context, args: list[str]) -> None:
+        """Refuse an option that is given twice though it has one value: the first would be ignored."""
+        given = self.make_parser(ctx).parse_args(args=[*args])[2]
+        for param in given:
+            single = isinstance(param, click.Option) and not (param.multiple or param.is_flag or param.count)
+            if single and given.count(param) > 1:
+                name = next(word for word in param.opts if any(arg.startswith(word) for arg in args))
+                raise UsageError(f"{name} is given {given.count(param)} times", f"give {name} once")
 
     def _take_defaults(self, ctx: click.Context, helped: Collection[str]) -> None:
         """Give the context the defaults of files and the environment; help is shown even where these are wrong."""

@@ -82,6 +82,8 @@ def check_outputs(writing: Writing, beside: Collection[str | None] = (), *, dry:
     _check_options(formats.values(), "-" in paths)
     if writing.scalars.scalar:
         _check_scalars(formats.values())
+    for format in formats.values():
+        writing.picture.check(format.name)
     files = [path for path in paths if path != "-"]
     replaces = writing.overwrite or writing.if_changed
     check_reports(*files, *beside, overwrite=replaces or dry)
@@ -198,6 +200,8 @@ def deliver_models(
     for each in made:
         if each.written.lost:
             warn(f"{each.target.name} lacks {', '.join(map(str, each.written.lost))}")
+        if each.note:
+            warn(each.note)
     data = {path: each.data for path, each in zip(writing.outputs, made, strict=False)}
     stream = data.pop("-", b"" if "-" in writing.outputs else None)
     changed = {p: d for p, d in data.items() if not (writing.if_changed and holds(Path(p), d))}

@@ -53,12 +53,14 @@ class Target:
 
 @dataclass(frozen=True)
 class Made:
-    """The content of an output, how it differs from the document, and what it is as read back (None: not read back)."""
+    """The content of an output, how it differs from the document, what it is as read back (None: not read back), and
+    what a picture does not show."""
 
     target: Target
     data: bytes = field(repr=False)
     written: Written
     read_back: ReadBack | None = None
+    note: str = ""
 
 
 def written(document: Document, target: Target, title: str = "", original: Original | None = None) -> Made:
@@ -95,7 +97,8 @@ def pictured(
     """A picture of a document after its steps as an output; see :func:`drawn`."""
     from mracad.occ.files import Written
 
-    return Made(target, drawn(document, target.picture, original, done, target.format).data, Written())
+    found = drawn(document, target.picture, original, done, target.format)
+    return Made(target, found.data, Written(), note=found.note)
 
 
 def drawn(

@@ -76,4 +76,4 @@ def thumbnail(figure: Figure) -> str:
 
 
 def _range(drawn: Rendered) -> str:
-    return f"{drawn.lowest:.3g} to {drawn.highest:.3g} {drawn.unit}".replace("-", "−")
+    return f"{drawn.lowest:.3g} to {drawn.highest:.3g} {drawn.unit} in the pixels".replace("-", "−")

@@ -42,6 +42,9 @@ CURVATURES = "max", "mean", "gauss"
 SHOWN = (*SHOWS, *(f"curvature:{kind}" for kind in CURVATURES), "deviation:")
 """How texts of --show begin."""
 
+TURNING = "gif", "mp4"
+"""Formats in which the model turns."""
+
 AXES = "xyz"
 """Axes on which planes of sections stand."""
 
@@ -225,6 +228,11 @@ class Picture(Options, frozen=True, kw_only=True, forbid_unknown_fields=True):
             raise UsageError("comb: there is no section", "add --section z=120mm")
         if "stripes" in self.given() and show_of(self.show).kind not in STRIPED:
             raise UsageError(f"stripes: {self.show} has none", "add --show zebra or --show isophotes")
+
+    def check(self, format: str) -> None:
+        """Refuse what a format of pictures cannot show; raises UsageError."""
+        if format in TURNING and len(self.views) > 1:
+            raise UsageError(f"view: a .{format} turns the model in one view", "give one view, or write .png")
 
     @property
     def views(self) -> tuple[str, ...]:

@@ -78,6 +78,15 @@ class Pen:
         """A text on what is there."""
         self.draw.text(at, text, TONE, self.font, anchor, stroke_width=halo, stroke_fill="white")
 
+    def caption(self, corner: tuple[int, int], wide: int, text: str) -> None:
+        """A text in the upper left corner of a part of a sheet, in as many lines as its width asks for."""
+        unit = int(self.font.size)
+        for row, line in enumerate(self._wrapped(text, wide - 2 * unit)):
+            shown = line
+            while len(shown) > 1 and self.font.getlength(shown) > wide - 2 * unit:
+                shown = shown.rstrip("…")[:-1] + "…"
+            self.write((corner[0] + unit, corner[1] + unit + round(1.3 * row * unit)), shown, "la", HALO)
+
     def beside(self, legend: Legend) -> None:
         """What stands at the right."""
         if legend.map and legend.scale:

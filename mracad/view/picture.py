@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING
@@ -13,9 +13,10 @@ from mracad.errors import FileError, UsageError
 from mracad.model.facets import Body
 from mracad.occ.facets import facets
 from mracad.spec.pictures import Picture, Show, show_of, size_of
-from mracad.spec.select import every_nurbs, select
+from mracad.spec.select import every_nurbs
 from mracad.view.fields import map_of, numbers_of
 from mracad.view.film import packed
+from mracad.view.fit import SEEN, outlines, points, seen_share, shown_from, wanted
 from mracad.view.labels import of_faces
 from mracad.view.legend import Legend, strip
 from mracad.view.looks import Look, look
@@ -33,9 +34,6 @@ Array = np.ndarray
 CHORD = 0.25
 """Largest distance of triangles from the surface, pixels of the larger side when the whole model is shown."""
 
-ZOOM = 20.0
-"""Largest factor by which triangles get finer where a few faces fill the picture."""
-
 ANGLE = 30.0
 """Largest turn between triangles, degrees: only outlines depend on it."""
 
@@ -51,9 +49,11 @@ class Rendered:
     title, unit : str
         What a map shows, and in which unit; ``""`` for pictures that show no numbers.
     lowest, highest : float
-        The extreme numbers in the picture.
+        The extreme numbers in its pixels.
     rings : int, optional
         Number of features, where these are shown.
+    note : str
+        What is not seen, and what to do; ``""`` for nothing.
     """
 
     data: bytes = field(repr=False)
@@ -62,6 +62,7 @@ class Rendered:
     lowest: float = 0.0
     highest: float = 0.0
     rings: int | None = None
+    note: str = ""
 
 
 def render(
@@ -85,7 +86,7 @@ def render(
     reference : Document, optional
         What ``show="deviation"`` is measured from.
     told : Told, optional
-        What ``show="treatment"`` shows.
+        What an edit did to the document, which ``show="treatment"`` shows.
     rings : sequence of Ring, optional
         What ``show="features"`` shows, unless features are to be found.
     format : {"png", "gif", "mp4"}
@@ -99,27 +100,40 @@ def render(
         When nothing can be drawn.
     """
     picture = picture or Picture()
+    picture.check(format)
     show, size = show_of(picture.show), size_of(picture.size)
-    show = show_of(picture.show)
     if show.kind == "deviation" and reference is None:
         raise UsageError("show: deviation needs what it is measured from", "write deviation:REF.step")
     if show.kind == "treatment" and told is None:
         raise UsageError("show: treatment is what an edit did", "give it with -o OUT.png to an edit, such as smooth")
     if picture.wipe and before is None:
         raise UsageError("wipe: there is no other model", "add --before REF.step")
-    told = told if show.kind == "treatment" else None
     rings = (_proposed(document) if rings is None else rings) if show.kind == "features" else None
-    wanted, closer = _wanted(document, picture.fit)
+    fit, closer = wanted(document, picture.fit)
     mesh = partial(_meshed, chord=CHORD / max(size) / closer)
     bodies = [mesh(each) for each in (before, document) if each]
     base = mesh(reference) if show.kind == "deviation" and reference else None
     marked = Rings.of(rings, bodies[-1]) if rings is not None else None
-    looks = [_look(show, picture, body, base, told or marked) for body in bodies]
-    legend = Legend(map_of(show, bodies[-1].diagonal), key=told.key if told else ())
-    points = np.concatenate([_points(body, wanted) for body in (bodies if wanted is None else bodies[-1:])])
+    drawn_told = told if show.kind == "treatment" else None
+    looks = [_look(show, picture, body, base, drawn_told or marked) for body in bodies]
+    if fit:
+        looks[-1] = replace(looks[-1], strokes={**outlines(bodies[-1], fit), **looks[-1].strokes})
+    legend = Legend(map_of(show, bodies[-1].diagonal), key=drawn_told.key if drawn_told else ())
+    around = np.concatenate([points(body, fit) for body in (bodies if fit is None else bodies[-1:])])
     turns = 1 if format == "png" else TURNS
-    scene = Scene.of(picture, bodies, looks, points, strip(legend, size), turns)
-    return _drawn(scene, replace(legend, comb=scene.comb), marked, turns, format)
+    scene = Scene.of(picture, _named(bodies, edited=told is not None), looks, around, strip(legend, size), turns)
+    note = _unseen(scene, fit) if fit and turns == 1 else ""
+    return replace(_drawn(scene, replace(legend, comb=scene.comb), marked, turns, format), note=note)
+
+
+def _named(bodies: Sequence[Body], *, edited: bool) -> list[Body]:
+    """Bodies with names that tell them apart, where there are two."""
+    if len(bodies) == 1:
+        return list(bodies)
+    before, after = bodies
+    if same := before.name == after.name:
+        before = replace(before, name=f"{before.name}, before")
+    return [before, replace(after, name=f"{after.name}, after") if same or edited else after]
 
 
 def _look(show: Show, picture: Picture, body: Body, base: Body | None, marks: Told | Rings | None) -> Look:
@@ -150,6 +164,17 @@ def _drawn(scene: Scene, legend: Legend, rings: Rings | None, turns: int, format
     return Rendered(data, legend.map.title, legend.map.unit, *span) if legend.map else Rendered(data)
 
 
+def _unseen(scene: Scene, faces: Collection[int]) -> str:
+    """What to say when faces that are to fill the picture are not seen in it."""
+    body, views = scene.bodies[-1], ", ".join(scene.picture.views)
+    if any(seen_share(body, faces, camera) >= SEEN for camera in scene.cameras[0]):
+        return ""
+    view = shown_from(body, faces)
+    hint = f"add --view={view}" if view else "others hide them from all sides"
+    which = ", ".join(scene.picture.fit)
+    return f"fit: {which} is not seen from {views}; {hint}"
+
+
 def _values(panes: Sequence[Pane]) -> Array:
     """The numbers on a sheet."""
     return np.concatenate([panel.shown for pane in panes for panel in pane.panels])
@@ -169,32 +194,3 @@ def _meshed(document: Document, chord: float) -> Body:
     if not found.facets:
         raise FileError(f"'{document.name}' cannot be meshed", "check its geometry")
     return found
-
-
-def _wanted(document: Document, chosen: Sequence[str]) -> tuple[frozenset[int] | None, float]:
-    """The faces that fill the picture (None for all), and how much larger the whole model is than these."""
-    if not chosen:
-        return None, 1.0
-    from mracad.occ.select import select_cq
-    from mracad.occ.view import view
-
-    model = view(document)
-    found = select(model, chosen, range(len(model.faces)), partial(select_cq, document)).faces
-    if not found:
-        raise UsageError("fit: no face is selected", "select faces by #3, a name, type:plane or near:X,Y,Z")
-    low, high = np.array([model.faces[face].box for face in found]).swapaxes(0, 1)
-    own = float(np.linalg.norm(high.max(axis=0) - low.min(axis=0)))
-    return found, float(np.clip(model.diagonal / max(own, 1e-300), 1.0, ZOOM))
-
-
-def _points(body: Body, wanted: frozenset[int] | None) -> Array:
-    """The points of faces, as placed."""
-    found = [
-        body.facets[face].points @ place.frame[:3, :3].T + place.frame[:3, 3]
-        for place in body.placed
-        for face in place.faces
-        if face in body.facets and (wanted is None or face in wanted)
-    ]
-    if not found:
-        raise FileError(f"'{body.name}': the faces to fit in cannot be meshed", "choose others")
-    return np.concatenate(found)

@@ -33,6 +33,7 @@ _FINEST = 1e-4  # of the diagonal: least distance between points
 _SHARE = 0.95  # of teeth that are no longer than was asked for
 _CUT = 1.25  # longer teeth are cut
 _STRAIGHT = 1e-9  # curvature times the size of the model below which a curve is straight
+_POINT = 1e-7  # of the diagonal: shorter curves, and smaller radii, are those of points
 _ALONG = 1e-3  # sine of the angle between face and plane below which a curve has no direction
 
 
@@ -45,7 +46,8 @@ class Curve:
     points : ndarray (n, 3)
         At even distances, as placed, mm.
     bends : ndarray (n, 3)
-        Curvature vectors, 1/mm, towards the centre of curvature; not a number where the plane touches the face.
+        Curvature vectors, 1/mm, towards the centre of curvature; not a number where the plane touches the face, and
+        where the surface is degenerate.
     """
 
     points: Array
@@ -77,8 +79,8 @@ def curves(body: Body, axis: int, place: float, spacing: float) -> list[Curve]:
             uv, jets = cut.on(uv)
             if len(uv) > 1:
                 uv, jets = cut.on(_even(uv, jets[0], spacing))
-            if len(uv) > 1:
-                found.append(Curve(jets[0], _bend(jets, axis)))
+            if len(uv) > 1 and np.ptp(jets[0], axis=0).max() > _POINT * body.diagonal:
+                found.append(Curve(jets[0], _bend(jets, axis, _POINT * body.diagonal)))
     return found
 
 
@@ -153,8 +155,8 @@ def _even(uv: Array, points: Array, spacing: float) -> Array:
     return np.stack([np.interp(at, along, column) for column in uv.T], axis=1)
 
 
-def _bend(jets: Sequence[Array], axis: int) -> Array:
-    """The curvature vector of the section at points of surfaces, ``(n, 3)``."""
+def _bend(jets: Sequence[Array], axis: int, least: float) -> Array:
+    """The curvature vector of the section at points of surfaces, ``(n, 3)``, of radii of at least ``least``."""
     _, su, sv, suu, suv, svv = jets
     normal, upright = unit(cross(su, sv)), np.eye(3)[axis]
     along = cross(normal, np.broadcast_to(upright, normal.shape))
@@ -164,7 +166,8 @@ def _bend(jets: Sequence[Array], axis: int) -> Array:
     a, b = components(su, sv, along).T[:, :, None]
     second = ((a * a * suu + 2 * a * b * suv + b * b * svv) * normal).sum(axis=1)
     share = np.where(steep, (normal * inward).sum(axis=1), np.nan)
-    return np.asarray((second / share)[:, None] * inward)
+    bend = second / share
+    return np.asarray(np.where(np.abs(bend) * least <= 1.0, bend, np.nan)[:, None] * inward)
 
 
 @dataclass(frozen=True)

@@ -68,7 +68,7 @@ def drawn(
             if numbers:
                 _number(pen, numbers(panel), (left, top), (first, last, height), noun)
             if caption:
-                pen.write((left + first + pen.font.size, top + pen.font.size), caption, "la")
+                pen.caption((left + first, top), last - first, caption)
     if panes:
         pen.rulers(panes[0].box, panes[0].panels[0].stage.camera.pixel, legend.comb)
     pen.beside(legend)

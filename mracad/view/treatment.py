@@ -28,9 +28,14 @@ EDGES = {
     "mended": "#7b2cbf",
     "to tolerance": "#a67c00",
     "slid": "#0b62c4",
-    "frozen": "#c1121f",
+    "idle": "#8b9197",
+    "stayed 1": "#c1121f",
+    "stayed 2": "#e8700a",
+    "stayed 3": "#d6339a",
+    "stayed": "#6b3a1f",
 }
-"""Colours of edges by how they were treated."""
+"""Colours of edges by how they were treated: those that stayed although something moved beside them, by the commonest
+reasons; the last is that of all other reasons."""
 
 _WIDE = 1.2  # pixels: half the width of edges
 

@@ -1,6 +1,8 @@
 """What edits did and where features are, in pixels; wipes; pictures that turn."""
 
 import io
+from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,8 +12,14 @@ from PIL import Image
 
 from mracad.errors import UsageError
 from mracad.job.look import snapshot
+from mracad.job.treated import told as told_of
+from mracad.seam.cause import Cause, Still
+from mracad.seam.natural import Treatment
 from mracad.spec.pictures import Picture
+from mracad.spec.steps import Smooth
 from mracad.view.colours import rgb
+from mracad.view.fit import OUTLINE
+from mracad.view.legend import Pen
 from mracad.view.picture import render
 from mracad.view.rings import COLOUR, Ring
 from mracad.view.treatment import EDGES, FACES, Told
@@ -28,21 +36,21 @@ def row_of_cubes(count):
 
 
 def test_faces_and_edges_have_the_colours_of_what_became_of_them():
-    """The tops of seven cubes and the edges between them, seen from above."""
-    document = row_of_cubes(7)
+    """The tops of ten cubes and the edges between them, seen from above."""
+    document = row_of_cubes(10)
     model = snapshot(document)
     tops = [f.index for f in model.faces if f.box[0, 2] > 9]
     across = [edge.index for edge in model.edges if np.ptp(edge.points[:, 0]) < 1e-9 and edge.points[:, 2].min() > 9]
-    between = sorted(across, key=lambda edge: model.edges[edge].points[0, 0])[1:11:2]
-    told = Told(dict(zip(tops, FACES, strict=True)), dict(zip(between, EDGES, strict=True)), {"edited": "7 faces"})
+    between = sorted(across, key=lambda edge: model.edges[edge].points[0, 0])[1:19:2]
+    told = Told(dict(zip(tops, FACES, strict=False)), dict(zip(between, EDGES, strict=True)), {"edited": "7 faces"})
     picture = image(render(document, Picture(show="treatment", view=("top",), size="900x160"), told=told).data)
     wide = 900 - (19 * 9)
-    pixel = 70 / (0.9 * wide)
-    at = [round(wide / 2 + (10 * k - 35) / pixel) for k in range(8)]
+    pixel = 100 / (0.9 * wide)
+    at = [round(wide / 2 + (10 * k - 50) / pixel) for k in range(11)]
     for k, colour in enumerate(FACES.values()):
-        assert picture[70, at[k] + 40] == pytest.approx(255 * rgb(colour), abs=1)
+        assert picture[76, at[k] + 30] == pytest.approx(255 * rgb(colour), abs=1)
     for k, colour in enumerate(EDGES.values(), 1):
-        line = picture[70, at[k] - 3 : at[k] + 4]
+        line = picture[76, at[k] - 3 : at[k] + 4]
         assert np.abs(line - 255 * rgb(colour)).sum(axis=1).min() < 60, colour
     key = picture[:60, wide:].reshape(-1, 3)
     assert (np.abs(key - 255 * rgb(FACES["edited"])).max(axis=1) <= 1).sum() > 100
@@ -96,6 +104,66 @@ def test_a_wipe_is_the_left_of_one_and_the_right_of_the_other():
     assert not (wiped[30:180, :148] == alone[30:180, :148]).all()
 
 
+@pytest.fixture
+def captions(monkeypatch):
+    """What is written on panels."""
+    found = []
+    monkeypatch.setattr(Pen, "caption", lambda pen, corner, wide, text: found.append(text))
+    return found
+
+
+@pytest.mark.parametrize(
+    ("names", "told", "expected"),
+    [
+        (("a.step", "a.step"), None, ["a.step, before", "a.step, after"]),
+        (("b.step", "a.step"), None, ["b.step", "a.step"]),
+        (("b.step", "a.step"), Told({}, {}, {}), ["b.step", "a.step, after"]),
+    ],
+)
+def test_two_models_have_names_that_tell_them_apart(captions, names, told, expected):
+    before, after = (replace(row_of_cubes(1), name=name) for name in names)
+    render(after, Picture(size="60x40"), before=before, told=told)
+    assert captions == expected
+
+
+def test_captions_stay_in_their_part_of_a_sheet():
+    sheet = Image.new("RGB", (400, 300), "white")
+    Pen.on(sheet).caption((0, 0), 90, "a_model_with_a_rather_long_name.step, before  iso")
+    dark = (np.asarray(sheet).min(axis=2) < 200).nonzero()
+    assert 60 < dark[1].max() < 90 and dark[0].max() > 20, "in lines"
+
+
+def test_faces_to_fit_in_are_outlined_and_a_view_that_shows_them_is_named():
+    document = shapes.document(BRepPrimAPI_MakeBox(30, 20, 10).Shape())
+    back = next(f.index for f in snapshot(document).faces if f.box[0, 1] > 19)
+    seen, hidden = (
+        render(document, Picture(view=(view,), fit=(f"#{back + 1}",), size="300x200")) for view in ("back", "front")
+    )
+    assert seen.note == "" and hidden.note == f"fit: #{back + 1} is not seen from front; add --view=back"
+    picture = image(seen.data)
+    y, x = np.nonzero(np.abs(picture - 255 * np.array(OUTLINE.colour)).max(axis=2) < 30)
+    assert [np.ptp(x), np.ptp(y)] == pytest.approx([270, 90], abs=4)
+
+
+def test_faces_that_are_hidden_from_all_sides_are_said_to_be():
+    inner, outer = BRepPrimAPI_MakeBox(gp_Pnt(4, 4, 4), 2, 2, 2).Shape(), BRepPrimAPI_MakeBox(10, 10, 10).Shape()
+    found = render(shapes.document(outer, inner), Picture(fit=("#7",), size="90x60"))
+    assert "others hide them from all sides" in found.note
+
+
+def test_edges_beside_which_nothing_moved_are_told_from_those_that_stayed():
+    reasons = [Still.IDLE] * 3 + [Still.FREE] * 4 + [Still.POLE] * 3 + [Still.SHARP] * 2 + [Still.HELD, Still.TRIMMED]
+    edges = tuple(Treatment(k, (0, 1), "frozen", Cause(why)) for k, why in enumerate(reasons))
+    edit = SimpleNamespace(outcomes=(), edges=(*edges, Treatment(20, (0, 1), "coupled")))
+    found = told_of(SimpleNamespace(edit=edit), Smooth(scale="1mm"))
+    assert [found.edges[k] for k in (0, 3, 7, 10, 12, 13, 20)] == [
+        "idle", "stayed 1", "stayed 2", "stayed 3", "stayed", "stayed", "coupled",
+    ]  # fmt: skip
+    assert found.words["idle"] == "3 edges with no change on either side"
+    assert found.words["stayed 1"] == "4 edges stayed: free edge"
+    assert found.words["stayed"] == "2 edges stayed for other reasons"
+
+
 def test_what_pictures_need_is_asked_for():
     document = row_of_cubes(1)
     for words, says in (
@@ -108,6 +176,8 @@ def test_what_pictures_need_is_asked_for():
     ):
         with pytest.raises(UsageError, match=says):
             render(document, Picture(**words))
+    with pytest.raises(UsageError, match="in one view"):
+        render(document, Picture(view=("iso,top",)), format="gif")
 
 
 def widths(frames):

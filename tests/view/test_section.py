@@ -5,7 +5,12 @@ import io
 import numpy as np
 import pytest
 from OCP.BRepBuilderAPI import BRepBuilderAPI_Transform
-from OCP.BRepPrimAPI import BRepPrimAPI_MakeCylinder, BRepPrimAPI_MakeSphere, BRepPrimAPI_MakeTorus
+from OCP.BRepPrimAPI import (
+    BRepPrimAPI_MakeCone,
+    BRepPrimAPI_MakeCylinder,
+    BRepPrimAPI_MakeSphere,
+    BRepPrimAPI_MakeTorus,
+)
 from OCP.gp import gp_Ax1, gp_Ax2, gp_Dir, gp_Pnt, gp_Trsf, gp_Vec
 from PIL import Image
 
@@ -75,6 +80,19 @@ def test_a_torus_cut_beside_its_axis():
 def test_a_plane_that_touches_gives_nothing():
     body = facets(shapes.document(BRepPrimAPI_MakeCylinder(5.0, 10.0).Shape()), 1e-3, 30.0)
     assert not curves(body, 2, 10.0, 0.5) and not curves(body, 0, 7.0, 0.5)
+
+
+def test_a_point_in_which_a_plane_cuts_is_no_curve():
+    cone = facets(shapes.document(BRepPrimAPI_MakeCone(0.0, 10.0, 10.0).Shape()), 1e-3, 30.0)
+    assert not curves(cone, 2, 1e-8, 0.1) and curves(cone, 2, 5.0, 0.1)
+
+
+def test_where_a_surface_is_degenerate_there_is_no_tooth():
+    """A plane through the apex of a cone, and one beside it by less than can be told: two straight lines."""
+    cone = facets(shapes.document(BRepPrimAPI_MakeCone(0.0, 10.0, 10.0).Shape()), 1e-3, 30.0)
+    for place in (0.0, 1e-9):
+        comb = combed(curves(cone, 0, place, 0.5), 3.0)
+        assert comb.unit < 1.0
 
 
 def test_combs_are_to_their_scale_and_straight_lines_have_none():

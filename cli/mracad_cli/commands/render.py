@@ -17,7 +17,7 @@ from mracad_cli.command import Command
 from mracad_cli.options import Reading
 from mracad_cli.outputs import check_reports, deliver, read
 from mracad_cli.progress import Progress
-from mracad_cli.say import json_text
+from mracad_cli.say import json_text, warn
 
 DRAWN = [extension for format in FORMATS.values() if format.kind == "picture" for extension in format.extensions]
 """Extensions of pictures."""
@@ -54,6 +54,7 @@ def command(reading: Reading, output: str, picture: Picture, overwrite: bool, as
     format = FORMATS["png"] if output == "-" else by_extension(output)
     if format.kind != "picture":
         raise UsageError(f"cannot draw {output}: pictures are .png, .gif or .mp4", "name a file that ends in .png")
+    picture.check(format.name)
     check_reports(None if output == "-" else output, overwrite=overwrite)
     with Progress() as progress:
         progress("reading", 0, 1)
@@ -64,6 +65,8 @@ def command(reading: Reading, output: str, picture: Picture, overwrite: bool, as
         from mracad.view.picture import render
 
         drawn = render(document, picture, before=before, reference=reference, format=format.name)
+    if drawn.note:
+        warn(drawn.note)
     if as_json:
         line = json_text(words.body(document.name, document.warnings, picture, drawn, output))
     else:

@@ -16,7 +16,7 @@ def line(name: str, picture: Picture, drawn: Rendered, output: str, seconds: flo
     width, height = size_of(picture.size)
     what = picture.show
     if drawn.title:
-        what = f"{drawn.title} {drawn.lowest:.3g} to {drawn.highest:.3g} {drawn.unit}".replace(" -", " −")
+        what = f"{drawn.title} {drawn.lowest:.3g} to {drawn.highest:.3g} {drawn.unit} in the pixels".replace(" -", " −")
     if drawn.rings is not None:
         what = f"{drawn.rings or 'no'} feature{'s' * (drawn.rings != 1)}"
     views = ", ".join(picture.views)
@@ -36,5 +36,5 @@ def body(name: str, warnings: tuple[str, ...], picture: Picture, drawn: Rendered
         "size": [width, height],
         "map": span if drawn.title else None,
         "written": output,
-        "warnings": warnings,
+        "warnings": (*warnings, *filter(None, [drawn.note])),
     }
