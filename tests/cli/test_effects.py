@@ -212,8 +212,8 @@ OWN = {
     "sweep by": ("--by 0,0,0.3",),
     "sweep to": ("--to 5,5,0.7", "LESS --by --to 5,5,0.5"),
     "sweep radius": ("--radius 2mm",),
-    "sweep rotate": ("--radius 2mm --rotate normal,10", "LESS --by --radius 2mm --rotate x,10"),
-    "sweep stretch": ("--radius 2mm --stretch 1.2", "LESS --by --radius 2mm --stretch x,1.2"),
+    "sweep rotate": ("--rotate normal,10", "LESS --by --radius 2mm --rotate x,10"),
+    "sweep stretch": ("--stretch 1.2", "LESS --by --radius 2mm --stretch x,1.2"),
     "sweep keep": ("--keep g2", "IN tangent.step --at #1@0.9,0.5"),
     "sweep gap_tolerance": ("--gap-tolerance 1mm", "IN halves.step --scale 40mm --by 0,0,3"),
     "sweep fit_g1": ("--fit-g1 20", "--at #1@0.9,0.5"),
@@ -336,6 +336,13 @@ def once(mracad, folder, place, given, old):
     return _known[key]
 
 
+REPLACED = (
+    *("scale", "by", "to", "from_", "feature", "folder", "output", "keep", "map", "fill"),
+    *("band", "distance", "noise", "rotate", "size", "stretch"),
+)
+"""Options whose values take the place of those that commands have anyway."""
+
+
 def words(case):
     """The words of a command with and without an option, and files that are there before."""
     command, _, option = case.partition("=")[0].rpartition(" ")
@@ -359,10 +366,7 @@ def words(case):
         base.remove("--json")
         return base, [*base, "--json"], old
     changed, own = list(base), given.split()
-    if (
-        option in ("scale", "by", "to", "from_", "feature", "folder", "output", "keep", "map", "fill")
-        and own[0] in changed
-    ):
+    if option in REPLACED and own[0] in changed:
         _give(changed, own)
     else:
         changed += own
