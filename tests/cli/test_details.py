@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import mracad as api
+from mracad.edit import mra as details
 
 
 @pytest.fixture(scope="module")
@@ -180,7 +181,7 @@ def test_bytes_at_random_never_do_more_than_fail(apart, tmp_path):
             bad[place] = rng.integers(0, 256)
         (tmp_path / "bad.mra").write_bytes(bad)
         try:
-            api.load_details(tmp_path / "bad.mra")
+            details.load(tmp_path / "bad.mra")
         except api.MracadError as error:
             assert int(error.code) == 3, error
 
@@ -191,7 +192,7 @@ def test_a_bomb_costs_no_memory(apart, tmp_path):
     (tmp_path / "bad.mra").write_bytes(repacked(apart / "sheet.mra", bomb))
     tracemalloc.start()
     with pytest.raises(api.MracadError):
-        api.load_details(tmp_path / "bad.mra")
+        details.load(tmp_path / "bad.mra")
     assert tracemalloc.get_traced_memory()[1] < 5e6
     tracemalloc.stop()
 
