@@ -137,7 +137,7 @@ def seams(model: Model, measures: list[SeamMeasure], limits: SeamLimits) -> Laye
     smooth = [m for m in measures if m.angle < limits.kink]
     bent = [m.angle for m in measures if m.angle >= limits.kink]
     count = Smoothness(len(measures), len(smooth), min(bent, default=None))
-    text = f"{count.smooth} smooth of {count.seams}"
+    text = f"{count.smooth} smooth of {count.seams} seams of all faces"
     text += f"; the next at {count.next:.2g}°" if count.next is not None else ""
     angle, gap = max((m.angle for m in smooth), default=0.0), max((m.gap for m in measures), default=0.0)
     unsewn = sum(not m.sewn for m in measures)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from mracad.brief import line
 
-Status = Literal["pass", "fail", "time limit", "skipped"]
+Status = Literal["pass", "noted", "fail", "time limit", "skipped"]
 Figure = float | int | str | bool | None
 
 
@@ -46,7 +46,8 @@ class Layer:
     Attributes
     ----------
     name : str
-    status : {"pass", "fail", "time limit", "skipped"}
+    status : {"pass", "noted", "fail", "time limit", "skipped"}
+        ``"noted"`` where something was found that a check was not asked to fail for.
     text : str
         The measurement, or why there is none, in one line.
     findings : tuple of Finding
@@ -88,3 +89,8 @@ class Verdict:
     def failed(self, *names: str) -> tuple[Layer, ...]:
         """The layers that failed: of those named, or of all."""
         return tuple(x for x in self.layers if x.status == "fail" and (not names or x.name in names))
+
+    def noting(self, failed: Collection[Layer] = ()) -> Verdict:
+        """The same verdict, where layers that found something are noted unless they are among those that ``failed``."""
+        layers = (replace(x, status="noted") if x.status == "fail" and x not in failed else x for x in self.layers)
+        return replace(self, layers=tuple(layers))

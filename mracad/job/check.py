@@ -59,7 +59,8 @@ def check(document: Document, options: Check, original: Original | None = None, 
     limits = CheckLimits(along, tolerance, wall, options.layer_limit)
     slow = SLOW if text is not None else SLOW.intersection(options.fail_on)
     verdict = _layered(text, document, model, limits, slow)
-    return Judged(verdict, tuple(failing(verdict, options.fail_on)))
+    failed = tuple(failing(verdict, options.fail_on))
+    return Judged(verdict.noting(failed), failed)
 
 
 def expectation(text: str) -> tuple[int, bool]:

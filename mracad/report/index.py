@@ -9,19 +9,19 @@ from typing import Any
 from mracad.report.page import Verdict, rendered
 from mracad.report.table import Column, Table
 
-HEIGHT = 64
+HEIGHT = 48
 """Of the pictures in rows, pixels."""
 
 COLUMNS = (
-    Column("", "pictures", link="link", height=HEIGHT),
+    Column("Pictures", "pictures", link="link", height=HEIGHT),
     Column("File", "file", link="link"),
-    Column("Status", "status"),
+    Column("Status", "status", marked=True),
     Column("Exit code", "code"),
     Column("Valid", "valid"),
     Column("Faces edited", "edited"),
     Column("NURBS faces", "faces"),
     Column("Largest deviation, mm", "deviation"),
-    Column("Time, s", "seconds"),
+    Column("Time", "seconds", unit="s"),
     Column("Attempts", "attempts"),
     Column("Message", "message"),
 )

@@ -11,6 +11,9 @@ from typing import Any
 MOST = 2000
 """Largest number of rows."""
 
+FLOOR = 1e-9
+"""Millimetres or degrees that count as 0 where they are shown."""
+
 NOTHING = "–"
 """What stands for a value that there is not."""
 
@@ -30,6 +33,10 @@ class Column:
         Where the addresses are that its cells lead to.
     height : int
         Of its values where they are lists of pictures, pixels; 0 for text.
+    unit : {"", "s"}
+        What its numbers are.
+    marked : bool
+        Whether its cells take the colours of what they say.
     """
 
     title: str
@@ -37,17 +44,26 @@ class Column:
     sign: str = ""
     link: str = ""
     height: int = 0
+    unit: str = ""
+    marked: bool = False
+
+    @property
+    def floor(self) -> float:
+        """Numbers below are shown as 0: of lengths and angles they are rounding errors."""
+        return FLOOR if self.title.endswith((", mm", ", °")) else 0.0
 
 
 @dataclass(frozen=True)
 class Cell:
-    """What stands in a cell, the exact value where it is a number, where it leads to, and its pictures."""
+    """What stands in a cell, the exact value where it is a number, where it leads to, its pictures, and the class of
+    its style."""
 
     text: str
     value: int | float | None = None
     link: str = ""
     pictures: Sequence[str] = ()
     height: int = 0
+    mark: str = ""
 
     @property
     def exact(self) -> str:
@@ -104,7 +120,12 @@ def _cell(record: Mapping[str, Any], column: Column) -> Cell:
     value, link = _at(record, column.key), (_at(record, column.link) or "") if column.link else ""
     if column.height:
         return Cell("", None, link, value or (), column.height)
-    return replace(cell(value, column.sign), link=link)
+    shown = cell(value, column.sign)
+    if shown.value is not None and abs(shown.value) < column.floor:
+        shown = replace(shown, text=f"{column.sign}0")
+    if shown.value is not None and column.unit == "s":
+        shown = replace(shown, text=f"{shown.value:.{0 if shown.value >= 9.95 else 1}f} s")
+    return replace(shown, link=link, mark=shown.text.replace(" ", "-") if column.marked else "")
 
 
 def cell(value: Any, sign: str = "") -> Cell:

@@ -31,7 +31,8 @@ def checked(mracad, path, *words):
 
 
 def failing(layers):
-    return {name for name, layer in layers.items() if layer["status"] == "fail"}
+    """The layers that found something."""
+    return {name for name, layer in layers.items() if layer["status"] in ("fail", "noted")}
 
 
 @pytest.fixture
@@ -188,6 +189,18 @@ def test_reports(mracad, samples, tmp_path):
     (run,) = json.loads(sarif.read_text())["runs"]
     assert sum(result["ruleId"] == "shells/free-edge" for result in run["results"]) == 10
     assert mracad("check", samples / "panel.step", *words).code == 2
+
+
+def test_what_was_found_without_being_asked_for_is_noted_everywhere(mracad, samples, tmp_path):
+    """A panel has free edges; nothing was asked to fail for them."""
+    sarif, junit = (tmp_path / "x.sarif", tmp_path / "x.xml")
+    result = mracad("check", samples / "panel.step", "--json", "--sarif", sarif, "--junit", junit)
+    shells = next(layer for layer in json.loads(result.out)["layers"] if layer["name"] == "shells")
+    assert result.code == 0 and shells["status"] == "noted" and len(shells["findings"]) == 10
+    (run,) = json.loads(sarif.read_text())["runs"]
+    assert {found["level"] for found in run["results"]} == {"note"} and "<failure" not in junit.read_text()
+    asked = mracad("check", samples / "panel.step", "--json", "--fail-on", "free-edges")
+    assert '"name": "shells", "status": "fail"' in asked.out and asked.code == 1
 
 
 def test_a_wrong_same_sense_is_named(mracad, box):

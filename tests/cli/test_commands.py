@@ -18,7 +18,7 @@ def test_the_four_lines(mracad, samples, tmp_path):
     found, deviation, seams, valid = result.out.splitlines()
     assert found == "panel.step: 6 NURBS faces: 6 smoothed at 16mm"
     assert deviation.startswith("deviation: max 0.") and " on #" in deviation
-    assert seams.startswith("seams: 7 smooth of 7, angle ≤ ") and "(was " in seams
+    assert seams.startswith("seams of NURBS faces: 7 smooth of 7, angle ≤ ") and "(was " in seams
     assert valid.startswith("valid: yes, as read back (was yes); wrote out.step, ")
 
 

@@ -66,8 +66,8 @@ def test_a_smooth_seam_may_turn_a_little(mracad, tmp_path, flat):
 def test_a_check_counts_smooth_seams(mracad, tmp_path, flat):
     one = panel(tmp_path / "one.step", 1.3, 0.2)
     result = mracad("check", one)
-    assert result.code == 0 and "1 smooth of 2; the next at 1.3°" in result.out
-    assert "2 smooth of 2; angle" in mracad("check", flat).out
+    assert result.code == 0 and "1 smooth of 2 seams of all faces; the next at 1.3°" in result.out
+    assert "2 smooth of 2 seams of all faces; angle" in mracad("check", flat).out
     assert mracad("check", one, "--expect", "1").code == mracad("check", flat, "--expect", "2").code == 0
     result = mracad("check", one, "--expect", "2", "--json")
     assert result.code == 1 and json.loads(result.out)["failed"] == ["seams"]

@@ -13,12 +13,25 @@ from tests.report.test_page import Read
 def test_a_model_is_compared_with_a_reference(mracad, samples, tmp_path, small_pictures):
     out = tmp_path / "a.html"
     result = mracad("report", samples / "panel.step", samples / "panel_clean.step", "-o", out)
-    assert result.code == 0 and "valid: yes" in result.out and "compared with panel_clean.step: failed" in result.out
+    moved = "compared with panel_clean.step: deviation max 0.0633 mm on #2"
+    assert result.code == 0 and "valid: yes" in result.out and moved in result.out
     text = out.read_text(encoding="utf-8")
-    assert "Deviation from panel_clean.step" in text and "comparison: failed" in text
+    assert "Deviation from panel_clean.step" in text and "comparison: deviation max 0.0633 mm" in text
+    page = Read(text)
+    said = " ".join(page.texts)
+    assert "outline moved by" in said and moved in said, "the lines of compare"
+    assert "comparison: failed" not in said and "fail" not in page.texts, "a comparison without limits fails nothing"
+    assert "noted" in page.texts and "seams of NURBS faces: 7 smooth of 7" in said
     blade = samples / "blade.step"
     same = mracad("report", blade, blade, "-o", tmp_path / "b.html", "--json")
-    assert json.loads(same.out)["compare"]["passed"] is True
+    body = json.loads(same.out)
+    assert body["compare"]["passed"] is True
+    page = Read((tmp_path / "b.html").read_text(encoding="utf-8"))
+    assert "no differences" in " ".join(page.texts)
+    faces = page.tables["faces"]
+    waves = [row[faces["keys"].index("shortest_wavelength")] for row in faces["rows"] if row]
+    analytic = [face["smoothing"] == "analytic" for face in body["faces"]]
+    assert any(analytic) and all(wave == [None, "–"] for wave, flat in zip(waves, analytic, strict=True) if flat)
 
 
 @pytest.fixture

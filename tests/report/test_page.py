@@ -92,12 +92,14 @@ def test_every_number_is_that_of_the_json(made, read):
         for row, record in zip(rows, records, strict=True):
             for key, (exact, shown) in zip(table["keys"], row, strict=True):
                 value = record.get(key)
+                if key in ("detail", "shortest_wavelength") and not record["shortest_wavelength"]:
+                    value = None  # a face without waves
                 number = isinstance(value, int | float) and not isinstance(value, bool)
                 assert (exact is not None) == number, (key, value, shown)
                 if number:
                     counted += 1
                     assert json.loads(exact) == value
-                    assert float(shown.lstrip("#").replace("−", "-")) == pytest.approx(value, rel=1e-4)
+                    assert float(shown.lstrip("#").replace("−", "-")) == pytest.approx(value, rel=1e-4, abs=1e-9)
     assert counted > 20
     assert {"area", "detail"} <= set(read.tables["faces"]["keys"])
     assert {"gap", "angle", "bend"} <= set(read.tables["seams"]["keys"])

@@ -11,11 +11,9 @@ from mracad.report.mesh import mesh
 from mracad.report.page import SVG, Figure, Page, Verdict
 from mracad.report.table import Column, Table
 from mracad_cli.render import info, json, text
-from mracad_cli.render.pages import passed
 
 if TYPE_CHECKING:
     from mracad.inspect.spectrum import Spectrum
-    from mracad.job.judge import Judged
     from mracad.occ.document import Document
 
 SCALE = "2%"
@@ -62,7 +60,6 @@ class Told:
     body: dict[str, Any]
     lines: Sequence[str]
     spectra: Sequence[Spectrum]
-    compared: Judged | None
 
 
 def told(
@@ -82,9 +79,12 @@ def told(
     progress("measuring waves", 0, 1)
     faces = [face.index for face in seen.model.faces if face.surface is not None]
     body = info.body(seen) | {"warnings": document.warnings, "check": json.verdict(checked.verdict, checked.failed)}
-    if compared:
-        body["compare"] = json.verdict(compared.verdict, compared.failed)
-    return Told(document, reference, body, info.summary(seen), spectra(seen.model, faces), compared)
+    lines = info.summary(seen)
+    if compared and reference:
+        found = compared.verdict.noting()  # no limits were given
+        body["compare"] = json.verdict(found, ())
+        lines += [f"compared with {reference.name}: {_differing(body['compare'])}", *text.layer_lines(found)]
+    return Told(document, reference, body, lines, spectra(seen.model, faces))
 
 
 def line(report: Told, output: str, size: int) -> str:
@@ -95,7 +95,7 @@ def line(report: Told, output: str, size: int) -> str:
         f"valid: {text.verdict(body['check']['valid'])}",
     ]
     if report.reference:
-        said.append(f"compared with {report.reference.name}: {passed(body['compare'])}")
+        said.append(f"compared with {report.reference.name}: {_differing(body['compare'])}")
     return "; ".join([*said, f"wrote {output}, {text.size(size)}"])
 
 
@@ -106,9 +106,9 @@ def page(report: Told) -> Page:
     names = [document.name, *([reference.name] if reference else [])]
     verdicts = [_valid(body["check"])]
     if "compare" in body:
-        verdicts.append(
-            Verdict("comparison", passed(body["compare"]), body["compare"]["passed"], body["compare"]["layers"])
-        )
+        layers = body["compare"]["layers"]
+        equal = all(layer["status"] != "noted" for layer in layers)
+        verdicts.append(Verdict("comparison", _differing(body["compare"]), equal or None, layers))
     compared = both(document, reference) if reference else []
     figures = [*compared, *alone(document, "zebra" if compared else ""), *_plots(document.name, report.spectra)]
     return Page(
@@ -126,12 +126,33 @@ def page(report: Told) -> Page:
         mesh=mesh(document, {face["face"] - 1: _called(face) for face in body["faces"]}, reference),
         reference=reference_name(document, reference),
         figures=figures,
-        tables=[Table("faces", "Faces", columns, body["faces"]), Table("seams", "Seams", SEAMS, body["seams"]["each"])],
+        tables=[
+            Table("faces", "Faces", columns, _measured(body["faces"])),
+            Table("seams", "Seams", SEAMS, body["seams"]["each"]),
+        ],
     )
 
 
 def _valid(body: Mapping[str, Any]) -> Verdict:
     return Verdict("valid", text.verdict(body["valid"]), body["valid"], body["layers"])
+
+
+def _differing(body: Mapping[str, Any]) -> str:
+    """The deviation, and in what else a model differs from its reference."""
+    found = {layer["name"]: layer["text"] for layer in body["layers"] if layer["status"] == "noted"}
+    moved = found.pop("deviation", "")
+    said = [f"deviation {moved}"] if moved else []
+    said += [f"{'also ' if moved else ''}differs in {', '.join(found)}"] if found else []
+    return "; ".join(said) or "no differences"
+
+
+def _measured(faces: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Faces without the waves of those that have none."""
+    return [
+        face | {"detail": face["detail"] if wave else None, "shortest_wavelength": wave or None}
+        for face in faces
+        for wave in (face["shortest_wavelength"],)
+    ]
 
 
 def _facts(body: Mapping[str, Any]) -> list[tuple[str, str]]:

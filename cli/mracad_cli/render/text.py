@@ -228,29 +228,33 @@ def edge_words(edges: tuple[Treatment, ...]) -> str:
 
 
 def seam_line(new: SeamSummary, old: SeamSummary | None = None) -> str:
-    """The seams in one line."""
+    """The seams of NURBS faces in one line."""
     angle, bend, gap = degrees(new.angle), f"{new.bend:.2g} 1/mm", mm(new.gap)
     if old:
         angle, bend = f"{angle} (was {degrees(old.angle)})", f"{bend} (was {old.bend:.2g})"
         gap = f"{gap} (was {mm(old.gap)})"
-    line = f"seams: {new.smooth} smooth of {new.seams}, angle ≤ {angle}, curvature jump ≤ {bend}; gap ≤ {gap}"
-    return line + (f"; {new.unsewn} not sewn" if new.unsewn else "")
+    line = f"seams of NURBS faces: {new.smooth} smooth of {new.seams}, angle ≤ {angle}, curvature jump ≤ {bend}"
+    return f"{line}; gap ≤ {gap}" + (f"; {new.unsewn} not sewn" if new.unsewn else "")
 
 
 def verdict_lines(found: Verdict, failed: Sequence[Layer]) -> list[str]:
-    """A verdict, layer by layer; what was found without being asked to fail is noted."""
+    """A verdict, layer by layer."""
+    end = "failed: " + ", ".join(layer.name for layer in failed) if failed else "passed"
+    return [f"{found.subject}: valid: {verdict(found.valid)}", *layer_lines(found), end]
+
+
+def layer_lines(found: Verdict) -> list[str]:
+    """The layers of a verdict, each with its findings."""
     width = max(len(layer.name) for layer in found.layers)
-    lines = [f"{found.subject}: valid: {verdict(found.valid)}"]
+    lines = []
     for layer in found.layers:
-        status = "noted" if layer.status == "fail" and layer not in failed else layer.status
-        lines.append(f"{layer.name.ljust(width)}  {status.ljust(7)}  {layer.text}".rstrip())
+        lines.append(f"{layer.name.ljust(width)}  {layer.status.ljust(7)}  {layer.text}".rstrip())
         lines += [f"  {placed(finding)}" for finding in layer.findings[:FINDINGS]]
         if len(layer.findings) > FINDINGS:
             lines.append(f"  and {len(layer.findings) - FINDINGS} more")
         lines += [f"  note: {placed(note)}" for note in layer.notes[:FINDINGS]]
         if len(layer.notes) > FINDINGS:
             lines.append(f"  and {len(layer.notes) - FINDINGS} more notes")
-    lines.append("failed: " + ", ".join(layer.name for layer in failed) if failed else "passed")
     return lines
 
 

@@ -9,9 +9,9 @@ for (const table of document.querySelectorAll("table.sorted")) {
     if (typeof a !== typeof b) return typeof a === "number" ? -1 : 1;
     return typeof a === "number" ? a - b : a.localeCompare(b, "en", { numeric: true });
   };
-  heads.forEach((head, k) => head.addEventListener("click", () => {
+  heads.forEach((head, k) => head.hasAttribute("aria-sort") && head.addEventListener("click", () => {
     const down = head.getAttribute("aria-sort") === "ascending";
-    for (const each of heads) each.setAttribute("aria-sort", "none");
+    for (const each of heads) if (each.hasAttribute("aria-sort")) each.setAttribute("aria-sort", "none");
     head.setAttribute("aria-sort", down ? "descending" : "ascending");
     const rows = [...body.rows].map((row) => [key(row, k), row]);
     rows.sort((a, b) => (down ? compare(b[0], a[0]) : compare(a[0], b[0])));
