@@ -591,7 +591,7 @@ def render(
     show: str = "shaded",
     view: str | Sequence[float] | Sequence[str | Sequence[float]] = ('iso',),
     fit: Faces = (),
-    size: str = "1200x800",
+    size: str | tuple[int, int] = "1200x800",
     stripes: int = 36,
     before: Path | None = None,
     wipe: bool = False,

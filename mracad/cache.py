@@ -10,6 +10,7 @@ import contextlib
 import hashlib
 import os
 import sys
+import tempfile
 from pathlib import Path
 
 from mracad.errors import MracadError
@@ -30,6 +31,20 @@ def folder() -> Path | None:
     home = {"darwin": "~/Library/Caches", "win32": os.environ.get("LOCALAPPDATA", "~/AppData/Local")}
     base = os.environ.get("XDG_CACHE_HOME") or home.get(sys.platform, "~/.cache")
     return Path(base).expanduser().absolute() / "mracad"
+
+
+def trouble() -> str:
+    """Why no entry can be stored; ``""`` if it can, or the cache is off."""
+    where = folder()
+    if where is None:
+        return ""
+    try:
+        while not where.exists():
+            where = where.parent
+        Path(tempfile.mkdtemp(dir=where)).rmdir()
+    except OSError as error:
+        return str(error.strerror)
+    return ""
 
 
 def size() -> tuple[int, int]:

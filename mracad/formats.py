@@ -62,13 +62,13 @@ READABLE = frozenset(
 """File extensions that can be read."""
 
 
-def by_extension(path: str | os.PathLike[str]) -> Format:
-    """The format for the extension of a file name; raises FileError."""
+def by_extension(path: str | os.PathLike[str], kind: Kind | None = None) -> Format:
+    """The format for the extension of a file name; raises FileError, with the formats of a kind if that is wanted."""
     extension = PurePath(path).suffix.lower()
     for format in FORMATS.values():
         if extension in format.extensions:
             return format
-    known = " ".join(format.extensions[0] for format in FORMATS.values())
+    known = " ".join(format.extensions[0] for format in FORMATS.values() if kind in (None, format.kind))
     raise FileError(f"cannot write {path}: unknown extension {extension!r}", f"use one of {known}")
 
 

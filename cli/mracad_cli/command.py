@@ -10,6 +10,7 @@ import os
 import re
 import sys
 from collections.abc import Collection, Iterable, Iterator
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -80,7 +81,7 @@ class Command(click.Command):
 
     def _take_defaults(self, ctx: click.Context, helped: Collection[str]) -> None:
         """Give the context the defaults of files and the environment; help is shown even where these are wrong."""
-        from mracad_cli.defaults import chosen, options_of, taken, value
+        from mracad_cli.defaults import chosen, options_of
 
         try:
             found = chosen(self.words(ctx), self, lambda: every(ctx.find_root().command))
@@ -91,11 +92,9 @@ class Command(click.Command):
         options = {str(option.name): option for option in options_of(self).values()}
         ctx.default_map, ctx.meta["mracad.defaults"] = {}, found
         for name, default in found.items():
-            try:
-                ctx.default_map[name] = value(default, options[name], ctx)
-            except UsageError:
-                if not helped and (default.command or not taken(default, every(ctx.find_root().command))):
-                    raise
+            ctx.default_map[name] = partial(_valued, ctx, default, options[name], lenient=bool(helped))
+            if helped and ctx.lookup_default(name) is not None:
+                ctx.default_map[name] = ctx.lookup_default(name)
 
     def invoke(self, ctx: click.Context) -> int:
         from mracad_cli.journal import Journal, subject_of
@@ -110,7 +109,9 @@ class Command(click.Command):
         if kept.junit:
             check_junit(kept.junit, replaced)
         used = {name: d for name, d in ctx.meta.get("mracad.defaults", {}).items() if _used(ctx, name)}
-        journal = Journal(self.words(ctx), kept.log, verbose=bool(kept.verbose), keeps=bool(kept.log or kept.junit))
+        journal = Journal(
+            self.words(ctx), kept.log, verbose=bool(kept.verbose) and not kept.quiet, keeps=bool(kept.log or kept.junit)
+        )
         journal.began(ctx.meta["mracad.arguments"], used)
         failure: MracadError | None = None
         try:
@@ -165,6 +166,20 @@ def refused(path: str, replaced: bool) -> bool:
     return False
 
 
+def _valued(ctx: click.Context, default: Default, its: click.Option, *, lenient: bool) -> Any:
+    """The value of a default, read where the command line gives none; forgotten if only others take it."""
+    from mracad_cli.defaults import taken, value
+
+    try:
+        return value(default, its, ctx)
+    except UsageError:
+        if not lenient and (default.command or not taken(default, every(ctx.find_root().command))):
+            raise
+    assert ctx.default_map is not None
+    ctx.default_map.pop(str(its.name))
+    return None
+
+
 def _used(ctx: click.Context, name: str) -> bool:
     return ctx.get_parameter_source(name) is ParameterSource.DEFAULT_MAP
 
@@ -189,6 +204,14 @@ def every(group: click.Command) -> dict[str, click.Command]:
         elif command:
             found[name] = command
     return found
+
+
+def groups(root: click.Command) -> dict[str, click.Group]:
+    """The groups of commands in a group, by name."""
+    context = click.Context(root)
+    names = root.list_commands(context) if isinstance(root, click.Group) else []
+    found = {name: root.get_command(context, name) for name in names}  # type: ignore[attr-defined]
+    return {name: each for name, each in found.items() if isinstance(each, click.Group)}
 
 
 class Unguarded(Command):
@@ -233,6 +256,17 @@ def told() -> Iterator[None]:
         raise MracadError(f"the CAD kernel failed{note.now()} ({what})", hint) from error
 
 
+def _unknown(error: click.NoSuchOption) -> tuple[str, str]:
+    """The message of an option that does not exist, and the options that end in it, or else look like it."""
+    ctx, given = error.ctx, error.option_name
+    known = [name for param in ctx.command.params for name in param.opts] if ctx else []
+    near = [name for name in known if name.endswith(given.removeprefix("-"))] if given.startswith("--") else []
+    help = f"see {ctx.command_path if ctx else 'mracad'} --help"
+    if not near:
+        return error.format_message().rstrip("."), help
+    return f"No such option {given!r}", f"did you mean {' or '.join(map(repr, near))}? {help}"
+
+
 def run(group: click.Group, arguments: list[str], *, guarded: bool) -> int:
     """Run a command of a group; returns its exit code, and raises every failure as a MracadError."""
     try:
@@ -244,6 +278,8 @@ def run(group: click.Group, arguments: list[str], *, guarded: bool) -> int:
         return int(Code.USAGE)
     except click.exceptions.Exit as error:
         return error.exit_code
+    except click.NoSuchOption as error:
+        raise MracadError(*_unknown(error), Code.USAGE) from error
     except click.ClickException as error:
         command = error.ctx.command_path if isinstance(error, click.UsageError) and error.ctx else "mracad"
         raise MracadError(error.format_message().rstrip("."), f"see {command} --help", Code.USAGE) from error

@@ -94,14 +94,15 @@ def chosen(command: str, own: click.Command, commands: Callable[[], Commands]) -
     Raises
     ------
     UsageError
-        For a default of an option or a command that does not exist, with its place.
+        For a default of an option or a command that does not exist, with its place; not for those of other commands.
     """
     options = options_of(own)
     result: dict[str, Default] = {}
     for default in found():
         name = option(default, command, options)
         if name is None:
-            check(default, commands())
+            if not _of_another(default, command, commands()):
+                check(default, commands())
         elif name in GIVEN:
             raise UsageError(f"{default.place}: {name} has no default", "give it on the command line")
         else:
@@ -139,6 +140,14 @@ def taken(default: Default, commands: Commands) -> bool:
                 value(default, options[own], click.Context(command))
                 return True
     return False
+
+
+def _of_another(default: Default, command: str, commands: Commands) -> bool:
+    """Whether a default is for a command, or a group of them, other than this one; variables begin with its words."""
+    others = {*commands, *(name.partition(" ")[0] for name in commands)} - {command, command.partition(" ")[0]}
+    if default.folder is None:
+        return any(default.option.startswith(f"{name.replace(' ', '-')}-") for name in others)
+    return default.command in others
 
 
 def check(default: Default, commands: Commands) -> None:

@@ -58,7 +58,7 @@ telling = apply(
         is_flag=True,
         expose_value=False,
         callback=_kept,
-        help="Print no results and no progress, only warnings and errors; what --json asks for is printed.",
+        help="Print no results and no progress, only warnings and errors, even with -v; --json is printed.",
     ),
     option(
         "-v",

@@ -79,7 +79,7 @@ class Document(kernel.Document):
         ascii: bool = False,
         scalar: str | Sequence[str] = (),
     ) -> Written:
-        """Write a file, whole or not at all; the same as :func:`mracad.write`.
+        """Write a file, whole or not at all; the same as :func:`mracad.write`.  An existing file is replaced.
 
         An exact file is read back and judged, as on the command line: faces that would make it worse stay as they were
         before the edits, and ``reports`` then says so.  ``scalar`` gives the points of meshes numbers, such as

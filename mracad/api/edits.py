@@ -11,7 +11,7 @@ from mracad.api.past import remember
 from mracad.api.progress import shown
 from mracad.api.speech import explained, speaking
 from mracad.api.things import opened
-from mracad.api.values import chosen, described, parameters
+from mracad.api.values import bound, chosen, described, parameters
 from mracad.job.document import Report, play
 from mracad.output import put
 from mracad.spec.recipe import Step
@@ -38,7 +38,7 @@ def edit(use: str) -> Callable[..., Any]:
     taken = signature(use)
 
     def function(thing: Any, /, **given: Any) -> Any:
-        taken.bind(thing, **given)  # raises TypeError
+        bound(use, taken, given, thing)
         details, progress = (given.pop(name, None) for name in (DETAILS.name if use == "level" else "", PROGRESS.name))
         with speaking(), shown(progress) as tell:
             tell("reading", 0, 1)

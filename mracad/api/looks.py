@@ -12,7 +12,7 @@ import numpy as np
 from mracad.api.progress import Progress, shown
 from mracad.api.speech import speaking
 from mracad.api.things import Source, opened
-from mracad.api.values import chosen, described, parameters
+from mracad.api.values import bound, chosen, described, parameters
 from mracad.errors import UsageError
 from mracad.spec.pictures import Picture
 from mracad.spec.places import spot
@@ -40,7 +40,7 @@ def _declared(
 
         @wraps(function)
         def call(*things: Any, **given: Any) -> Any:
-            taken.bind(*things, **given)  # raises TypeError
+            bound(function.__name__, taken, given, *things)
             with speaking(), shown(given.pop("progress", None)) as tell:
                 return function(*things, given, tell)
 

@@ -56,9 +56,13 @@ class Thing:
         if isinstance(given, Iterable):
             return [text for each in given for text in self.selectors(each, option)]
         try:
-            return [f"#{operator.index(given) + 1}"]
+            index = operator.index(given)
         except TypeError:
             raise UsageError(f"{option}: {given!r} is no face", "give #3, an index from 0 or a face") from None
+        count = len(self.document.faces)
+        if not 0 <= index < count:
+            raise UsageError(f"{option}: there is no face with index {index}", f"indices are 0 to {count - 1}")
+        return [f"#{index + 1}"]
 
 
 def opened(thing: Source, *, change: bool) -> Thing:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import textwrap
 from collections.abc import Collection, Iterable, Mapping
-from inspect import Parameter
+from inspect import Parameter, Signature
 from numbers import Real
 from typing import Any, TypeVar
 
@@ -14,7 +14,7 @@ import msgspec
 from mracad.api.speech import explained
 from mracad.api.things import Thing
 from mracad.errors import UsageError
-from mracad.spec.fields import Field, fields
+from mracad.spec.fields import Field, fields, nearest
 from mracad.spec.steps.base import Options
 from mracad.spec.text import options
 
@@ -25,6 +25,18 @@ SELECTORS = "faces", "hold", "fit"
 
 LONGEST = 90
 """Longest list of choices in the line of a keyword, characters."""
+
+
+def bound(function: str, taken: Signature, given: Mapping[str, Any], *things: Any) -> None:
+    """Raise TypeError for arguments that a function does not take."""
+    unknown = next((name for name in given if name not in taken.parameters), None)
+    if unknown is not None:
+        hint = nearest(unknown, list(taken.parameters)[len(things) :], f"see help(mracad.{function})")
+        raise TypeError(f"{function}() has no option {unknown!r}; {hint}")
+    try:
+        taken.bind(*things, **given)
+    except TypeError as error:
+        raise TypeError(f"{function}(): {error}") from None
 
 
 def chosen(struct: type[Given], given: Mapping[str, Any], thing: Thing) -> Given:
@@ -45,6 +57,8 @@ def _plain(field: Field, value: Any, thing: Thing) -> Any:
     row = hasattr(value, "__len__") and not isinstance(value, str)
     if row and _takes_points(field) and all(isinstance(x, Real) for x in value):
         return ",".join(f"{float(x):.17g}" for x in value)
+    if row and field.name == "size":
+        return "x".join(map(str, value))
     if row and field.many:
         return [_plain(field, each, thing) for each in value]
     return str(value) if field.type is str and isinstance(value, Real) and not isinstance(value, bool) else value
@@ -92,6 +106,8 @@ def _one(field: Field) -> str:
         return str(field.type.__name__)
     if field.naming and not field.form:
         return "Path"
+    if field.name == "size":
+        return "str | tuple[int, int]"
     return "str | Sequence[float]" if _takes_points(field) else "str"
 
 
@@ -120,5 +136,11 @@ def _kind(field: Field) -> str:
     elif field.quantity:
         one = f"{field.quantity.noun.split(maxsplit=1)[1]} (str or float)"
     else:
-        one = "str or numbers" if points else "path" if _one(field) == "Path" else field.type.__name__
+        one = (
+            "str or numbers"
+            if points or field.name == "size"
+            else "path"
+            if _one(field) == "Path"
+            else field.type.__name__
+        )
     return f"{one}, or sequence of these" if field.many else one

@@ -23,7 +23,7 @@ from OCP.Standard import Standard_Failure
 from OCP.TCollection import TCollection_ExtendedString
 from OCP.TDocStd import TDocStd_Application, TDocStd_Document
 
-from mracad import cache
+from mracad import cache, note
 from mracad.occ.document import Document
 from mracad.occ.labels import Title
 from mracad.occ.load import Text
@@ -57,6 +57,8 @@ def through_cache(file: Text, how: tuple[str | None, ...], read: Callable[[], Do
     """
     key = _key(file, how)
     found = cache.find(key)
+    if found:
+        note.doing("reading (cache)")
     opened = _opened(found, file.name) if found else None
     if opened:
         return opened

@@ -53,7 +53,9 @@ def fill(text: str, name: str) -> Fill:
     """Places all over the faces from ``KIND,spacing:LENGTH``; raises UsageError."""
     match = re.fullmatch(rf"\s*({'|'.join(FILLS)})\s*,\s*spacing\s*:\s*(.+)", text)
     if match is None:
-        raise UsageError(f"{name}: {text!r} is not a way to fill faces", FILL)
+        kind = text.partition(",")[0].strip()
+        what = "has no spacing" if kind in FILLS and "spacing" not in text else "is not a way to fill faces"
+        raise UsageError(f"{name}: {text!r} {what}", FILL)
     length(match[2], 1.0, f"{name}: spacing")
     return Fill(match[1], match[2])
 

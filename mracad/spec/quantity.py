@@ -115,6 +115,11 @@ Share = Annotated[float, SHARE]
 """The type of a field that is a percentage."""
 
 
+def worded(text: str) -> str:
+    """A length as it is told: a plain number is in millimetres."""
+    return f"{text.strip()} mm" if re.fullmatch(NUMBER, text.strip()) else text
+
+
 def length(text: str, diagonal: float, name: str) -> float:
     """A positive length in millimetres from ``"5"``, ``"5mm"``, ``"0.2in"`` or ``"2%"`` of ``diagonal``.
 

@@ -169,3 +169,15 @@ def test_steps_of_recipes_take_no_defaults(here, mracad):
     before = mracad("recipe", "check", "fair.toml", "--json")
     (here / "mracad.toml").write_text('amount = 0.5\n[smooth]\nkeep = "g2"\nscale = "9mm"\n')
     assert mracad("recipe", "check", "fair.toml", "--json") == before and before.code == 0
+
+
+def test_names_for_other_commands_are_no_matter_and_what_is_overridden_is_not_read(here, mracad, monkeypatch):
+    """The part is missing: exit code 3 once the options are read."""
+    (here / "mracad.toml").write_text('[smooth]\nsclae = "5mm"\n[feature]\nx = 1\n')
+    monkeypatch.setenv("MRACAD_SMOOTH_SCLAE", "5mm")
+    assert mracad("render", "part.step", "-o", "a.png").code == 3
+    assert mracad(*FINE).code == 2 and mracad("env").code == 1
+    monkeypatch.delenv("MRACAD_SMOOTH_SCLAE")
+    (here / "mracad.toml").write_text('[smooth]\nscale = "banana"\n')
+    assert mracad(*FINE).code == 3
+    assert mracad(*SMOOTH).err.startswith("mracad: mracad.toml:2: scale: 'banana' is not a length")

@@ -31,10 +31,19 @@ def test_what_the_cache_of_documents_holds(mracad, here, monkeypatch):
 
     assert json.loads(mracad("env", "--json").out)["caches"]["documents"] == "off"
     monkeypatch.setenv("MRACAD_CACHE", str(here / "cache"))
-    assert json.loads(mracad("env", "--json").out)["caches"]["documents"] == "0 in 0.0 kB"
+    assert json.loads(mracad("env", "--json").out)["caches"]["documents"] == f"0 of 0.0 kB in {here}/cache, writable"
     cache.keep("a" * 64, cache.sealed(b"x" * 1968))
-    assert json.loads(mracad("env", "--json").out)["caches"]["documents"] == "1 in 2.0 kB"
-    assert str(here) not in mracad("env").out  # no path of the user
+    assert json.loads(mracad("env", "--json").out)["caches"]["documents"] == f"1 of 2.0 kB in {here}/cache, writable"
+    monkeypatch.setenv("HOME", str(here))
+    assert "in ~/cache, writable" in mracad("env").out and str(here) not in mracad("env").out
+
+
+def test_a_cache_that_cannot_be_written_is_a_problem(mracad, here, monkeypatch):
+    (here / "file").write_text("")
+    monkeypatch.setenv("MRACAD_CACHE", str(here / "file" / "cache"))
+    result = mracad("env")
+    assert result.code == 1 and f"in {here}/file/cache, not writable" in result.out
+    assert f"problem: the cache of documents cannot be written to {here}/file/cache: Not a directory; " in result.out
 
 
 def test_defaults_with_their_places_and_what_is_wrong_with_them(mracad, here, monkeypatch):
@@ -55,7 +64,7 @@ def test_defaults_with_their_places_and_what_is_wrong_with_them(mracad, here, mo
         "colour": ("red", "MRACAD_COLOUR"),
     }
     wrong = {d["from"] for d in body["defaults"] if d["problem"]}
-    assert wrong == {"mracad.toml:2", "mracad.toml:4", "mracad.toml:7", "MRACAD_COLOUR"} and result.code == 0
+    assert wrong == {"mracad.toml:2", "mracad.toml:4", "mracad.toml:7", "MRACAD_COLOUR"} and result.code == 1
     assert len(body["problems"]) == 4
     text = mracad("env").out
     assert 'default: smooth scale = "5 apples" from mracad.toml:4' in text and text.count("\nproblem: ") == 4

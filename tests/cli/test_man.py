@@ -21,10 +21,16 @@ def pages(tmp_path_factory):
 
 
 def test_there_is_a_page_for_each_command(pages):
-    assert pages.keys() == {"mracad", *(f"mracad-{name.replace(' ', '-')}" for name in declared.commands())}
+    groups = {"mracad-feature", "mracad-recipe"}
+    assert pages.keys() == {"mracad", *groups, *(f"mracad-{name.replace(' ', '-')}" for name in declared.commands())}
     overview = plain(pages["mracad"].read_text())
     for name in declared.commands():
         assert f"mracad-{name.replace(' ', '-')}(1)" in overview and f" {name} " in overview
+
+
+def test_a_group_leads_to_its_commands(pages):
+    text = plain(pages["mracad-feature"].read_text())
+    assert "mracad feature COMMAND" in text and "mracad-feature-list(1)" in text and "mracad-smooth" not in text
 
 
 def plain(text):

@@ -8,7 +8,7 @@ import click
 
 from mracad.errors import FileError
 from mracad_cli import options
-from mracad_cli.command import Plain, every
+from mracad_cli.command import Plain, every, groups
 from mracad_cli.outputs import deliver
 
 
@@ -23,7 +23,11 @@ def command(ctx: click.Context, folder: str) -> None:
     except OSError as error:
         raise FileError(f"cannot write into {folder}: {error.strerror}", "name another folder") from error
     root = ctx.find_root().command
-    pages = {"mracad": man.overview(root, every(root))}
-    for name, page in every(root).items():
+    commands = every(root)
+    pages = {"mracad": man.overview(root, commands)}
+    for name, group in groups(root).items():
+        own = {each: page for each, page in commands.items() if each.startswith(f"{name} ")}
+        pages[f"mracad-{name}"] = man.overview(group, own, name)
+    for name, page in commands.items():
         pages[f"mracad-{name.replace(' ', '-')}"] = man.page(name, page, ctx.find_root())
     deliver({str(Path(folder, f"{name}.1")): text for name, text in pages.items()}, [f"wrote {len(pages)} pages"])

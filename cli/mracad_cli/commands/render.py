@@ -51,7 +51,7 @@ def command(reading: Reading, output: str, picture: Picture, overwrite: bool, as
         raise UsageError("show: treatment is what an edit did", "give it to an edit, such as smooth, with -o OUT.png")
     if picture.wipe and not picture.before:
         raise UsageError("wipe: there is no other model", "add --before REF.step")
-    format = FORMATS["png"] if output == "-" else by_extension(output)
+    format = FORMATS["png"] if output == "-" else by_extension(output, "picture")
     if format.kind != "picture":
         raise UsageError(f"cannot draw {output}: pictures are .png, .gif or .mp4", "name a file that ends in .png")
     picture.check(format.name)

@@ -9,6 +9,7 @@ import re
 import sys
 from collections.abc import Mapping
 from importlib import metadata
+from pathlib import Path
 from typing import Any
 
 import click
@@ -28,6 +29,9 @@ def body(commands: Mapping[str, click.Command]) -> dict[str, Any]:
         defaults, wrong = [_default(default, commands) for default in found()], []
     except MracadError as error:
         defaults, wrong = [], [str(error)]
+    if trouble := cache.trouble():
+        hint = "name another folder with MRACAD_CACHE, or off"
+        wrong.append(f"the cache of documents cannot be written to {_folder()}: {trouble}; {hint}")
     return {
         "mracad": __version__,
         "python": platform.python_version(),
@@ -97,11 +101,17 @@ def _version(name: str) -> str | None:
 
 
 def _documents() -> str:
-    """How much the cache of healed documents holds."""
+    """How much the cache of healed documents holds, and where."""
     if cache.folder() is None:
         return "off"
     entries, total = cache.size()
-    return f"{entries} in {size(total)}"
+    return f"{entries} of {size(total)} in {_folder()}, {'not ' if cache.trouble() else ''}writable"
+
+
+def _folder() -> str:
+    """The folder of the cache of documents, from the user's own."""
+    path, home = str(cache.folder()), str(Path.home())
+    return f"~{path.removeprefix(home)}" if path.startswith(f"{home}{os.sep}") else path
 
 
 def _compiled() -> str:

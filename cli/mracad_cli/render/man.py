@@ -48,18 +48,20 @@ def page(name: str, command: click.Command, root: click.Context) -> str:
     return "\n".join([*lines, *_end(["mracad(1)"])]) + "\n"
 
 
-def overview(group: click.Command, commands: Mapping[str, click.Command]) -> str:
-    """The page of the program."""
+def overview(group: click.Command, commands: Mapping[str, click.Command], name: str = "") -> str:
+    """The page of the program, or of the group of commands with a name."""
+    words = f"mracad {name}".strip()
     lines = [
-        *_head("mracad", group),
+        *_head(words.replace(" ", "-"), group),
         ".SH SYNOPSIS",
-        "\\fBmracad\\fR COMMAND [OPTIONS] [ARGS]...",
+        f"\\fB{escaped(words)}\\fR COMMAND [OPTIONS] [ARGS]...",
         ".SH DESCRIPTION",
         *_paragraphs(group),
         ".SH COMMANDS",
         *_terms((name, f"{_sentence(command)}.") for name, command in commands.items()),
     ]
-    return "\n".join([*lines, *_end(f"mracad-{name.replace(' ', '-')}(1)" for name in commands)]) + "\n"
+    also = ["mracad(1)"] if name else []
+    return "\n".join([*lines, *_end([*also, *(f"mracad-{each.replace(' ', '-')}(1)" for each in commands)])]) + "\n"
 
 
 def escaped(text: str) -> str:

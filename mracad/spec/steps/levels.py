@@ -8,7 +8,7 @@ from msgspec import Meta
 
 from mracad.errors import UsageError
 from mracad.spec.files import File
-from mracad.spec.quantity import Length
+from mracad.spec.quantity import Length, worded
 from mracad.spec.steps.base import Edges
 from mracad.spec.steps.smooth import Fitting
 
@@ -49,7 +49,7 @@ class Level(Shaped, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
     @property
     def done(self) -> str:
-        return f"reduced to {self.scale}" if self.level is None else f"reduced to level {self.level:g}"
+        return f"reduced to {worded(self.scale or '')}" if self.level is None else f"reduced to level {self.level:g}"
 
     @property
     def quiet(self) -> str:

@@ -10,7 +10,7 @@ from msgspec import Meta
 
 from mracad.errors import UsageError
 from mracad.spec import motions, places
-from mracad.spec.quantity import Length, gain_of
+from mracad.spec.quantity import Length, gain_of, worded
 from mracad.spec.steps.levels import Shaped
 from mracad.spec.steps.smooth import Fairing
 
@@ -156,7 +156,7 @@ class Sweep(Shaped, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
     @property
     def done(self) -> str:
-        return f"swept at {self.scale}"
+        return f"swept at {worded(self.scale)}"
 
     @property
     def quiet(self) -> str:

@@ -9,7 +9,7 @@ from msgspec import Meta
 from mracad.errors import UsageError
 from mracad.spec import places
 from mracad.spec.fields import Begins
-from mracad.spec.quantity import Angle, Length, Share
+from mracad.spec.quantity import Angle, Length, Share, worded
 from mracad.spec.steps.base import Edges, Selection
 
 Sliding = Annotated[
@@ -136,8 +136,9 @@ class Smooth(Fairing, frozen=True, kw_only=True, forbid_unknown_fields=True):
         if self.level is not None:
             return f"level {self.level:g}"
         if self.scale is None:
-            return f"the largest scale within {self.max_deviation}"
-        return f"{self.scale} and {self.across} across" if self.across else self.scale
+            return f"the largest scale within {worded(self.max_deviation or '')}"
+        scale = worded(self.scale)
+        return f"{scale} and {worded(self.across)} across" if self.across else scale
 
     def __post_init__(self) -> None:
         super().__post_init__()
