@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, BinaryIO
+from typing import TYPE_CHECKING
 
 from mracad.errors import EditError, FileError
-from mracad.formats import by_content
 from mracad.inspect import accept
 from mracad.inspect.accept import Slack
 from mracad.inspect.faults import Fault, FaultKind, ReadBack
@@ -125,40 +123,6 @@ def produce(
         left = accept.blamed((fault for _, fault in faults), edited, memory.facts)
         excluded |= dict.fromkeys(left, Excluded.FILE)
     raise _refused(document.name, faults)
-
-
-def read_back(
-    document: Document,
-    file: str | os.PathLike | BinaryIO,
-    written: Written | None = None,
-    original: Original | None = None,
-) -> ReadBack:
-    """Read an exact file back and compare it with the document that was written to it.
-
-    Parameters
-    ----------
-    document : Document
-    file : path or binary stream
-    written : Written, optional
-        The result of writing it, which tells which faces are in parts.
-    original : callable, optional
-        Reads the document as it was before it was edited.  Then a fault is forgiven only where the kernel's own read
-        and write of that has it too; without it every fault is forgiven that loses no content.
-
-    Raises
-    ------
-    FileError
-        For a file that cannot be read.
-    """
-    from mracad.occ.facts import facts
-    from mracad.occ.load import load
-
-    text = load(file)
-    target = Target(text.name, by_content(text.getvalue(), text.name).name)
-    found = _read_back(text.getvalue(), target)
-    copy = partial(_Copies(original).of, target) if original else None
-    slack = Slack(parts={cut.face: cut.parts for cut in written.cut} if written else {})
-    return accept.read_back(found, *accept.judge(facts(document), found, slack, copy))
 
 
 class _Memory:

@@ -130,15 +130,6 @@ def test_a_mesh_is_judged_by_its_triangles(mracad, samples: Path, tmp_path: Path
     assert result.code == 0 and "valid: yes, as meshed; wrote out.stl" in result.out
 
 
-def test_in_python(samples: Path, tmp_path: Path) -> None:
-    document = library.read(samples / "panel.step")
-    library.write(document, tmp_path / "out.step")
-    assert library.read_back(document, tmp_path / "out.step").valid
-    library.write(library.read(samples / "bottle.step"), tmp_path / "other.step")
-    found = library.read_back(document, tmp_path / "other.step", original=lambda: document)
-    assert not found.valid and "face lost" in {fault.reason for fault in found.faults}
-
-
 def test_faces_of_which_the_file_would_be_worse_are_left(mracad, samples: Path, tmp_path: Path, monkeypatch) -> None:
     """A writer that tears the corners off face #1 as soon as that has moved: it and its neighbours there are left."""
     whole = writer.step

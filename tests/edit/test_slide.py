@@ -265,7 +265,7 @@ def test_the_library_slides_like_the_command(tmp_path, mracad):
     documents.write(blocks.document("cone", blocks.nets(16)[1]), source)
     assert mracad("denoise", source, "--noise", "0.05mm", "-o", target).code == 0
     model = library.snapshot(library.read(source))
-    edit = library.denoise(model, library.Denoise(noise="0.05mm"))
+    edit = denoise(model, Denoise(noise="0.05mm"))
     assert {each.how for each in edit.edges} == {"slid"}
     poles = [sculpted(each)[1].poles for each in (edit.displacement.applied(model), view(read(target)))]
     assert np.array_equal(*poles)

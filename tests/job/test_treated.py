@@ -1,5 +1,7 @@
 """What edits did, in the words of their reports."""
 
+from collections import Counter
+
 from mracad.edit.smooth import smooth
 from mracad.job.document import run
 from mracad.job.treated import rings, told
@@ -15,5 +17,10 @@ def test_faces_and_edges_are_counted_as_in_the_report(samples):
     assert found.words["edited"] == "2 faces smoothed at 25mm" and found.words["held"] == "1 face held by --hold"
     assert found.words["coupled"] == "1 edge moved with both faces"
     stay = [edge for edge in report.edit.edges if edge.reason]
-    assert found.words["frozen"].startswith(f"{len(stay)} edges stayed: ")
-    assert found.edges == {edge.edge: edge.how for edge in report.edit.edges} and rings(report) is None
+    why = Counter(found.edges[edge.edge] for edge in stay)
+    for how, count in why.items():
+        assert found.words[how].startswith(f"{count} edge") and how.partition(" ")[0] in ("idle", "stayed")
+    reasons = {str(edge.reason) for edge in stay}
+    assert {found.words[how].partition("stayed: ")[2] for how in why if how != "idle"} <= reasons
+    moved = {edge.edge: edge.how for edge in report.edit.edges if not edge.reason}
+    assert found.edges.items() >= moved.items() and len(found.edges) == len(report.edit.edges) and rings(report) is None
