@@ -23,7 +23,7 @@ from OCP.XCAFDoc import XCAFDoc_DocumentTool
 from mracad.formats import by_content
 from mracad.occ.document import Document, empty, no_faces
 from mracad.occ.load import load
-from mracad.occ.settings import quiet
+from mracad.occ.settings import exchange, quiet
 from mracad.occ.units import UNITS, Units, named
 
 
@@ -33,7 +33,7 @@ def read_brep(source: str | os.PathLike | BinaryIO, input_unit: str | None = Non
     binary = by_content(file.getvalue(), file.name).name == "binbrep"
     unit = "mm" if input_unit is None else named(input_unit)
     shape = TopoDS_Shape()
-    with quiet():
+    with quiet(), exchange({}):
         stream = io.BytesIO(file.getvalue())
         if binary:
             BinTools.Read_s(shape, stream)

@@ -15,6 +15,7 @@ from datetime import UTC, datetime
 from OCP.Interface import Interface_FloatWriter, Interface_Static
 from OCP.Message import Message
 from OCP.STEPCAFControl import STEPCAFControl_Controller
+from OCP.XCAFDoc import XCAFDoc_ShapeTool
 
 from mracad.errors import UsageError
 
@@ -61,6 +62,9 @@ def quiet() -> Iterator[None]:
 def exchange(values: Mapping[str, str | int]) -> Iterator[None]:
     """Set the kernel's exchange parameters, and restore the old ones at the end.
 
+    Products without a name are named by their kind inside the block, as the kernel does unless another library has
+    told it otherwise.
+
     Parameters
     ----------
     values : mapping
@@ -72,12 +76,15 @@ def exchange(values: Mapping[str, str | int]) -> Iterator[None]:
     """
     STEPCAFControl_Controller.Init_s()
     old = {name: Interface_Static.CVal_s(name) for name in values}
+    naming = XCAFDoc_ShapeTool.AutoNaming_s()
     try:
+        XCAFDoc_ShapeTool.SetAutoNaming_s(True)
         for name, value in values.items():
             if not Interface_Static.SetCVal_s(name, str(value)):
                 raise ValueError(f"the kernel has no setting {name} = {value}")
         yield
     finally:
+        XCAFDoc_ShapeTool.SetAutoNaming_s(naming)
         for name, text in old.items():
             Interface_Static.SetCVal_s(name, text)
 

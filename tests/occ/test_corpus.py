@@ -13,6 +13,7 @@ from OCP.TDocStd import TDocStd_Document
 from OCP.TopAbs import TopAbs_FORWARD
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS
+from OCP.XCAFDoc import XCAFDoc_ShapeTool
 
 from mracad.occ.check import check
 from mracad.occ.geometry import basis
@@ -33,7 +34,11 @@ def source(request):
 
 @pytest.fixture(scope="module")
 def document(source):
-    return read_step(source)
+    XCAFDoc_ShapeTool.SetAutoNaming_s(False)  # as CadQuery leaves it: names of products must not depend on it
+    try:
+        return read_step(source)
+    finally:
+        XCAFDoc_ShapeTool.SetAutoNaming_s(True)
 
 
 @pytest.fixture(scope="module")

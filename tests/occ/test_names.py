@@ -10,7 +10,7 @@ from OCP.TCollection import TCollection_ExtendedString
 from OCP.TopAbs import TopAbs_FACE
 from OCP.TopExp import TopExp_Explorer
 from OCP.TopLoc import TopLoc_Location
-from OCP.XCAFDoc import XCAFDoc_DocumentTool
+from OCP.XCAFDoc import XCAFDoc_DocumentTool, XCAFDoc_ShapeTool
 
 from mracad.errors import UsageError
 from mracad.occ.charset import detect
@@ -20,6 +20,7 @@ from mracad.occ.files import read, write
 from mracad.occ.labels import components, label_name, labels, name_label
 from mracad.occ.literals import decoded, encoded
 from mracad.occ.load import Text
+from mracad.occ.topology import compound
 from tests.occ import shapes
 
 WORDS = ("ASMWORD", "PARTWORD", "PARTNUMBER", "LEFTWORD", "FACEWORD", "LAYERWORD")
@@ -129,6 +130,17 @@ def test_empty_names_stay_empty_and_identifiers_stay():
     named = written(read(Text(text.replace(b"'','','what", b"'P-1','','what"), "x.step")))
     assert b"PRODUCT('P-1','','what it is'" in named
     assert contents(read(Text(named, "x.step"))).products == ("ASMWORD", "P-1")
+
+
+def test_other_libraries_do_not_change_the_names_of_products(tmp_path):
+    solids = [BRepPrimAPI_MakeBox(1, 2, 3).Shape(), BRepPrimAPI_MakeBox(3, 2, 1).Shape()]
+    write(shapes.document(compound(solids)), tmp_path / "x.brep")
+    XCAFDoc_ShapeTool.SetAutoNaming_s(False)  # as CadQuery leaves it
+    try:
+        assert contents(read(tmp_path / "x.brep")).products == ("x", "SOLID", "SOLID")
+        assert not XCAFDoc_ShapeTool.AutoNaming_s()
+    finally:
+        XCAFDoc_ShapeTool.SetAutoNaming_s(True)
 
 
 def test_names_of_an_iges_file():
