@@ -60,7 +60,7 @@ lint: $(VENV)/dev
 
 bench: $(VENV)/dev
 	$(BIN)/python benchmarks/transform.py
-	$(BIN)/python benchmarks/command.py
+	$(BIN)/python benchmarks/phases.py
 	$(BIN)/python benchmarks/features.py
 	$(BIN)/python benchmarks/seams.py
 
