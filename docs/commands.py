@@ -17,7 +17,8 @@ from mracad.errors import MEANINGS
 HEAD = """# Commands
 
 Made by `make docs` from the declarations of the commands; `mracad COMMAND --help` says the same. A `FILE` may be
-`-` for a stream. [Formats](formats.md), [defaults of options](shell.md#defaults), [steps of recipes](steps.md).
+`-` for a stream, or a [URL](batch.md#in-object-stores). [Formats](formats.md),
+[defaults of options](shell.md#defaults), [steps of recipes](steps.md).
 
 Results go to standard output, everything else to standard error. An error is one line: what, where, what to do. Nothing
 is written then.

@@ -13,6 +13,7 @@ from typing import IO, BinaryIO
 
 from mracad import note
 from mracad.errors import FileError
+from mracad.store import Location, Url, location
 
 PREFIX = ".mracad-"
 """Prefix of the names of temporary files; 32 hexadecimal digits and ``.part`` follow, as in no other file."""
@@ -59,8 +60,12 @@ def temporary(folder: Path, prefix: str = PREFIX) -> list[Path]:
     return [p for p in folder.glob(f"{prefix}*") if re.fullmatch(r"[0-9a-f]{32}\.part", p.name[len(prefix) :])]
 
 
-def put_all(files: Mapping[str | os.PathLike, bytes], last: Callable[[], object] = bool, prefix: str = PREFIX) -> None:
+def put_all(
+    files: Mapping[str | os.PathLike | Url, bytes], last: Callable[[], object] = bool, prefix: str = PREFIX
+) -> None:
     """Write files whole; if one cannot be written, or ``last`` fails, none is put in place.
+
+    Those in stores are put there one by one before the others: the ones before the first that fails stay.
 
     Parameters
     ----------
@@ -73,11 +78,19 @@ def put_all(files: Mapping[str | os.PathLike, bytes], last: Callable[[], object]
     FileError
         When a file cannot be written.
     """
+    remote: list[tuple[Url, bytes]] = []
     with contextlib.ExitStack() as stack:
-        for path, data in files.items():
+        for name, data in files.items():
+            path = location(name)
+            if isinstance(path, Url):
+                remote.append((path, data))
+                continue
             made = stack.enter_context(beside(path, prefix))
-            with _writing(Path(path)):
+            with _writing(path):
                 made.write_bytes(data)
+        for url, data in remote:
+            note.ending()
+            url.write_bytes(data)
         last()
 
 
@@ -95,10 +108,10 @@ def put(data: bytes, target: str | os.PathLike | BinaryIO, prefix: str = PREFIX)
         ) from error
 
 
-def holds(path: Path, data: bytes) -> bool:
+def holds(path: Location, data: bytes) -> bool:
     """Whether a file exists and already has this content."""
     try:
-        return path.stat().st_size == len(data) and path.read_bytes() == data
+        return (isinstance(path, Url) or path.stat().st_size == len(data)) and path.read_bytes() == data
     except OSError:
         return False
 

@@ -18,6 +18,9 @@ PROJECT = tomllib.loads((Path(__file__).parents[1] / "pyproject.toml").read_text
         ("imageio_ffmpeg", "video", ["smooth", "panel.step", "--scale", "9mm", "-o", "a.mp4"]),
         ("svgelements", "features", ["feature", "make", "a.svg,height:1mm", "-o", "a.feature"]),
         ("ezdxf", "features", ["feature", "make", "a.dxf,height:1mm", "-o", "a.feature"]),
+        ("fsspec", "stores", ["smooth", "s3://b/panel.step", "--scale", "9mm", "-o", "a.step"]),
+        ("s3fs", "stores", ["batch", "r.toml", "s3://b/*.step", "-O", "out"]),
+        ("gcsfs", "stores", ["convert", "panel.step", "-o", "gs://b/a.step"]),
         ("distributed", "cluster", ["batch", "r.toml", "panel.step", "-O", "out", "--cluster", "local"]),
     ],
 )

@@ -15,6 +15,7 @@ from mracad import note
 from mracad.errors import FileError, UsageError, needing
 from mracad.formats import FORMATS, Format, by_extension
 from mracad.spec.fields import dashed
+from mracad.store import Location, Url, is_url, location
 from mracad_cli.options import PAGES, PICTURES, Reading, Reports, Writing
 from mracad_cli.say import json_text, say, warn
 
@@ -91,7 +92,7 @@ def check_outputs(writing: Writing, beside: Collection[str | None] = (), *, dry:
     mesh = writing.chord, writing.angle, writing.ascii_stl
     how = (writing.schema or "").upper(), *mesh, writing.picture, writing.scalars
     return [
-        Target("standard output" if path == "-" else Path(path).name, format.name, *how)
+        Target("standard output" if path == "-" else location(path).name, format.name, *how)
         for path, format in formats.items()
     ]
 
@@ -123,7 +124,7 @@ def _check_scalars(formats: Collection[Format]) -> None:
 
 def check_reports(*paths: str | None, overwrite: bool) -> None:
     """Refuse reports that could not be written, and two that would be the same file."""
-    given = [Path(path) for path in paths if path]
+    given = [location(path) for path in paths if path]
     for number, path in enumerate(given):
         if path.resolve() in [other.resolve() for other in given[:number]]:
             raise UsageError(f"{path} is named twice", "give each file that is written a name of its own")
@@ -145,19 +146,34 @@ def check_junit(path: str, overwrite: bool) -> None:
     """Refuse a report for CI that is not XML, or could not be written."""
     if not path.lower().endswith(".xml"):
         raise UsageError(f"cannot write {path}: JUnit is XML", "name a file that ends in .xml")
-    check_target(Path(path), overwrite)
+    check_target(location(path), overwrite)
 
 
-def check_target(path: Path, overwrite: bool) -> None:
+def check_target(path: Location, overwrite: bool) -> None:
     """Refuse an output that could not be written, or that exists already."""
+    if isinstance(path, Url):
+        path.check()
+    else:
+        _check_folder(path)
+    if not overwrite and path.exists():
+        raise UsageError(f"{path} exists", "give --overwrite to replace it")
+
+
+def _check_folder(path: Path) -> None:
+    """Refuse a path on this machine that could not be written."""
     if path.is_dir():
         raise FileError(f"cannot write {path}: it is a directory", "name a file in it")
     if not path.parent.is_dir():
         raise FileError(f"cannot write {path}: there is no folder {path.parent}", "create it first")
     if not os.access(path.parent, os.W_OK):
         raise FileError(f"cannot write {path}: the folder is not writable", "choose another one")
-    if path.exists() and not overwrite:
-        raise UsageError(f"{path} exists", "give --overwrite to replace it")
+
+
+def check_depfile(depfile: str | None, *files: str | None) -> None:
+    """Refuse rules for make with files that it cannot see."""
+    far = next((file for file in files if file and is_url(file)), None)
+    if depfile and far:
+        raise UsageError(f"depfile: make cannot see {far}", "leave --depfile out")
 
 
 def deliver(files: Mapping[str, str | bytes | None], lines: Iterable[str], *, stream: bytes | None = None) -> None:
@@ -204,7 +220,7 @@ def deliver_models(
             warn(each.note)
     data = {path: each.data for path, each in zip(writing.outputs, made, strict=False)}
     stream = data.pop("-", b"" if "-" in writing.outputs else None)
-    changed = {p: d for p, d in data.items() if not (writing.if_changed and holds(Path(p), d))}
+    changed = {p: d for p, d in data.items() if not (writing.if_changed and holds(location(p), d))}
     deliver({**changed, **files}, lines, stream=stream)
 
 

@@ -12,6 +12,7 @@ import click
 
 from mracad.spec.fields import Field, dashed
 from mracad.spec.quantity import ANGLE, LENGTH, MEMORY, TIME, Kind
+from mracad.store import is_url
 
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
@@ -162,7 +163,7 @@ class Declared(click.ParamType):
 def relocated(kind: click.ParamType, text: str, folder: str) -> str:
     """The text of an option with a relative path in it taken from a folder."""
     if isinstance(kind, File):
-        return text if text == "-" else os.path.normpath(os.path.join(folder, text))
+        return text if text == "-" or is_url(text) else os.path.normpath(os.path.join(folder, text))
     if isinstance(kind, Declared) and (naming := kind.field.naming) and (file := naming.file(text)):
         return naming.renamed(text, {file: os.path.normpath(os.path.join(folder, file))})
     return text

@@ -13,7 +13,16 @@ from mracad.spec.steps import STEPS, Options
 from mracad_cli import options, running
 from mracad_cli.command import Command
 from mracad_cli.options import Editing, Reading, Writing
-from mracad_cli.outputs import check_outputs, check_page, deliver_models, depfile_text, load, read, read_silently
+from mracad_cli.outputs import (
+    check_depfile,
+    check_outputs,
+    check_page,
+    deliver_models,
+    depfile_text,
+    load,
+    read,
+    read_silently,
+)
 from mracad_cli.progress import Progress
 from mracad_cli.say import json_text
 
@@ -74,6 +83,7 @@ def run_steps(
     start = time.perf_counter()
     places = [f"{path}.toml" for path in writing.outputs if editing.record and path != "-"]
     check_page(editing.report_html)
+    check_depfile(editing.depfile, reading.file, *writing.outputs)
     others = (editing.report, editing.report_html, editing.depfile, *places, *beside)
     targets = check_outputs(writing, others, dry=editing.dry_run)
     records = {place: record_of(steps, place) for place in places}

@@ -6,7 +6,6 @@ import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields
 from functools import partial
-from pathlib import Path
 from typing import BinaryIO
 
 from mracad.api.speech import speaking
@@ -22,6 +21,7 @@ from mracad.occ.load import load
 from mracad.output import put
 from mracad.spec.pictures import Scalars
 from mracad.spec.recipe import Step
+from mracad.store import location
 
 
 @dataclass(eq=False)
@@ -155,7 +155,7 @@ def _called(step: Step) -> str:
 
 
 def _name(document: kernel.Document, target: str | os.PathLike[str] | BinaryIO) -> str:
-    return Path(target).name if isinstance(target, str | os.PathLike) else document.name
+    return location(target).name if isinstance(target, str | os.PathLike) else document.name
 
 
 def _format(target: str | os.PathLike[str] | BinaryIO, format: str) -> str:

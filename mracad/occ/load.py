@@ -7,7 +7,7 @@ import os
 from pathlib import Path
 from typing import BinaryIO
 
-from mracad.errors import FileError
+from mracad.store import location, read
 
 
 class Text(io.BytesIO):
@@ -30,10 +30,4 @@ def load(source: str | os.PathLike | BinaryIO) -> Text:
         return source
     if not isinstance(source, str | os.PathLike):
         return Text(source.read(), Path(str(getattr(source, "name", "stdin"))).name.strip("<>"))
-    path = Path(source)
-    try:
-        return Text(path.read_bytes(), path.name)
-    except OSError as error:
-        reason = {IsADirectoryError: "it is a folder", FileNotFoundError: "there is no such file"}
-        why = reason.get(type(error), error.strerror or str(error))
-        raise FileError(f"cannot read '{path}': {why}", "give the path of a model") from error
+    return Text(read(source), location(source).name)

@@ -10,12 +10,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from importlib.resources import files
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mracad.errors import needing
 from mracad.report.table import Table
 from mracad.spec.pictures import VIEWS
+from mracad.store import Location, head
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -135,11 +135,10 @@ def rendered(name: str, page: object, **more: object) -> bytes:
     return _environment().get_template(name).render(page=page, **common, **more).encode()
 
 
-def row_of(path: Path) -> dict[str, Any]:
+def row_of(path: Location) -> dict[str, Any]:
     """What an index says of a page that was written; empty where there is none."""
     try:
-        with path.open("rb") as file:
-            found = _ROW.search(file.read(_HEAD))
+        found = _ROW.search(head(path, _HEAD))
         return dict(json.loads(found[1])) if found else {}
     except (OSError, ValueError):
         return {}

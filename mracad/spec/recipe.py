@@ -30,6 +30,7 @@ from mracad.errors import FileError, UsageError
 from mracad.spec.fields import dashed, fields, named, nearest
 from mracad.spec.steps import STEPS, Options
 from mracad.spec.text import braced, filled, options, place_of, places_of_steps, toml, toml_value
+from mracad.store import Location, Url, is_url, location
 from mracad.version import __version__
 
 OWN = ("use", "id")
@@ -139,7 +140,7 @@ class Recipe:
         UsageError
             For a value that an option does not take.
         """
-        path = Path("stdin" if source == "-" else source)
+        path = location("stdin" if source == "-" else source)
         folder = self.file.parent if self.file else Path()
         variables = {"name": path.stem, "folder": str(path.parent)}
         found = []
@@ -148,7 +149,7 @@ class Recipe:
                 key: filled(value, variables, table.place(key)) for key, value in table.values.items() if key not in OWN
             }
             given = options(STEPS[table.values["use"]], values, table.place)
-            given = given.relocated({file: os.path.normpath(folder / file) for file in given.files()})
+            given = given.relocated({file: _from(folder, file) for file in given.files()})
             found.append(Step(name, table.values["use"], given))
         return tuple(found)
 
@@ -271,14 +272,14 @@ def title(steps: Iterable[Step]) -> str:
     return " ! ".join(step.text() for step in steps)
 
 
-def record_of(steps: Iterable[Step], place: str | os.PathLike[str]) -> str:
+def record_of(steps: Iterable[Step], place: str | os.PathLike[str] | Url) -> str:
     """The steps as a recipe, with every option resolved and the versions of the packages.
 
     Parameters
     ----------
     steps : iterable of Step
-    place : path
-        Path of the recipe to be written; files that options name are written relative to it.
+    place : path or Url
+        Path of the recipe to be written; files that options name are written relative to it (in a store: absolute).
 
     Raises
     ------
@@ -288,13 +289,25 @@ def record_of(steps: Iterable[Step], place: str | os.PathLike[str]) -> str:
     lines = ["[versions]", *(f"{toml(name)} = {toml(version)}" for name, version in versions().items())]
     for step in steps:
         lines += ["", "[[step]]", f"use = {toml(step.use)}", f"id = {toml(step.id)}"]
-        near = {file: os.path.relpath(file, Path(place).parent) for file in step.options.files()}
+        near = {file: _seen(file, location(place).parent) for file in step.options.files()}
         lines += [
             f"{dashed(name)} = {toml(braced(value))}"
             for name, value in structs.asdict(step.options.relocated(near)).items()
             if value is not None
         ]
     return "\n".join(lines) + "\n"
+
+
+def _from(folder: Path, file: str) -> str:
+    """A file that is named relative to a folder."""
+    return file if is_url(file) else os.path.normpath(folder / file)
+
+
+def _seen(file: str, folder: Location) -> str:
+    """A file as named in a folder."""
+    if is_url(file):
+        return file
+    return os.path.abspath(file) if isinstance(folder, Url) else os.path.relpath(file, folder)
 
 
 @cache

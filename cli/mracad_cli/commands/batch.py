@@ -1,7 +1,8 @@
 """Run a recipe on many models, each in a worker process with limits. A second run does only what changed.
 
-IN are files, folders (all models below them) or patterns; - reads a list from standard input. If a file crashes its
-worker, hangs or needs too much memory, only that file fails. Exit code 1 if any file failed; run again to continue.
+IN are files, folders (all models below them) or patterns, here or at URLs (s3://, gs://); - reads a list from standard
+input. If a file crashes its worker, hangs or needs too much memory, only that file fails. Exit code 1 if any file
+failed; run again to continue.
 """
 
 from __future__ import annotations
@@ -22,9 +23,10 @@ from mracad.errors import Code, MracadError, needing
 from mracad.formats import FORMATS
 from mracad.job.batch.settings import Limits, Settings
 from mracad.spec.quantity import MEMORY, TIME
+from mracad.store import location
 from mracad_cli import options, running
 from mracad_cli.command import Unguarded
-from mracad_cli.outputs import check_page, check_reports, deliver, depfile_text
+from mracad_cli.outputs import check_depfile, check_page, check_reports, deliver, depfile_text
 from mracad_cli.progress import Progress
 from mracad_cli.say import json_text, say, warn
 from mracad_cli.steps import needed, plan
@@ -63,7 +65,9 @@ class Reports:
 _placing = options.gathered(
     "place",
     Place,
-    options.option("-O", "--folder", metavar="DIR", required=True, type=options.folder, help="Folder to write into."),
+    options.option(
+        "-O", "--folder", metavar="DIR", required=True, type=options.folder, help="Folder to write into, or its URL."
+    ),
     options.option(
         "-j", "--jobs", type=click.IntRange(min=1), metavar="N", help="Number of workers.  [default: one per core]"
     ),
@@ -148,10 +152,12 @@ def command(
             import distributed  # noqa: F401
     check_reports(reports.report, reports.report_html, reports.junit, reports.depfile, overwrite=True)
     words = [word for given in sources for word in (_listed() if given == "-" else [given])]
-    items = find(words, Path(place.folder), place.format or "")
+    check_depfile(reports.depfile, place.folder, *words)
+    folder = location(place.folder)
+    items = find(words, folder, place.format or "")
     if not reports.dry_run:
         return _run(steps, items, place, settings, reports)
-    listed = {item.source: str(Path(place.folder, item.output)) for item in items}
+    listed = {item.source: str(folder / item.output) for item in items}
     planned = plan(steps.steps(items[0].source))
     lines = [*planned, *(f"{source} -> {output}" for source, output in listed.items())]
     deliver({}, [json_text({"plan": planned, "files": listed})] if reports.as_json else lines)
@@ -185,7 +191,9 @@ def _run(recipe: Recipe, items: Sequence[Item], place: Place, settings: Settings
     told = text.batch_lines(outcomes, seconds)
     if reports.report_html:
         planned = plan(recipe.steps(items[0].source))
-        files[reports.report_html] = batch.index(recipe.name, planned, outcomes, told, Path(reports.report_html).parent)
+        files[reports.report_html] = batch.index(
+            recipe.name, planned, outcomes, told, location(reports.report_html).parent
+        )
         told.append(f"wrote {reports.report_html}")
     deliver(files, [json_text({"summary": body})] if reports.as_json else told)
     return 1 if counts["failed"] else 0
@@ -202,7 +210,7 @@ def _outcomes(
     outcomes: list[Outcome] = []
     failed = 0
     with (
-        Manifest(Path(place.folder)) as manifest,
+        Manifest(location(place.folder)) as manifest,
         _workers(place, len(items)) as executor,
         closing(run(recipe, items, manifest, executor, *how)) as results,
         Progress(rate=True) as progress,

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
 from mracad.errors import FileError
+from mracad.store import Location, Url, location
 
 if TYPE_CHECKING:
     from mracad.job.batch.run import Outcome
@@ -28,16 +29,18 @@ class Pages:
 
     Attributes
     ----------
-    folder : Path
+    folder : Path or Url
     """
 
-    folder: Path
+    folder: Location
 
     @classmethod
     def beside(cls, index: str) -> Pages:
         """Pages for an index, in a folder that is made if needed; raises FileError."""
-        path = Path(index)
+        path = location(index)
         folder = path.with_name(f"{path.stem}_files")
+        if isinstance(folder, Url):
+            return cls(folder)
         try:
             folder.mkdir(exist_ok=True)
         except OSError as error:
@@ -45,7 +48,7 @@ class Pages:
             raise FileError(f"cannot make a folder {folder} for the pages: {error.strerror}", hint) from error
         return cls(folder)
 
-    def place(self, output: str) -> Path:
+    def place(self, output: str) -> Location:
         """The page about an output."""
         return self.folder / f"{output}.html"
 
@@ -63,7 +66,9 @@ class Pages:
         return pages.edited(before, done.document, steps, done, body, key)
 
 
-def index(recipe: str, asked: Sequence[str], outcomes: Sequence[Outcome], lines: Sequence[str], beside: Path) -> bytes:
+def index(
+    recipe: str, asked: Sequence[str], outcomes: Sequence[Outcome], lines: Sequence[str], beside: Location
+) -> bytes:
     """The index of the pages about the files of a batch.
 
     Parameters
@@ -74,7 +79,7 @@ def index(recipe: str, asked: Sequence[str], outcomes: Sequence[Outcome], lines:
     outcomes : sequence of Outcome
     lines : sequence of str
         What the command line says.
-    beside : Path
+    beside : Path or Url
         The folder of the index.
     """
     from mracad.report.index import Index, html
@@ -95,15 +100,15 @@ def index(recipe: str, asked: Sequence[str], outcomes: Sequence[Outcome], lines:
     )
 
 
-def _record(outcome: Outcome, beside: Path) -> dict[str, Any]:
+def _record(outcome: Outcome, beside: Location) -> dict[str, Any]:
     """A row: what became of a file, and what its page says of it."""
     from mracad.report.page import row_of
 
     done = outcome.status in ("done", "unchanged")
     said = [outcome.message, outcome.hint, *(f"warning: {each}" for each in outcome.warnings)]
     return {
-        **(row_of(Path(outcome.page)) if outcome.page else {}),
-        "link": address(Path(outcome.page), beside) if outcome.page else "",
+        **(row_of(location(outcome.page)) if outcome.page else {}),
+        "link": address(outcome.page, beside) if outcome.page else "",
         "file": outcome.file,
         "status": outcome.status,
         "code": outcome.code if done or outcome.status == "failed" else None,
@@ -113,6 +118,6 @@ def _record(outcome: Outcome, beside: Path) -> dict[str, Any]:
     }
 
 
-def address(page: Path, beside: Path) -> str:
-    """The address of a page, seen from a folder."""
-    return quote(os.fsencode(Path(os.path.relpath(page, beside)).as_posix()))
+def address(page: str, beside: Location) -> str:
+    """The address of a page, seen from a folder above it."""
+    return quote(os.fsencode(Path(os.path.relpath(page, str(beside))).as_posix()))

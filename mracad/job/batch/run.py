@@ -7,10 +7,9 @@ import time
 from collections.abc import Generator, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, Literal, Protocol
 
-from mracad.errors import Code, FileError, MracadError, UsageError
+from mracad.errors import Code, MracadError, UsageError
 from mracad.inspect.faults import ReadBack
 from mracad.job.batch.cluster import lost
 from mracad.job.batch.find import Item
@@ -18,6 +17,7 @@ from mracad.job.batch.manifest import Manifest
 from mracad.job.batch.settings import Settings
 from mracad.job.batch.work import Pages, Product, Work, do
 from mracad.spec.recipe import Recipe, record_of
+from mracad.store import location, read
 
 AHEAD = 2
 """Files given to the executor per worker: enough that none waits, few enough to hold in memory."""
@@ -151,13 +151,14 @@ class _Batch:
         """Give a file to the executor; the outcome instead if it is already done or cannot be done."""
         try:
             steps = self.recipe.steps(item.source)
-            files = {file: _bytes(file) for step in steps for file in step.options.files()}
-            data = _bytes(item.source)
+            files = {file: read(file) for step in steps for file in step.options.files()}
+            data = read(item.source)
             self._check_target(item)
         except MracadError as error:
             return _failed(item, error)
-        name = Path(item.source).name
-        work = Work(name, data, steps, self.settings, item.format, files, self._epoch, pages=self.pages)
+        work = Work(
+            location(item.source).name, data, steps, self.settings, item.format, files, self._epoch, pages=self.pages
+        )
         try:
             beside = self._record(item, work)
             paged = self.pages is None or self.pages.made(item.output, work.key)
@@ -197,7 +198,7 @@ class _Batch:
 
     def _check_target(self, item: Item) -> None:
         target = self.manifest.folder / item.output
-        if target.exists() and not (self.settings.overwrite or self.manifest.made(item.output)):
+        if not (self.settings.overwrite or self.manifest.made(item.output)) and target.exists():
             raise UsageError(f"'{target}' exists and was not made by a batch", "give --overwrite to replace it")
 
     def _page(self, item: Item) -> str:
@@ -207,7 +208,7 @@ class _Batch:
         """The outcome of a task, once what it made is in place."""
         output, key = task.item.output, task.work.key
         page = self._page(task.item)
-        beside = {str(Path(page).resolve()): product.page} if page else {}
+        beside = {str(location(page).resolve()): product.page} if page else {}
         if product.failed:
             self.manifest.put(beside)
         else:
@@ -227,13 +228,6 @@ class _Batch:
             read_back=product.read_back,
             page=page,
         )
-
-
-def _bytes(path: str) -> bytes:
-    try:
-        return Path(path).read_bytes()
-    except OSError as error:
-        raise FileError(f"cannot read '{path}': {error.strerror or error}", "check its path and permissions") from error
 
 
 def _failed(item: Item, error: MracadError, task: _Task | None = None) -> Outcome:

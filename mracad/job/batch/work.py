@@ -22,6 +22,7 @@ from mracad.job.batch.manifest import digest
 from mracad.job.batch.settings import Settings
 from mracad.spec.recipe import Step, versions
 from mracad.spec.steps import STEPS
+from mracad.store import Location, location
 
 if TYPE_CHECKING:
     from mracad.job.document import Report
@@ -33,7 +34,7 @@ if TYPE_CHECKING:
 class Pages(Protocol):
     """What makes a page about each file; sent to the workers, which draw."""
 
-    def place(self, output: str) -> Path:
+    def place(self, output: str) -> Location:
         """The file for the page about an output."""
 
     def made(self, output: str, key: str) -> bool:
@@ -80,7 +81,7 @@ class Work:
     @cached_property
     def key(self) -> str:
         """A hash of everything that the output depends on."""
-        files = {Path(name).name: digest(data) for name, data in self.files.items()}
+        files = {location(name).name: digest(data) for name, data in self.files.items()}
         steps = [[step.use, step.id, structs.asdict(step.options)] for step in self.steps]
         how = self.settings
         parts = [self.name, digest(self.data), steps, dict(self.versions), files]
@@ -190,7 +191,7 @@ def _here(work: Work, folder: Path) -> list[Step]:
     """The steps, with the files that they name copied into a folder of this machine."""
     places: dict[str, str] = {}
     for number, (name, data) in enumerate(work.files.items()):
-        place = folder / str(number) / Path(name).name
+        place = folder / str(number) / location(name).name
         place.parent.mkdir()
         place.write_bytes(data)
         places[name] = str(place)
