@@ -76,7 +76,7 @@ class Rows:
         if c.size >= LARGE and not self.periodic:
             from mracad.bspline import sweeps
 
-            return sweeps.apply(self.start, self.values, c, axis % c.ndim)
+            return sweeps.apply(self, c, axis % c.ndim)
         moved = np.moveaxis(c, axis, 0)
         flat = moved.reshape(self.columns, -1)
         out = np.zeros((len(self.start), flat.shape[1]))
@@ -95,7 +95,7 @@ class Rows:
         if c.size >= LARGE and not self.periodic:
             from mracad.bspline import sweeps
 
-            return sweeps.scatter(self.start, self.values, self.columns, c, axis % c.ndim)
+            return sweeps.scatter(self, c, axis % c.ndim)
         moved = np.moveaxis(c, axis, 0)
         flat = moved.reshape(len(self.start), -1)
         order, first = self._groups

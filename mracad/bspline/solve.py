@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mracad.bspline.knots import Array
 from mracad.bspline.rows import LARGE, Rows
 from mracad.errors import MracadError
+
+if TYPE_CHECKING:
+    from mracad.bspline.sweeps import Triangles
 
 
 def folded(n: int) -> Array:
@@ -62,14 +66,15 @@ class BandSolver:
         """Magnitudes on the diagonal of the factor U, in column order."""
         return np.asarray(np.abs(self._factor[self._below + self._above]))
 
-    def solve(self, b: Array, axis: int = 0, overwrite: bool = False) -> Array:
-        """The solution of ``A x = b`` along ``axis``; with ``overwrite`` it may overwrite ``b``."""
-        b = np.asarray(b, dtype=float)
-        if b.size >= LARGE:
-            from mracad.bspline import sweeps
+    def solve(self, b: Array, axis: int = 0, overwrite: bool = False, compiled: bool = False) -> Array:
+        """The solution of ``A x = b`` along ``axis``; with ``overwrite`` it may overwrite ``b``.
 
+        Few values are left to LAPACK, unless ``compiled`` code is wanted for them, too.
+        """
+        b = np.asarray(b, dtype=float)
+        if compiled or b.size >= LARGE:
             x = b if overwrite else np.empty(b.shape)
-            sweeps.solve(self.triangles, self.column_order, b, axis % b.ndim, x)
+            self._triangles.solve(b, axis % b.ndim, x)
             return x
         from scipy.linalg.lapack import dgbtrs
 
@@ -79,8 +84,9 @@ class BandSolver:
         return np.moveaxis(x[self._place].reshape(moved.shape), 0, axis)
 
     @cached_property
-    def triangles(self) -> tuple[Rows, Rows, Array, Array]:
-        """Strict L (unit diagonal) and strict U with ``A[rows][:, column_order] = L U``, 1 / diag U, and ``rows``."""
+    def _triangles(self) -> Triangles:
+        from mracad.bspline.sweeps import Triangles
+
         n, below, reach = len(self.row_order), self._below, self._below + self._above
         # gbtrf leaves each multiplier in the row's place at its step: follow the rows to their final places.
         at = np.arange(n + below)
@@ -95,4 +101,5 @@ class BandSolver:
         lower = Rows.from_coo(final[owner[column, k]], column, multipliers[column, k], (n, n))
         k, column = np.nonzero(self._factor[:reach])
         upper = Rows.from_coo(column + k - reach, column, self._factor[k, column], (n, n))
-        return lower, upper, 1.0 / self._factor[reach], self.row_order[at[:n]]
+        order = self.row_order[at[:n]], self.column_order
+        return Triangles.of(order, lower, upper, 1.0 / self._factor[reach])

@@ -1,11 +1,14 @@
 """Compiled sweeps along one axis of large arrays: banded products and triangular solves.
 
-Blocks of lines are gathered into a buffer that stays in the processor's cache, swept, and scattered.  Imported only for
-large arrays, because the compiler costs half a second to import.
+Blocks of lines are gathered into a buffer, one row for each place along the axis, swept, and scattered.  Lines that lie
+side by side in memory are taken by the hundred, which memory likes best; others have to be transposed, and a buffer of
+few of them stays in the processor's cache.  Imported only for large arrays, because the compiler costs half a second to
+import.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -14,11 +17,10 @@ from numba import njit, types
 from mracad.bspline.knots import Array
 from mracad.bspline.rows import Rows
 
-_LINES = 48
-_UNROLL = 4
+_WIDE, _NARROW = 256, 48
+_UNROLL = 6
 # One signature per kernel, so that each is compiled once and cached on disk.  Lines come as flat memory and its layout:
-# sizes (before, along, after) and the steps of the first two; a band as its taps, and where each row of them begins or
-# ends.
+# sizes (before, along, after) and the steps of the first two; a band as its taps, and where those of each row end.
 _REAL = types.Array(types.float64, 1, "C", readonly=True)
 _INDEX = types.Array(types.int64, 1, "C", readonly=True)
 _TAPS = types.Array(types.float64, 2, "C", readonly=True)
@@ -26,44 +28,70 @@ _BAND = types.Tuple((_TAPS, _INDEX))
 _LAYOUT = types.UniTuple(types.int64, 5)
 _IN = types.Tuple((_REAL, _LAYOUT))
 _OUT = types.Tuple((types.float64[::1], _LAYOUT))
+_TERM = types.Tuple((_IN, _INDEX, _INDEX, _BAND))
 
 _Lines = tuple[Array, tuple[int, ...]]
 
 
-def apply(start: Array, values: Array, c: Array, axis: int) -> Array:
-    """The matrix with runs ``values`` from columns ``start`` times ``c`` along ``axis``."""
-    out = np.empty((*c.shape[:axis], len(start), *c.shape[axis + 1 :]))
-    place, target = np.arange(c.shape[axis]), np.arange(len(start))
-    nothing = _lines(c[(slice(None),) * axis + (slice(0),)], axis)
-    _product(_lines(c, axis), nothing, place, start, _padded(values), target, _lines(out, axis))
+_Term = tuple[_Lines, Array, Array, tuple[Array, Array]]
+
+
+def apply(matrix: Rows, c: Array, axis: int) -> Array:
+    """The matrix times ``c`` along ``axis``."""
+    out = np.empty((*c.shape[:axis], len(matrix.start), *c.shape[axis + 1 :]))
+    nothing = Rows(np.zeros_like(matrix.start), np.zeros((len(matrix.start), 1)), 0)
+    parts = (matrix, c), (nothing, c[(slice(None),) * axis + (slice(0),)])
+    orders = np.arange(matrix.columns), np.arange(0), np.arange(len(matrix.start))
+    add(parts, orders, axis, out)
     return out
 
 
-def scatter(start: Array, values: Array, columns: int, c: Array, axis: int) -> Array:
-    """The transpose of the matrix with runs ``values`` from columns ``start`` times ``c`` along ``axis``."""
-    out = np.empty((*c.shape[:axis], columns, *c.shape[axis + 1 :]))
-    _scatter(_lines(c, axis), start, values, _lines(out, axis))
+def scatter(matrix: Rows, c: Array, axis: int) -> Array:
+    """The transposed matrix times ``c`` along ``axis``."""
+    out = np.empty((*c.shape[:axis], matrix.columns, *c.shape[axis + 1 :]))
+    _scatter(_lines(c, axis), matrix.start, matrix.values, _lines(out, axis))
     return out
 
 
-def combine(matrix: Rows, columns: Array, rows: Array, coarse: Array, detail: Array, axis: int, out: Array) -> None:
-    """``out[rows] = A x[columns]`` along ``axis``, with ``x`` the coarse values followed by the details.
+def add(
+    parts: tuple[tuple[Rows, Array], tuple[Rows, Array]], orders: tuple[Array, Array, Array], axis: int, out: Array
+) -> None:
+    """``out[rows] = A x[a] + B y[b]`` along ``axis``, for the parts (A, x) and (B, y) and the orders a, b and rows.
 
-    ``out`` may be the array whose two parts are ``coarse`` and ``detail``.
+    ``out`` may be the array of which ``x`` and ``y`` are parts.
     """
-    first, second, place = _lines(coarse, axis), _lines(detail, axis), np.argsort(columns)
-    _product(first, second, place, matrix.start, _padded(matrix.values), np.argsort(rows), _target(out, axis))
+    terms = [_term(*part, order, axis) for part, order in zip(parts, orders, strict=False)]
+    _product(terms[0], terms[1], orders[2], _target(out, axis))
 
 
-def solve(triangles: tuple[Rows, Rows, Array, Array], columns: Array, b: Array, axis: int, out: Array) -> None:
-    """``L U out[columns] = b[rows]`` along ``axis``; ``out`` may be ``b``.
+@dataclass(frozen=True, eq=False)
+class Triangles:
+    """A matrix as ``A[rows][:, columns] = L U``.
 
-    The triangles come as strict L and U, one over the diagonal of U, and ``rows``.
+    Attributes
+    ----------
+    order : pair of ndarray (n,) of int
+        Rows and columns.
+    lower, upper : pair of ndarray (n, w) and ndarray (n,)
+        Strict D⁻¹ L D and D⁻¹ U, D the diagonal of U, negated, as taps on the ``w`` rows just before (or after) each
+        row, and where they begin (or end).
+    inverse : ndarray (n,)
+        1 / D.
     """
-    lower, upper, inverse, rows = triangles
-    order = np.argsort(rows), np.argsort(columns)
-    bands = _window(lower, before=True), _window(upper, before=False)
-    _solve(_lines(b, axis), order, *bands, inverse, _target(out, axis))
+
+    order: tuple[Array, Array]
+    lower: tuple[Array, Array]
+    upper: tuple[Array, Array]
+    inverse: Array
+
+    @classmethod
+    def of(cls, order: tuple[Array, Array], lower: Rows, upper: Rows, inverse: Array) -> Triangles:
+        """From strict triangles."""
+        return cls(order, _window(lower, inverse, 1.0 / inverse), _window(upper, inverse), inverse)
+
+    def solve(self, b: Array, axis: int, out: Array) -> None:
+        """``A out = b`` along ``axis``; ``out`` may be ``b``."""
+        _solve(_lines(b, axis), self.order, self.lower, self.upper, self.inverse, _target(out, axis))
 
 
 def _lines(c: Array, axis: int) -> _Lines:
@@ -89,20 +117,20 @@ def _target(out: Array, axis: int) -> _Lines:
     return flat, layout
 
 
-def _padded(values: Array) -> tuple[Array, Array]:
-    """Runs padded to a multiple of the unrolling, and the used length of each."""
-    taps = np.pad(values, ((0, 0), (0, -values.shape[1] % _UNROLL)))
-    length = taps.shape[1] - np.argmax(taps[:, ::-1] != 0, axis=1)
-    return taps, -(-length // _UNROLL) * _UNROLL
+def _term(matrix: Rows, c: Array, order: Array, axis: int) -> _Term:
+    """Lines, where each of their places goes, and the matrix on places in that order: where each run begins, its taps,
+    padded to a multiple of the unrolling, and how many of them are used."""
+    taps = np.pad(matrix.values, ((0, 0), (0, -matrix.values.shape[1] % _UNROLL)))
+    used = np.where(taps.any(axis=1), taps.shape[1] - np.argmax(taps[:, ::-1] != 0, axis=1), 0)
+    return _lines(c, axis), np.argsort(order), matrix.start, (taps, used)
 
 
-def _window(triangle: Rows, before: bool) -> tuple[Array, Array]:
-    """A strict triangle, negated, as taps on the ``w`` rows just before (or after) each row, and where they begin (or
-    end).
-
-    The taps of row ``i`` multiply rows ``i − w … i − 1``, or ``i + 1 … i + w``.
-    """
+def _window(triangle: Rows, left: Array, right: Array | None = None) -> tuple[Array, Array]:
+    """The lower triangle times diagonal matrices from both sides, or the upper one from the left; see
+    :class:`Triangles`."""
     row, column, value = triangle.coo()
+    before = right is not None
+    value = value * left[row] * (1.0 if right is None else right[column])
     distance = row - column if before else column - row
     width = -(-max(int(distance.max(initial=1)), 1) // _UNROLL) * _UNROLL
     taps = np.zeros((len(triangle.start), width))
@@ -114,113 +142,149 @@ def _window(triangle: Rows, before: bool) -> tuple[Array, Array]:
 
 
 @njit(cache=True)
-def _gather(lines: Any, block: Any, place: Any, buffer: Any) -> None:
-    """Lines ``[a0:a1, :, b0:b1]`` into the rows ``place`` of the buffer."""
-    (flat, layout), (a0, a1, b0, b1) = lines, block
-    width = b1 - b0
-    for i in range(place.size):
-        row = buffer[place[i]]
-        for a in range(a0, a1):
-            source, at = a * layout[3] + i * layout[4] + b0, (a - a0) * width
-            for b in range(width):
-                row[at + b] = flat[source + b]
+def _shape(layout: Any) -> Any:
+    """Numbers of lines before and after the axis in a block, and in all."""
+    wide = min(layout[2], _WIDE)
+    high = 1 if layout[2] >= _NARROW else min(layout[0], _NARROW // wide)
+    return high, wide, high * wide
 
 
 @njit(cache=True)
-def _spread(buffer: Any, place: Any, block: Any, lines: Any) -> None:
-    """Rows ``place`` of the buffer to lines ``[a0:a1, :, b0:b1]``."""
-    (flat, layout), (a0, a1, b0, b1) = lines, block
-    width = b1 - b0
-    for i in range(place.size):
-        row = buffer[place[i]]
-        for a in range(a0, a1):
-            target, at = a * layout[3] + i * layout[4] + b0, (a - a0) * width
-            for b in range(width):
-                flat[target + b] = row[at + b]
+def _buffer(rows: Any, n: Any) -> Any:
+    """Rows of zeros, which begin with a line of the processor's cache if ``n`` is a multiple of 8."""
+    flat = np.zeros(rows * n + 7)
+    begin = (-(flat.ctypes.data // 8)) % 8
+    return flat[begin : begin + rows * n]
+
+
+@njit(cache=True)
+def _read(lines: Any, block: Any, i: Any, factor: Any, row: Any) -> None:
+    """Place ``i`` of the lines ``[a0:a0 + high, :, b0:b0 + wide]``, times a factor, into a row."""
+    (flat, layout), (a0, high, b0, wide) = lines, block
+    at, step = a0 * layout[3] + i * layout[4] + b0, layout[3]
+    if high == 1:
+        source = flat[at : at + wide]
+        for j in range(wide):
+            row[j] = factor * source[j]
+    elif wide == 3 and high == _NARROW // 3:  # a number that the compiler knows
+        for a in range(_NARROW // 3):
+            row[3 * a], row[3 * a + 1], row[3 * a + 2] = factor * flat[at], factor * flat[at + 1], factor * flat[at + 2]
+            at += step
+    else:
+        for a in range(high):
+            for b in range(wide):
+                row[wide * a + b] = factor * flat[at + b]
+            at += step
+
+
+@njit(cache=True)
+def _write(row: Any, lines: Any, block: Any, i: Any) -> None:
+    """A row to place ``i`` of the lines ``[a0:a0 + high, :, b0:b0 + wide]``."""
+    (flat, layout), (a0, high, b0, wide) = lines, block
+    at, step = a0 * layout[3] + i * layout[4] + b0, layout[3]
+    if high == 1:
+        target = flat[at : at + wide]
+        for j in range(wide):
+            target[j] = row[j]
+    elif wide == 3 and high == _NARROW // 3:  # a number that the compiler knows
+        for a in range(_NARROW // 3):
+            flat[at], flat[at + 1], flat[at + 2] = row[3 * a], row[3 * a + 1], row[3 * a + 2]
+            at += step
+    else:
+        for a in range(high):
+            for b in range(wide):
+                flat[at + b] = row[wide * a + b]
+            at += step
 
 
 @njit(cache=True, fastmath={"contract", "nsz"})
-def _axpy4(y: Any, w: Any, k: Any, x: Any, r: Any) -> None:
-    """``y += Σ w[k + s] x[r + s]`` over four rows."""
-    w0, w1, w2, w3 = w[k], w[k + 1], w[k + 2], w[k + 3]
-    x0, x1, x2, x3 = x[r], x[r + 1], x[r + 2], x[r + 3]
-    for j in range(_LINES):
-        y[j] += w0 * x0[j] + w1 * x1[j] + w2 * x2[j] + w3 * x3[j]
+def _add3(y: Any, w: Any, k: Any, x: Any, at: Any) -> None:
+    """``y += Σ w[k + s] x[at + s]`` over three rows of a buffer as long as ``y``."""
+    n = y.size
+    x0, x1, x2 = x[at : at + n], x[at + n : at + 2 * n], x[at + 2 * n : at + 3 * n]
+    w0, w1, w2 = w[k], w[k + 1], w[k + 2]
+    for j in range(n):
+        y[j] += w0 * x0[j] + w1 * x1[j] + w2 * x2[j]
 
 
-@njit(cache=True)
-def _blocks(layout: Any) -> Any:
-    """Sizes of the blocks of lines."""
-    width = min(layout[2], _LINES)
-    return max(_LINES // width, 1), width
+@njit(cache=True, fastmath={"contract", "nsz"})
+def _add6(y: Any, w: Any, k: Any, x: Any, at: Any) -> None:
+    """The same over six rows."""
+    n = y.size
+    x0, x1, x2 = x[at : at + n], x[at + n : at + 2 * n], x[at + 2 * n : at + 3 * n]
+    x3, x4, x5 = x[at + 3 * n : at + 4 * n], x[at + 4 * n : at + 5 * n], x[at + 5 * n : at + 6 * n]
+    w0, w1, w2, w3, w4, w5 = w[k], w[k + 1], w[k + 2], w[k + 3], w[k + 4], w[k + 5]
+    for j in range(n):
+        y[j] += (w0 * x0[j] + w1 * x1[j] + w2 * x2[j]) + (w3 * x3[j] + w4 * x4[j] + w5 * x5[j])
 
 
-@njit(types.void(_IN, _INDEX, _TAPS, _OUT), cache=True)
+@njit(types.void(_IN, _INDEX, _TAPS, _OUT), cache=True, fastmath={"contract", "nsz"})
 def _scatter(c: Any, head: Any, taps: Any, out: Any) -> None:
     before, along, after = c[1][:3]
     columns, reach = out[1][1], taps.shape[1]
-    high, wide = _blocks(c[1])
-    x = np.zeros((along, _LINES))
-    y = np.zeros((columns + reach, _LINES))
-    identity, targets = np.arange(along), np.arange(columns)
+    high, wide, n = _shape(c[1])
+    row, y = _buffer(1, n), _buffer(columns + reach, n)
     for a0 in range(0, before, high):
-        a1 = min(a0 + high, before)
         for b0 in range(0, after, wide):
-            b1 = min(b0 + wide, after)
-            block = a0, a1, b0, b1
-            _gather(c, block, identity, x)
+            block = a0, min(high, before - a0), b0, min(wide, after - b0)
             y[:] = 0.0
             for i in range(along):
+                _read(c, block, i, 1.0, row)
                 for k in range(reach):
                     tap = taps[i, k]
                     if tap != 0.0:
-                        row = y[head[i] + k]
-                        for j in range(_LINES):
-                            row[j] += tap * x[i, j]
-            _spread(y, targets, block, out)
+                        each = y[(head[i] + k) * n : (head[i] + k + 1) * n]
+                        for j in range(n):
+                            each[j] += tap * row[j]
+            for i in range(columns):
+                _write(y[i * n : (i + 1) * n], out, block, i)
 
 
 @njit(types.void(_IN, types.UniTuple(_INDEX, 2), _BAND, _BAND, _REAL, _OUT), cache=True)
 def _solve(b: Any, order: Any, lower: Any, upper: Any, inverse: Any, out: Any) -> None:
     before, along, after = b[1][:3]
-    (place, target), (low, below), (high_taps, above) = order, lower, upper
-    lead, tail = low.shape[1], high_taps.shape[1]
-    high, wide = _blocks(b[1])
-    x = np.zeros((lead + along + tail, _LINES))
+    (source, target), (low, below), (up, above) = order, lower, upper
+    lead = low.shape[1]
+    high, wide, n = _shape(b[1])
+    x = _buffer(lead + along + up.shape[1], n)
     for a0 in range(0, before, high):
-        a1 = min(a0 + high, before)
         for b0 in range(0, after, wide):
-            b1 = min(b0 + wide, after)
-            block = a0, a1, b0, b1
-            _gather(b, block, place + lead, x)
+            block = a0, min(high, before - a0), b0, min(wide, after - b0)
             for i in range(along):
+                y = x[(lead + i) * n : (lead + i + 1) * n]
+                _read(b, block, source[i], inverse[i], y)
                 for k in range(below[i], lead, _UNROLL):
-                    _axpy4(x[lead + i], low[i], k, x, i + k)
+                    _add6(y, low[i], k, x, (i + k) * n)
             for i in range(along - 1, -1, -1):
-                y = x[lead + i]
+                y = x[(lead + i) * n : (lead + i + 1) * n]
                 for k in range(0, above[i], _UNROLL):
-                    _axpy4(y, high_taps[i], k, x, lead + i + 1 + k)
-                for j in range(_LINES):
-                    y[j] *= inverse[i]
-            _spread(x, target + lead, block, out)
+                    _add6(y, up[i], k, x, (lead + i + 1 + k) * n)
+                _write(y, out, block, target[i])
 
 
-@njit(types.void(_IN, _IN, _INDEX, _INDEX, _BAND, _INDEX, _OUT), cache=True)
-def _product(first: Any, second: Any, place: Any, head: Any, band: Any, target: Any, out: Any) -> None:
-    (before, _, after), (taps, reach) = out[1][:3], band
-    m, rows = first[1][1], head.size
-    high, wide = _blocks(out[1])
-    x = np.zeros((place.size + taps.shape[1], _LINES))
-    y = np.zeros((rows, _LINES))
+@njit(cache=True)
+def _fill(x: Any, n: Any, term: Any, block: Any) -> None:
+    """All lines of a block into the rows of a buffer."""
+    lines, place = term[0], term[1]
+    for i in range(place.size):
+        _read(lines, block, i, 1.0, x[place[i] * n : (place[i] + 1) * n])
+
+
+@njit(types.void(_TERM, _TERM, _INDEX, _OUT), cache=True)
+def _product(first: Any, second: Any, target: Any, out: Any) -> None:
+    before, _, after = out[1][:3]
+    high, wide, n = _shape(out[1])
+    x, y = _buffer(first[1].size + _UNROLL, n), _buffer(second[1].size + _UNROLL, n)
+    row = _buffer(1, n)
     for a0 in range(0, before, high):
-        a1 = min(a0 + high, before)
         for b0 in range(0, after, wide):
-            b1 = min(b0 + wide, after)
-            block = a0, a1, b0, b1
-            _gather(first, block, place[:m], x)
-            _gather(second, block, place[m:], x)
-            for i in range(rows):
-                y[i] = 0.0
-                for k in range(0, reach[i], _UNROLL):
-                    _axpy4(y[i], taps[i], k, x, head[i] + k)
-            _spread(y, target, block, out)
+            block = a0, min(high, before - a0), b0, min(wide, after - b0)
+            _fill(x, n, first, block)
+            _fill(y, n, second, block)
+            for i in range(target.size):
+                row[:] = 0.0
+                for k in range(0, first[3][1][i], 3):
+                    _add3(row, first[3][0][i], k, x, (first[2][i] + k) * n)
+                for k in range(0, second[3][1][i], _UNROLL):
+                    _add6(row, second[3][0][i], k, y, (second[2][i] + k) * n)
+                _write(row, out, block, target[i])

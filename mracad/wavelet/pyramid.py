@@ -71,18 +71,19 @@ class LevelBands:
             rest = rest * _kept(np.linalg.norm(rest, axis=-1), limit, soft)[..., None]
         return replace(self, bands=bands, residual=rest)
 
-    def synthesise(self, coarse: Array) -> Array:
-        """Control points of the finer net from those of the coarser one."""
+    def synthesise(self, coarse: Array, compiled: bool = False) -> Array:
+        """Control points of the finer net from those of the coarser one; for ``compiled`` see
+        :meth:`mracad.wavelet.step.TwoScale.analyse`."""
         if self.u is not None and self.v is not None:
             poles = np.empty((self.u.fine.count, self.v.fine.count, *coarse.shape[2:]))
             low, high = poles[: len(coarse)], poles[len(coarse) :]
-            self.v.synthesise(coarse, self.bands["LH"], 1, low)
-            self.v.synthesise(self.bands["HL"], self.bands["HH"], 1, high)
-            self.u.synthesise(low, high, 0, poles)
+            self.v.synthesise(coarse, self.bands["LH"], 1, low, compiled)
+            self.v.synthesise(self.bands["HL"], self.bands["HH"], 1, high, compiled)
+            self.u.synthesise(low, high, 0, poles, compiled)
         elif self.u is not None:
-            poles = self.u.synthesise(coarse, self.bands["HL"], 0)
+            poles = self.u.synthesise(coarse, self.bands["HL"], 0, compiled=compiled)
         elif self.v is not None:
-            poles = self.v.synthesise(coarse, self.bands["LH"], 1)
+            poles = self.v.synthesise(coarse, self.bands["LH"], 1, compiled=compiled)
         if self.residual is not None:
             poles += self.residual
         return poles

@@ -54,11 +54,16 @@ class TwoScale:
         return BandSolver(*self._entries, self._row_order, self._column_order)
 
     @cached_property
-    def _matrix(self) -> Rows:
-        """[P|Q] with rows and columns in band order."""
+    def _parts(self) -> tuple[tuple[Rows, Array], tuple[Rows, Array]]:
+        """P and Q with rows and columns in band order, and the orders of their columns."""
         row, column, value = self._entries
-        n = len(self._row_order)
-        return Rows.from_coo(_inverse(self._row_order)[row], _inverse(self._column_order)[column], value, (n, n))
+        row, n, m = _inverse(self._row_order)[row], len(self._row_order), self._m
+        found = []
+        for those, first, count in ((column < m, 0, m), (column >= m, m, n - m)):
+            order = self._column_order[(self._column_order >= first) & (self._column_order < first + count)] - first
+            entries = row[those], _inverse(order)[column[those] - first], value[those]
+            found.append((Rows.from_coo(*entries, (n, count)), order))
+        return found[0], found[1]
 
     @cached_property
     def exact(self) -> bool:
@@ -83,14 +88,17 @@ class TwoScale:
         """The largest control point of each wavelet, ``(n − m,)``."""
         return np.asarray(np.abs(self._wavelets.values).max(axis=1, initial=0.0))
 
-    def analyse(self, c: Array, axis: int = 0, overwrite: bool = False) -> tuple[Array, Array]:
-        """Coarse control points and details of ``c`` along ``axis``; with ``overwrite`` they may take its place."""
+    def analyse(self, c: Array, axis: int = 0, overwrite: bool = False, compiled: bool = False) -> tuple[Array, Array]:
+        """Coarse control points and details of ``c`` along ``axis``; with ``overwrite`` they may take its place.
+
+        ``compiled`` code is used even for few of them, if wanted: parts of large nets, which have loaded it.
+        """
         c = np.asarray(c, dtype=float)
         if c.shape[axis] != self.fine.count:
             raise UsageError(f"{c.shape[axis]} control points along axis {axis}, but the knots need {self.fine.count}")
         coarse, detail = slice(None, self._m), slice(self._m, None)
         if self.exact or self.pinned:
-            both = self._solver.solve(c, axis, overwrite)
+            both = self._solver.solve(c, axis, overwrite, compiled)
             return _part(both, axis, coarse), _part(both, axis, detail)
         best = projection(self.coarse, self.fine).coarse(c, axis)
         rest = c - refinement(self.coarse, self.fine).apply(best, axis)
@@ -99,10 +107,13 @@ class TwoScale:
         helps = np.abs(left).max(initial=0) < 0.1 * np.abs(rest).max(initial=0)
         return best, found if helps else np.zeros_like(found)
 
-    def synthesise(self, coarse: Array, detail: Array, axis: int = 0, out: Array | None = None) -> Array:
+    def synthesise(
+        self, coarse: Array, detail: Array, axis: int = 0, out: Array | None = None, compiled: bool = False
+    ) -> Array:
         """The control points with the given coarse control points and details along ``axis``.
 
-        They are written to ``out`` if given; both inputs may be parts of that array.
+        They are written to ``out`` if given; both inputs may be parts of that array.  For ``compiled`` see
+        :meth:`analyse`.
         """
         if (coarse.shape[axis], detail.shape[axis]) != (self._m, self.fine.count - self._m):
             raise UsageError(
@@ -112,14 +123,15 @@ class TwoScale:
         axis %= coarse.ndim
         if out is None:
             out = np.empty((*coarse.shape[:axis], self.fine.count, *coarse.shape[axis + 1 :]))
-        if out.size >= LARGE:
+        if compiled or out.size >= LARGE:
             from mracad.bspline import sweeps
 
-            sweeps.combine(self._matrix, self._column_order, self._row_order, coarse, detail, axis, out)
+            (p, first), (q, second) = self._parts
+            sweeps.add(((p, coarse), (q, detail)), (first, second, self._row_order), axis, out)
         else:
-            both = np.concatenate([coarse, detail], axis=axis)
-            mixed = self._matrix.apply(np.take(both, self._column_order, axis=axis), axis)
-            np.take(mixed, _inverse(self._row_order), axis=axis, out=out)
+            both = zip(self._parts, (coarse, detail), strict=True)
+            low, high = (matrix.apply(np.take(c, order, axis=axis), axis) for (matrix, order), c in both)
+            np.take(low + high, _inverse(self._row_order), axis=axis, out=out)
         return out
 
 
@@ -144,22 +156,23 @@ class Chain:
         """The largest control point of each wavelet, over the knots of its own step."""
         return np.concatenate([each.heights for each in self.steps])
 
-    def analyse(self, c: Array, axis: int = 0, overwrite: bool = False) -> tuple[Array, Array]:
-        """Coarse control points and details of ``c`` along ``axis``; with ``overwrite`` they may take its place."""
+    def analyse(self, c: Array, axis: int = 0, overwrite: bool = False, compiled: bool = False) -> tuple[Array, Array]:
+        """See :meth:`TwoScale.analyse`."""
         details = []
         for each in self.steps:
-            c, detail = each.analyse(c, axis, overwrite)
+            c, detail = each.analyse(c, axis, overwrite, compiled)
             details.append(detail)
         return c, np.concatenate(details, axis=axis)
 
-    def synthesise(self, coarse: Array, detail: Array, axis: int = 0, out: Array | None = None) -> Array:
-        """The control points with the given coarse ones and details along ``axis``, written to ``out`` if it is
-        given."""
+    def synthesise(
+        self, coarse: Array, detail: Array, axis: int = 0, out: Array | None = None, compiled: bool = False
+    ) -> Array:
+        """See :meth:`TwoScale.synthesise`."""
         end = detail.shape[axis]
         for each in reversed(self.steps):
             begin = end - (each.fine.count - each.coarse.count)
             here = out if each is self.steps[0] else None
-            coarse = each.synthesise(coarse, _part(detail, axis, slice(begin, end)), axis, here)
+            coarse = each.synthesise(coarse, _part(detail, axis, slice(begin, end)), axis, here, compiled)
             end = begin
         return coarse
 

@@ -6,6 +6,7 @@ A *step* turns ``n`` control points into ``m`` coarse ones followed by ``n − m
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise, zip_longest
@@ -13,6 +14,7 @@ from itertools import pairwise, zip_longest
 import numpy as np
 
 from mracad.bspline.knots import Array, KnotVector
+from mracad.bspline.rows import LARGE
 from mracad.errors import UsageError
 from mracad.wavelet.pyramid import LevelBands, Pyramid
 from mracad.wavelet.step import EXACT, Chain, TwoScale, step
@@ -59,10 +61,9 @@ def decompose(
     if poles.shape[:-1] != tuple(ladder[0].count for ladder in ladders):
         raise UsageError(f"control points of shape {poles.shape} do not fit the finest knots of the ladders")
     steps = [[step(b, a, 0 if a.periodic else pinned) for a, b in pairwise(ladder)] for ladder in ladders]
-    flat = poles.reshape(-1, poles.shape[-1])
-    centroid = np.full(len(flat), 1.0 / len(flat)) @ flat
-    c = np.array(poles, order="C")
-    _move(c, -centroid)
+    lines = poles.reshape(len(poles), -1)
+    centroid = (np.ones(len(lines)) @ lines).reshape(-1, poles.shape[-1]).sum(axis=0) * (poles.shape[-1] / poles.size)
+    c = _moved(poles, -centroid, np.empty(poles.shape))
     pairs = [(pair[0], pair[1] if len(pair) > 1 else None) for pair in zip_longest(*steps)]
     c, levels = _analysed(c, pairs)
     return Pyramid(c, tuple(levels), centroid, tuple(tuple(ladder) for ladder in ladders))
@@ -101,18 +102,19 @@ def reconstruct(pyramid: Pyramid, level: float = 0.0) -> Array:
     if not 0 <= level <= len(pyramid.levels):
         raise UsageError(f"level {level} is outside 0 … {len(pyramid.levels)}")
     poles = np.array(pyramid.coarse, order="C")
+    compiled = poles.shape[-1] * math.prod(ladder[0].count for ladder in pyramid.ladders) >= LARGE
     for index in reversed(range(len(pyramid.levels))):
         gain = min(max(index + 1 - level, 0.0), 1.0)
         each = pyramid.levels[index]
-        poles = (each if gain == 1.0 else each.scaled(gain)).synthesise(poles)
-    _move(poles, pyramid.centroid)
-    return poles
+        poles = (each if gain == 1.0 else each.scaled(gain)).synthesise(poles, compiled)
+    return _moved(poles, pyramid.centroid, poles)
 
 
-def _move(poles: Array, offset: Array) -> None:
-    """Add ``offset`` to every control point of a contiguous array, by whole lines, which is faster."""
+def _moved(poles: Array, offset: Array, out: Array) -> Array:
+    """Every control point plus ``offset``, in a contiguous array, by whole lines, which is faster."""
     lines = poles.reshape(len(poles), -1)
-    lines += np.tile(offset, lines.shape[1] // len(offset))
+    np.add(lines, np.tile(offset, lines.shape[1] // len(offset)), out=out.reshape(lines.shape))
+    return out
 
 
 def _analysed(
@@ -125,21 +127,22 @@ def _analysed(
     points of an ill-conditioned coarse net cost nothing.
     """
     exact = all(each is None or each.exact for pair in pairs for each in pair)
+    compiled = c.size >= LARGE
     small = 0.0 if exact else EXACT * np.abs(c).max(initial=0)
     nets, levels = [], []
     for u, v in pairs:
-        coarse, bands = _bands(c, u, v, overwrite=exact)
+        coarse, bands = _bands(c, u, v, overwrite=exact, compiled=compiled)
         level = LevelBands(u, v, bands)
         if not exact:
             nets.append(c)
-            more, extra = _bands(c - level.synthesise(coarse), u, v)
+            more, extra = _bands(c - level.synthesise(coarse, compiled), u, v, compiled=compiled)
             coarse = coarse + more
             level = replace(level, bands={name: band + extra[name] for name, band in bands.items()})
         levels.append(level)
         c = coarse
     poles = c
     for i in reversed(range(len(nets))):
-        poles = levels[i].synthesise(poles)
+        poles = levels[i].synthesise(poles, compiled)
         residual = nets[i] - poles
         if np.abs(residual).max(initial=0) > small:
             levels[i] = replace(levels[i], residual=residual)
@@ -148,14 +151,14 @@ def _analysed(
 
 
 def _bands(
-    c: Array, u: TwoScale | Chain | None, v: TwoScale | Chain | None, overwrite: bool = False
+    c: Array, u: TwoScale | Chain | None, v: TwoScale | Chain | None, overwrite: bool = False, compiled: bool = False
 ) -> tuple[Array, dict[str, Array]]:
     """Coarse control points and bands of one level."""
     bands = {}
     if u is not None:
-        c, bands["HL"] = u.analyse(c, 0, overwrite)
+        c, bands["HL"] = u.analyse(c, 0, overwrite, compiled)
     if v is not None:
-        c, bands["LH"] = v.analyse(c, 1, overwrite)
+        c, bands["LH"] = v.analyse(c, 1, overwrite, compiled)
         if u is not None:
-            bands["HL"], bands["HH"] = v.analyse(bands["HL"], 1, overwrite)
+            bands["HL"], bands["HH"] = v.analyse(bands["HL"], 1, overwrite, compiled)
     return c, bands

@@ -176,3 +176,16 @@ def test_a_ladder_of_one_rung_changes_nothing():
     kv = uniform(2, 0)
     c = np.random.default_rng(0).standard_normal((3, 3, 3))
     np.testing.assert_allclose(reconstruct(decompose(c, [kv], [kv])), c, atol=1e-15)
+
+
+@pytest.mark.parametrize("shape", [(1,), (2,), (3,), (49, 3), (7, 4, 1)])
+@pytest.mark.parametrize("axis", [0, 1])
+@pytest.mark.parametrize("kind", KINDS)
+def test_compiled_steps_are_the_same(shape, axis, kind):
+    fine, coarse = rungs_by_level(random_knots(3, kind, 40, 1))[:2]
+    other = (53,) if axis else ()
+    c = np.random.default_rng(1).standard_normal((*other, fine.count, *shape))
+    plain, compiled = (step(coarse, fine).analyse(c, axis, compiled=each) for each in (False, True))
+    for one, two in zip(plain, compiled, strict=True):
+        np.testing.assert_allclose(one, two, atol=1e-12)
+    np.testing.assert_allclose(step(coarse, fine).synthesise(*compiled, axis, compiled=True), c, atol=1e-12)
