@@ -255,7 +255,7 @@ def _tried(
     target = wish.target(trial.problem, members, joined)
     if wish.fades and trial.pose.share is not None:
         target = trial.pose.share * target
-    wished = sum(trial.problem.gains(target, target, [1.0] * len(members)))
+    wished = float(trial.problem.gains(target, target).of(1.0).sum())
     found, possible = [trial.nothing(least * wished)], trial.most(target) > least * wished
     for batch in wish.ways(trial.problem, target, trial.width) if possible else ():
         first = len(found)
@@ -293,20 +293,20 @@ def _explained(trial: Trial, moved: dict[int, Moved], target: Array) -> dict[int
 def _confirmed(trial: Trial, members: Mapping[int, Sheet], found: Sequence[Verdict], target: Array) -> dict[int, Moved]:
     """The result that is worth most when judged closely."""
     best: dict[int, Moved] = {}
-    most, wanted = (-1.0, 0.0), sum(trial.problem.gains(target, target, [1.0] * len(members)))
+    most, wanted = (-1.0, 0.0), float(trial.problem.gains(target, target).of(1.0).sum())
     nets = {i: space.net for i, space in trial.problem.spaces.items()}
     lasting = trial.problem.free.size <= LASTING
     looks = [closely(members[i], net) for i, net in nets.items()]
     for verdict in sorted(found, key=rank, reverse=True)[:CANDIDATES]:
         if rank(verdict) <= most:
             break
-        verdict = trial.settled(verdict, target)
+        verdict = trial.settled(verdict)
         moved = []
         fresh = (closely(members[i], net) for i, net in nets.items())
         for each in _moved(trial, members, verdict, looks if lasting else fresh):
             each = each.confirmed(trial.tolerances)
             moved.append(each if lasting else each.done())
-        verdict = trial.left(verdict, [each.amount for each in moved], target)
+        verdict = trial.left(verdict, [each.amount for each in moved])
         if rank(verdict) > most:
             most = rank(verdict)
             best = {each.sheet.index: replace(each, gain=verdict.gain, wanted=wanted) for each in moved}

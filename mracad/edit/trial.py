@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from mracad.edit.watch import BISECTIONS, Tried, Watch, amounts, displaced
 from mracad.inspect.places import Placed
 from mracad.inspect.roughness import Change, Worse, better, places, worse
 from mracad.seam.interface import Joints
+from mracad.seam.solve import Gains
 
 Array = np.ndarray
 
@@ -55,18 +57,28 @@ class Verdict:
         The change of roughness of its faces, by face.
     limits : sequence of tuple of Worse
         The figures that limit the amount.
-    gains : sequence of float
-        How much nearer each surface comes to the target, as a squared norm.
-    gain : float
-        The same for all surfaces, with the least of their amounts.
+    nearer : Gains
+        How much nearer amounts bring each surface to the target.
+    extra : float
+        A gain that counts besides: what others have to exceed.
     """
 
     tried: Tried
     amounts: Sequence[float]
     changes: Sequence[Mapping[int, Change]]
     limits: Sequence[tuple[Worse, ...]]
-    gains: Sequence[float]
-    gain: float
+    nearer: Gains
+    extra: float = 0.0
+
+    @cached_property
+    def gains(self) -> Array:
+        """How much nearer each surface comes to the target, as a squared norm."""
+        return self.nearer.of(np.array(self.amounts))
+
+    @cached_property
+    def gain(self) -> float:
+        """The same for all surfaces, with the least of their amounts."""
+        return self.extra + float(self.nearer.of(self.least).sum())
 
     @property
     def parts(self) -> Sequence[Array]:
@@ -102,13 +114,13 @@ class Trial:
         if not self.problem.free.any():
             return 0.0
         nearest = target if self.problem.soft is not None else self.problem.nearest(target)
-        return sum(self.problem.gains(nearest, target, [1.0] * len(self.nets)))
+        return float(self.problem.gains(nearest, target).of(1.0).sum())
 
     def nothing(self, least: float = 0.0) -> Verdict:
         """The verdict on no change, with a gain that others have to exceed."""
         still = Tried(self.watch, self.nets, [np.zeros(net.poles.shape) for net in self.nets])
-        none = [0.0] * len(self.nets)
-        return Verdict(still, none, self.watch.still(), [()] * len(none), none, least)
+        none = np.zeros(len(self.nets))
+        return Verdict(still, none.tolist(), self.watch.still(), [()] * len(none), Gains(none, none), least)
 
     def judged(self, delta: Array, target: Array, others: Sequence[Verdict] = ()) -> Verdict:
         """The share of a displacement allowed for each surface; 0 where it could not do better than ``others``."""
@@ -117,39 +129,37 @@ class Trial:
             every = zip(self.nets, self._split(delta), self.stretches, strict=True)
             within = [bounded(net, part, bound, s.times(self.width)).reshape(-1, 3) for net, part, s in every]
             delta = self.problem.nearest(np.concatenate(within))
-        tried = Tried(self.watch, self.nets, self._split(delta))
-        return self._verdict(tried, target, self._floor(delta, target, others), BISECTIONS[len(self.nets) > 1])
+        tried, nearer = Tried(self.watch, self.nets, self._split(delta)), self.problem.gains(delta, target)
+        return self._verdict(tried, nearer, self._floor(nearer, others), BISECTIONS[len(self.nets) > 1])
 
-    def settled(self, verdict: Verdict, target: Array) -> Verdict:
+    def settled(self, verdict: Verdict) -> Verdict:
         """The same verdict, with amounts found in more steps."""
         if not verdict.least or verdict.least == 1.0:
             return verdict
-        return self._verdict(verdict.tried, target, np.zeros(len(self.nets)), BISECTIONS[1])
+        return self._verdict(verdict.tried, verdict.nearer, np.zeros(len(self.nets)), BISECTIONS[1])
 
-    def left(self, verdict: Verdict, shares: Sequence[float], target: Array) -> Verdict:
+    def left(self, verdict: Verdict, shares: Sequence[float]) -> Verdict:
         """The same verdict with other amounts."""
-        delta = np.concatenate([part.reshape(-1, 3) for part in verdict.parts])
-        gains, gain = self._gains(delta, target, shares)
-        return replace(verdict, amounts=shares, gains=gains, gain=gain)
+        return replace(verdict, amounts=shares)
 
-    def _verdict(self, tried: Tried, target: Array, floor: Array, steps: int) -> Verdict:
-        delta = np.concatenate([part.reshape(-1, 3) for part in tried.parts])
-        shares, found, limits = amounts(tried, floor, self._ceilings(delta), self.tolerances, steps)
+    def _verdict(self, tried: Tried, nearer: Gains, floor: Array, steps: int) -> Verdict:
+        ceilings = self._ceilings(tried) if np.isfinite(floor).any() else np.zeros(len(floor))
+        shares, found, limits = amounts(tried, floor, ceilings, self.tolerances, steps)
         for i, (faces, least) in enumerate(zip(found, self.least, strict=True)):
             if not gained(faces, self.tolerances, least):
                 shares[i], found[i] = 0.0, {face: change.undone() for face, change in faces.items()}
-        return Verdict(tried, shares, found, limits, *self._gains(delta, target, shares))
+        return Verdict(tried, shares, found, limits, nearer)
 
     def eased(self, verdict: Verdict, target: Array, others: Sequence[Verdict] = ()) -> Verdict:
         """The best verdict on a displacement that is scaled back at places that allow less of it."""
         found = [verdict]
         while found[-1].least <= ENOUGH and len(found) <= EASINGS:
-            delta = np.concatenate([part.reshape(-1, 3) for part in found[-1].parts])
-            if np.isinf(self._floor(delta, target, others)).all():
+            if np.isinf(self._floor(found[-1].nearer, others)).all():
                 break
             share = self._shares(found[-1].tried)
             if np.ptp(share) == 0:
                 break
+            delta = np.concatenate([part.reshape(-1, 3) for part in found[-1].parts])
             easier = self.problem.nearest(share * delta, stiffness(self.width))
             found.append(self.judged(easier, target, [*others, *found]))
         return max(found, key=rank)
@@ -162,8 +172,7 @@ class Trial:
 
     def fairer(self, delta: Array) -> list[bool]:
         """Whether a displacement would reduce the roughness of each surface, whatever it adds to others."""
-        both = zip(self.problem.spaces.values(), self.problem.split(delta).values(), strict=True)
-        found = self.watch.changes({i: displaced(space.net, part) for i, (space, part) in enumerate(both)})
+        found = Tried(self.watch, self.nets, self._split(delta)).changes(dict.fromkeys(range(len(self.nets)), 1.0))
         return [_fairer(faces, least, GAIN[0]) for faces, least in zip(found.values(), self.least, strict=True)]
 
     def allowed_unheld(self, target: Array) -> bool:
@@ -171,19 +180,14 @@ class Trial:
         every = Tried(self.watch, self.nets, self._split(target)).changes(dict.fromkeys(range(len(self.nets)), 1.0))
         return not any(worse(change, self.tolerances.growth) for faces in every.values() for change in faces.values())
 
-    def _floor(self, delta: Array, target: Array, others: Sequence[Verdict]) -> Array:
+    def _floor(self, nearer: Gains, others: Sequence[Verdict]) -> Array:
         """Amounts below which a displacement is worth less than another; infinite if it always is."""
         best, count = max((worth(each) for each in others), default=0.0), len(self.nets)
         if best and count == 1:
-            return np.array([_beating(best, *(self.problem.gains(delta, target, [a])[0] for a in (0.5, 1.0)))])
-        gains, gain = self._gains(delta, target, [1.0] * count)
+            return np.array([_beating(best, nearer)])
+        gains = nearer.of(1.0)
         beaten = [any(each.gains[i] >= most for each in others) for i, most in enumerate(gains)]
-        return np.full(count, np.inf if WHOLE * gain <= best and all(beaten) else 0.0)
-
-    def _gains(self, delta: Array, target: Array, shares: Sequence[float]) -> tuple[list[float], float]:
-        """How much nearer a displacement brings each surface to a target, and all of them with the least amount."""
-        least = [min(shares)] * len(shares)
-        return self.problem.gains(delta, target, shares), sum(self.problem.gains(delta, target, least))
+        return np.full(count, np.inf if WHOLE * gains.sum() <= best and all(beaten) else 0.0)
 
     def _split(self, delta: Array) -> list[Array]:
         return list(self.problem.split(delta).values())
@@ -205,15 +209,15 @@ class Trial:
         both = zip(self.nets, least, self.stretches, strict=True)
         return np.concatenate([eased(net, share, s.times(self.width / 2)).ravel() for net, share, s in both])[:, None]
 
-    def _ceilings(self, delta: Array) -> Array:
+    def _ceilings(self, tried: Tried) -> Array:
         """The share of a displacement that contacts allow for each surface."""
         ceiling = dict.fromkeys(self.problem.spaces, 1.0)
+        delta = np.concatenate([part.reshape(-1, 3) for part in tried.parts])
         room = self.pose.contacts.room(delta, self.pose.opened, self.pose.limits)
         for surfaces, most in zip(self.pose.owners, room, strict=True):
             for i in surfaces & ceiling.keys():
                 ceiling[i] = min(ceiling[i], most)
-        both = zip(self.problem.spaces.items(), self.problem.split(delta).values(), strict=True)
-        moved = {i: displaced(space.net, part) for (i, space), part in both}
+        moved = {i: displaced(*both) for i, both in zip(ceiling, zip(self.nets, tried.parts, strict=True), strict=True)}
         for i, most in self.jumps.room(moved).items():
             ceiling[i] = min(ceiling[i], most)
         return np.array(list(ceiling.values()))
@@ -233,11 +237,10 @@ def worth(verdict: Verdict) -> float:
     return verdict.gain * (WHOLE if verdict.least > ENOUGH else 1.0)
 
 
-def _beating(best: float, half: float, whole: float) -> float:
-    """The least amount of a displacement that is worth more than the best, given the gains of half and all of it."""
+def _beating(best: float, nearer: Gains) -> float:
+    """The least amount of the displacement of a surface that is worth more than the best."""
     amounts = np.arange(1, 65) / 64
-    gain = (4 * half - whole) * amounts + 2 * (whole - 2 * half) * amounts**2
-    more = amounts[gain * np.where(amounts > ENOUGH, WHOLE, 1.0) > best]
+    more = amounts[nearer.of(amounts) * np.where(amounts > ENOUGH, WHOLE, 1.0) > best]
     return float(more[0]) if len(more) else np.inf
 
 

@@ -10,8 +10,9 @@ import numpy as np
 
 from mracad.bspline.surface import Net
 from mracad.edit.tolerances import Tolerances
+from mracad.inspect.ramp import Ramp
 from mracad.inspect.roughness import Change, Worse, worse
-from mracad.inspect.survey import POINTS, Survey, changes, surveys
+from mracad.inspect.survey import POINTS, Survey, surveys
 from mracad.model.brep import Face
 
 Array = np.ndarray
@@ -44,7 +45,7 @@ class Watch:
     reaches: Sequence[tuple[float, float]]
     points: int = POINTS
 
-    @property
+    @cached_property
     def owners(self) -> list[tuple[int, int]]:
         """Position of the surface of each face, and index of the face."""
         return [(place, face.index) for place, (*_, faces) in enumerate(self.surfaces) for face in faces]
@@ -54,7 +55,7 @@ class Watch:
         """The faces before the edit."""
         both = zip(self.surfaces, self.reaches, strict=True)
         every = [(net, base, face, reach) for (net, base, faces), reach in both for face in faces]
-        looked = [(net, (face,), net.u, net.v) for net, _, face, _ in every]
+        looked = [(net, (face,)) for net, _, face, _ in every]
         bases = [base for _, base, *_ in every] if np.isfinite(self.reaches).all() else ()
         return surveys(looked, self.points, SINGULAR / self.width, [reach for *_, reach in every], bases)
 
@@ -63,15 +64,6 @@ class Watch:
         found: list[dict[int, Change]] = [{} for _ in self.surfaces]
         for (place, face), survey in zip(self.owners, self.surveys, strict=True):
             found[place][face] = Change(survey.roughness, survey.roughness, survey.noise)
-        return found
-
-    def changes(self, nets: Mapping[int, Net]) -> dict[int, dict[int, Change]]:
-        """The changes of the faces of some surfaces, by position of the surface."""
-        found: dict[int, dict[int, Change]] = {place: {} for place in nets}
-        looked = [(*owner, survey) for owner, survey in zip(self.owners, self.surveys, strict=True) if owner[0] in nets]
-        now = changes([survey for *_, survey in looked], [nets[place] for place, *_ in looked])
-        for (place, face, _), change in zip(looked, now, strict=True):
-            found[place][face] = change
         return found
 
 
@@ -92,10 +84,20 @@ class Tried:
     parts: Sequence[Array]
     _seen: dict[tuple[int, float], Mapping[int, Change]] = field(default_factory=dict)
 
+    @cached_property
+    def ramp(self) -> Ramp:
+        """The faces along the displacements."""
+        return Ramp(self.watch.surveys, [self.parts[place] for place, _ in self.watch.owners])
+
     def changes(self, amounts: Mapping[int, float]) -> dict[int, Mapping[int, Change]]:
         """The changes of the faces of each surface after the given amount of its displacement."""
-        new = {i: displaced(self.nets[i], a * self.parts[i]) for i, a in amounts.items() if (i, a) not in self._seen}
-        self._seen.update({(i, amounts[i]): faces for i, faces in self.watch.changes(new).items()})
+        new = {i for i, amount in amounts.items() if (i, amount) not in self._seen}
+        those = [k for k, (place, _) in enumerate(self.watch.owners) if place in new]
+        found: dict[int, dict[int, Change]] = {i: {} for i in new}
+        for k, change in self.ramp.changes({k: amounts[self.watch.owners[k][0]] for k in those}).items():
+            place, face = self.watch.owners[k]
+            found[place][face] = change
+        self._seen.update({(i, amounts[i]): faces for i, faces in found.items()})
         return {i: self._seen[i, amount] for i, amount in amounts.items()}
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +14,7 @@ from mracad.model.cells import inside_grid
 from mracad.wavelet.ladder import arc_lengths
 
 Array = np.ndarray
+Tangents = Sequence[tuple[Array, Array]]
 
 CLUSTER = 1e-4, 1e-6
 """Knots closer than this, mm, or than this fraction of the surface, count as one."""
@@ -73,17 +74,30 @@ class Crossing:
     places: Array
     seen: Array
 
-    def angles(self, net: Net) -> Array:
-        """Angles between the normals on either side of these knot lines of a surface; radians, NaN where it is
-        degenerate."""
+    def tangents(self, net: Net) -> Tangents:
+        """S_u and S_v of a surface on either side of these knot lines, ``(n, 3)`` each."""
+        found = []
+        for us, vs, sides in self._sides():
+            su, sv = (np.swapaxes(part, 0, self.axis)[self.seen] for part in net.grid(us, vs, 1, sides)[1:])
+            found.append((su, sv))
+        return found
+
+    def angles(self, net: Net, tangents: Tangents) -> Array:
+        """Angles between the normals on either side of these knot lines of a surface with the given tangents; radians,
+        NaN where it is degenerate."""
         normals = []
-        for side, limit in enumerate(LIMITS):
-            at, limits = (self.at[:, side], self.places), (limit, LIMITS[1])
-            us, vs, sides = (*at, limits) if self.axis == 0 else (*at[::-1], limits[::-1])
-            tangents = [np.swapaxes(part, 0, self.axis)[self.seen] for part in net.grid(us, vs, 1, sides)[1:]]
-            uv = np.stack(np.meshgrid(*at, indexing="ij"), axis=-1)[self.seen][:, :: 1 - 2 * self.axis]
-            normals.append(net.normals(uv, sides, (tangents[0], tangents[1])))
+        for (us, vs, sides), both in zip(self._sides(), tangents, strict=True):
+            uv = np.stack(np.meshgrid(us, vs, indexing="ij"), axis=-1)
+            normals.append(net.normals(np.swapaxes(uv, 0, self.axis)[self.seen], sides, both))
         return np.asarray(2 * np.arcsin(np.minimum(np.linalg.norm(normals[1] - normals[0], axis=1) / 2, 1.0)))
+
+    def _sides(self) -> Iterator[tuple[Array, Array, tuple[Side, Side]]]:
+        """Parameters u and v of the places, and the limits to take there, left and right of the lines."""
+        for side, limit in enumerate(LIMITS):
+            if self.axis == 0:
+                yield self.at[:, side], self.places, (limit, LIMITS[1])
+            else:
+                yield self.places, self.at[:, side], (LIMITS[1], limit)
 
 
 def crossings(net: Net, faces: Sequence[Face], axis: int, places: Array) -> Crossing | None:

@@ -118,9 +118,9 @@ class Places:
         filled, first = np.unique(cell[order], return_index=True)
         bare, known = np.zeros(shape), np.zeros((5, len(areas))) if base is None else _bent(base)
         places = cls(order, first, filled, shape, (u, v), bare, known, bare, bare, bare)
-        area = places._gathered(np.add, areas)
+        (area,) = places._gathered(np.add, areas[None])
         area = np.where(area > SMALL * area.max(initial=0.0), area, 0.0)
-        before, beyond = places._means(form, areas), places._beyond(form, areas)
+        before, beyond = places._means(form, areas)
         k = 2 * np.pi / min(wavelengths)
         flat = np.array([SLOPE**2 * k**2 / 2, SLOPE**2 * k**4 / 8])
         return replace(places, area=area, before=before, most=_around(before, flat), around=_around(beyond, flat))
@@ -142,14 +142,14 @@ class Places:
             Growth of angles across knot lines, radians.
         """
         counts = self.area > 0
-        spread = np.where(counts, (self._beyond(form, areas) / self.around - 1).max(axis=0), 0.0)
-        fell = self.before - self._means(form, areas)
+        means, beyond = self._means(form, areas)
+        spread = np.where(counts, (beyond / self.around - 1).max(axis=0), 0.0)
+        fell = self.before - means
         lost = np.where(counts, (fell / self.most).max(axis=0), 0.0)
         rise = np.maximum(-fell * self.area, 0.0)
         rise /= np.maximum(rise.mean(axis=(1, 2), keepdims=True), 1e-300)
-        peaks, turn, singular = (
-            self._gathered(np.maximum, each) for each in (form.largest * (areas > 0), turned, unsettled)
-        )
+        largest = np.stack([form.largest * (areas > 0), turned, unsettled])
+        peaks, turn, singular = self._gathered(np.maximum, largest)
         return Placed(spread, lost, rise, peaks, turn, self._opened(opened), singular, self.area, self.ends)
 
     def _opened(self, opened: Iterable[tuple[Crossing, Array]]) -> Array:
@@ -161,25 +161,21 @@ class Places:
         return found
 
     def _gathered(self, how: np.ufunc, values: Array) -> Array:
-        """Values ``(q,)`` reduced to one per place by a ufunc, ``(nu, nv)``."""
-        found = np.zeros(self.shape).ravel()
+        """Values ``(k, q)`` reduced to one per place by a ufunc, ``(k, nu, nv)``."""
+        found = np.zeros((len(values), self.shape[0] * self.shape[1]))
         if len(self.first):
-            found[self.filled] = how.reduceat(values[self.order], self.first)
-        return found.reshape(self.shape)
+            found[:, self.filled] = how.reduceat(values[:, self.order], self.first, axis=1)
+        return found.reshape(-1, *self.shape)
 
-    def _means(self, form: Forms, areas: Array) -> Array:
-        """Means of bending and curvature variation, ``(2, nu, nv)``."""
-        return self._mean(areas, form.bending, form.variation)
-
-    def _beyond(self, form: Forms, areas: Array) -> Array:
-        """Means of bending and variation beyond the base, ``(2, nu, nv)``."""
+    def _means(self, form: Forms, areas: Array) -> tuple[Array, Array]:
+        """Means of bending and curvature variation, and of both beyond the base, ``(2, nu, nv)`` each."""
         off = _bent(form) - self.base
         off *= off
-        return self._mean(areas, off[0] + 2 * off[1] + off[2], off[3] + off[4])
-
-    def _mean(self, areas: Array, *figures: Array) -> Array:
-        sums = [self._gathered(np.add, areas * each) for each in figures]
-        return np.asarray(np.stack(sums) / np.maximum(self._gathered(np.add, areas), 1e-300))
+        sums = np.stack([areas, form.bending, form.variation, off[0] + 2 * off[1] + off[2], off[3] + off[4]])
+        sums[1:] *= areas
+        sums = self._gathered(np.add, sums)
+        means = sums[1:] / np.maximum(sums[0], 1e-300)
+        return means[:2], means[2:]
 
 
 def _bent(form: Forms) -> Array:

@@ -1,4 +1,4 @@
-"""Faces measured before and after an edit, at the same points of every knot span inside their trims."""
+"""Faces measured before an edit, at points of every knot span inside their trims; see :mod:`mracad.inspect.ramp`."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ import numpy as np
 from mracad.bspline.jets import blocks
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
-from mracad.inspect.creases import CLUSTER, Crossing, crossings
+from mracad.inspect.creases import CLUSTER, Crossing, Tangents, crossings
 from mracad.inspect.curvature import Forms, forms
 from mracad.inspect.places import Places
-from mracad.inspect.roughness import Change, Roughness
+from mracad.inspect.roughness import Roughness
 from mracad.model.brep import Face
 from mracad.model.cells import Quadrature, quadrature
 
@@ -29,17 +29,17 @@ RIPPLE = 1e-8
 ROUNDING = 16 * float(np.finfo(float).eps)
 """Error of a point of a surface relative to its largest coordinate, taken as a ripple as long as the span there."""
 
-NOISY, STEEP = 1.0, 20.0
-"""If normals turn by more than the first in the median, degrees, noise is being removed; those that turn by more than
-the second are then also compared with those around."""
+KEPT = 50_000
+"""Largest number of points whose derivatives are kept, in all: 240 bytes each."""
 
-STEADY = 0.05
-"""Weight of a turn of the normal at a singular point, per radian, against a relative change of its curvature."""
 
-_BLOCK = 50_000
+@dataclass(frozen=True, eq=False)
+class Crossed:
+    """Places where tangents may jump, with the tangents there and the angles between normals, radians."""
 
-_ENOUGH = 4096
-"""Number of points that are processed together."""
+    crossing: Crossing
+    tangents: Tangents
+    angles: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,18 +51,19 @@ class Survey:
     net : Net
     faces : tuple of Face
     rule : Quadrature
-    centre : ndarray (3,)
-        Origin of ``points``.
-    points, normals : ndarray (3, q)
-        Points and normals at the points of the rule; normals in single precision.
+    weights : ndarray (q,)
+        Those of its points.
+    jet : ndarray (10, 3, q) or None
+        Derivatives at the points, see :func:`mracad.bspline.jets.jets`; None for many points.
+    normals : ndarray (3, q)
+        In single precision.
     regular : ndarray of bool (q,)
         Where the surface is neither degenerate nor singular and knots lie apart: curvature counts only there.
     sharp : ndarray (q,)
         Curvature at singular points, 1/mm; 0 elsewhere.
     rounding : ndarray (q,)
         Curvature that rounding can cause, 1/mm.
-    crossed : list of (Crossing, ndarray)
-        Places where tangents may jump, and the angles there.
+    crossed : list of Crossed
     roughness, noise : Roughness
     places : Places or None
         The places of the faces, if they are measured place by place.
@@ -71,20 +72,25 @@ class Survey:
     net: Net
     faces: tuple[Face, ...]
     rule: Quadrature
-    centre: Array
-    points: Array
+    weights: Array
+    jet: Array | None
     normals: Array
     regular: Array
     sharp: Array
     rounding: Array
-    crossed: Sequence[tuple[Crossing, Array]]
+    crossed: Sequence[Crossed]
     roughness: Roughness
     noise: Roughness
     places: Places | None
 
+    @property
+    def centre(self) -> Array:
+        """Origin of the points, ``(3,)``."""
+        return np.asarray(self.net.poles.mean(axis=(0, 1)))
+
 
 def surveys(
-    surfaces: Iterable[tuple[Net, Sequence[Face], KnotVector, KnotVector]],
+    surfaces: Iterable[tuple[Net, Sequence[Face]]],
     points: int = POINTS,
     singular: float = np.inf,
     reaches: Sequence[tuple[float, float]] = (),
@@ -94,10 +100,10 @@ def surveys(
 
     Parameters
     ----------
-    surfaces : iterable of (Net, sequence of Face, KnotVector, KnotVector)
-        The surface, the faces on it that are measured as one, and the knots that it will have afterwards.
+    surfaces : iterable of (Net, sequence of Face)
+        The surface, over the knots that it will have afterwards, and the faces on it that are measured as one.
     points : int
-        Points per span of those knots, in each direction.
+        Points per span, in each direction.
     singular : float
         Curvature, 1/mm, above which a point is singular: figures there depend on the places of grid points.
     reaches : sequence of (float, float)
@@ -106,139 +112,50 @@ def surveys(
     bases : sequence of Net
         Smooth copies of the surfaces, against which waves are measured; planes by default.
     """
-    ready = [
-        (net, tuple(faces), _rule(faces, u, v, points), (u, v), net.poles.mean(axis=(0, 1)))
-        for net, faces, u, v in surfaces
-    ]
+    ready = [(net, tuple(faces), quadrature(net, faces, points, FEWEST, ends=True)) for net, faces in surfaces]
     found = []
-    seen = _seen([(net, rule, centre) for net, _, rule, _, centre in ready])
-    shapes = _seen([(net, rule, centre) for net, (_, _, rule, _, centre) in zip(bases, ready, strict=False)])
-    for (net, faces, rule, knots, centre), (at, form), reach in zip_longest(ready, seen, reaches):
+    seen = _seen([(net, rule) for net, _, rule in ready])
+    shapes = _seen([(net, rule) for net, (_, _, rule) in zip(bases, ready, strict=False)])
+    for (net, faces, rule), (jet, form), reach in zip_longest(ready, seen, reaches):
         _, base = next(shapes, (None, None))
-        sides = form.speeds * _spans(rule, knots)
+        sides = form.speeds * _spans(rule, (net.u, net.v))
         least = max(CLUSTER[0], CLUSTER[1] * float(np.linalg.norm(np.ptp(net.poles, axis=(0, 1)))))
         regular = form.regular & (sides.min(axis=0) >= least)
         sharp = np.where(regular & (form.largest > singular), form.largest, 0.0)
         regular &= sharp == 0
         sides = np.maximum(sides, least)
-        areas = _areas(rule, form)
+        weights = rule.weights.T[rule.mask.T]
+        areas = weights * form.density
         rounding = ROUNDING * float(np.abs(net.poles).max()) * _wavenumber(sides.min(axis=0)) ** 2
         crossed = _crossed(net, faces, rule)
-        kink = _largest(angles for _, angles in crossed)
+        kink = largest(each.angles for each in crossed)
         found.append(
             Survey(
-                net, faces, rule, centre, at, form.normal.astype(np.float32), regular, sharp, rounding, crossed,
-                _roughness(areas, form, regular, rounding, kink), _noise(areas * regular, sides, rounding),
+                net, faces, rule, weights, jet, form.normal.astype(np.float32), regular, sharp, rounding, crossed,
+                roughness(areas, form, regular, rounding, kink), _noise(areas * regular, sides, rounding),
                 Places.of(rule, form, base, areas * regular, reach) if reach else None,
             )
         )  # fmt: skip
     return found
 
 
-def changes(surveyed: Sequence[Survey], nets: Sequence[Net]) -> list[Change]:
-    """The changes of surveyed surfaces.
-
-    Parameters
-    ----------
-    surveyed : sequence of Survey
-    nets : sequence of Net
-        Each surface as it is now, over the same domain.
-    """
-    found = []
-    seen = _seen([(net, survey.rule, survey.centre) for survey, net in zip(surveyed, nets, strict=True)])
-    for survey, net, (at, form) in zip(surveyed, nets, seen, strict=True):
-        motion = at - survey.points
-        both = form.regular & survey.regular
-        turned = 2 * np.arcsin(np.minimum(_turned(survey, form.normal.astype(np.float32), both) / 2, 1.0))
-        now = [(crossing, crossing.angles(net), before) for crossing, before in survey.crossed]
-        opened = [(crossing, new - old) for crossing, new, old in now]
-        kink, unsettled = _largest(new for _, new, _ in now), _unsettled(survey, form)
-        areas, places = _areas(survey.rule, form), survey.places
-        found.append(
-            Change(
-                survey.roughness,
-                _roughness(areas, form, survey.regular, survey.rounding, kink),
-                survey.noise,
-                np.degrees(_largest(grew for _, grew in opened)).item(),
-                np.degrees(turned.max(initial=0.0)).item(),
-                float(np.abs((motion * survey.normals).sum(axis=0)).max(initial=0.0)),
-                float(np.linalg.norm(motion, axis=0).max(initial=0.0)),
-                float(unsettled.max(initial=0.0)),
-                places.compared(form, areas * survey.regular, turned, unsettled, opened) if places else None,
-            )
-        )
-    return found
-
-
-def _unsettled(survey: Survey, form: Forms) -> Array:
-    """Relative change of curvature, or turn of normals, at points that stay singular; 0 elsewhere, ``(q,)``."""
-    found, those = np.zeros(len(survey.sharp)), survey.sharp > 0
-    if those.any():
-        before, after = survey.sharp[those], form.largest[those]
-        change = np.where(after > before.min(), np.abs(after / before - 1), 0.0)
-        turned = np.linalg.norm(form.normal[:, those].astype(np.float32) - survey.normals[:, those], axis=0)
-        found[those] = np.maximum(change, STEADY * turned)
-    return found
-
-
-def _turned(survey: Survey, normals: Array, counted: Array) -> Array:
-    """Distances of normals ``(3, q)`` from those before, as chords, ``(q,)``.
-
-    If noise is removed all over the face, large turns are measured to the nearest normal within one span: removing
-    noise turns a normal towards its neighbours, whereas a fold turns it over.
-    """
-    off = np.where(counted, np.linalg.norm(normals - survey.normals, axis=0), 0.0)
-    rule, (noisy, most) = survey.rule, 2 * np.sin(np.radians([NOISY / 2, STEEP / 2]))
-    if (off > most).any() and np.median(off[counted]) > noisy:
-        reach, mask = (rule.v.shape[1], rule.u.shape[1]), rule.mask.T
-        place = np.full(mask.shape, -1)
-        place[mask] = np.where(survey.regular, np.arange(len(off)), -1)
-        place = np.pad(place, [(r, r) for r in reach], constant_values=-1)
-        row, column = np.nonzero(mask)
-        steps = np.ndindex(2 * reach[0] + 1, 2 * reach[1] + 1)
-        for down, right in sorted(steps, key=lambda step: float(np.abs(np.subtract(step, reach)).sum())):
-            those = np.flatnonzero(off > most)
-            beside = place[row[those] + down, column[those] + right]
-            near = np.linalg.norm(normals[:, those] - survey.normals[:, beside], axis=0)
-            off[those] = np.where(beside < 0, off[those], np.minimum(off[those], near))
-    return off
-
-
-def _rule(faces: Sequence[Face], u: KnotVector, v: KnotVector, points: int) -> Quadrature:
-    return quadrature(Net(u, v, np.empty((u.count, v.count, 0))), faces, points, FEWEST, ends=True)
-
-
-def _seen(surfaces: Sequence[tuple[Net, Quadrature, Array]]) -> Iterator[tuple[Array, Forms]]:
-    """Points and forms of each surface at the points of its rule; small surfaces are processed together."""
-    sizes = np.array([int(rule.mask.sum()) for _, rule, _ in surfaces])
-    block = (sizes.cumsum() - sizes) // _BLOCK
-    for number in np.unique(block):
-        members = np.flatnonzero(block == number).tolist()
+def _seen(surfaces: Sequence[tuple[Net, Quadrature]]) -> Iterator[tuple[Array | None, Forms]]:
+    """Derivatives, unless they are many, and forms of each surface at the points of its rule; small surfaces are
+    processed together."""
+    sizes = np.array([int(rule.mask.sum()) for _, rule in surfaces])
+    group = (sizes.cumsum() - sizes) // KEPT
+    for number in np.unique(group):
+        members = np.flatnonzero(group == number).tolist()
         parts = chain.from_iterable(
-            blocks(net, rule.u, rule.v, rule.mask, centre) for net, rule, centre in (surfaces[i] for i in members)
+            blocks(net, rule.u, rule.v, rule.mask, net.poles.mean(axis=(0, 1)))
+            for net, rule in (surfaces[i] for i in members)
         )
-        points, found = zip(*((part[0], forms(part)) for part in _gathered(parts)), strict=True)
-        at, form = np.concatenate(points, axis=1), Forms.joined(found)
+        few = sizes[members].sum() <= KEPT
+        jet = np.concatenate(list(parts), axis=2) if few else None
+        form = forms(jet) if jet is not None else Forms.joined([forms(part) for part in parts])
         ends = sizes[members].cumsum()
         for begin, end in zip(ends - sizes[members], ends, strict=True):
-            yield at[:, begin:end], form.part(slice(begin, end))
-
-
-def _gathered(parts: Iterable[Array]) -> Iterator[Array]:
-    """Parts, with small ones concatenated."""
-    waiting: list[Array] = []
-    for part in parts:
-        waiting.append(part)
-        if sum(each.shape[-1] for each in waiting) >= _ENOUGH:
-            yield waiting[0] if len(waiting) == 1 else np.concatenate(waiting, axis=-1)
-            waiting = []
-    if waiting:
-        yield waiting[0] if len(waiting) == 1 else np.concatenate(waiting, axis=-1)
-
-
-def _areas(rule: Quadrature, form: Forms) -> Array:
-    """Area of each point of a rule, mm²."""
-    return np.asarray(rule.weights.T[rule.mask.T] * form.density)
+            yield None if jet is None else jet[:, :, begin:end], form.part(slice(begin, end))
 
 
 def _spans(rule: Quadrature, knots: tuple[KnotVector, KnotVector]) -> Array:
@@ -251,17 +168,20 @@ def _spans(rule: Quadrature, knots: tuple[KnotVector, KnotVector]) -> Array:
     return np.stack([each[rule.mask.T] for each in grid])
 
 
-def _crossed(net: Net, faces: Sequence[Face], rule: Quadrature) -> list[tuple[Crossing, Array]]:
-    """Places where tangents of faces may jump, and the angles there."""
+def _crossed(net: Net, faces: Sequence[Face], rule: Quadrature) -> list[Crossed]:
+    """Places where tangents of faces may jump."""
     every = [crossings(net, faces, axis, at.ravel()) for axis, at in ((0, rule.v), (1, rule.u))]
-    return [(each, each.angles(net)) for each in every if each]
+    both = [(each, each.tangents(net)) for each in every if each]
+    return [Crossed(each, tangents, each.angles(net, tangents)) for each, tangents in both]
 
 
-def _largest(angles: Iterable[Array]) -> float:
+def largest(angles: Iterable[Array]) -> float:
+    """The largest of all angles that are not NaN, or 0."""
     return max((float(np.nanmax(each, initial=0.0)) for each in angles), default=0.0)
 
 
-def _roughness(areas: Array, form: Forms, counts: Array, rounding: Array, kink: float) -> Roughness:
+def roughness(areas: Array, form: Forms, counts: Array, rounding: Array, kink: float) -> Roughness:
+    """The figures of faces from the areas of points, their forms, and which of them count."""
     counted = areas * counts
     return Roughness(
         float(areas.sum()),

@@ -108,6 +108,26 @@ class Soft:
     between: Any = None
 
 
+@dataclass(frozen=True, eq=False)
+class Gains:
+    """By how much an amount a of a displacement δ brings each surface nearer to a target t, as a squared norm.
+
+    ‖t‖² − ‖t − a δ‖² = a (2 δᵀ M t − a δᵀ M δ)
+
+    Attributes
+    ----------
+    linear, square : ndarray (surfaces,)
+        δᵀ M t and δᵀ M δ.
+    """
+
+    linear: Array
+    square: Array
+
+    def of(self, amounts: Array | float) -> Array:
+        """The gains of amounts ``(surfaces,)``."""
+        return np.asarray(amounts * (2 * self.linear - amounts * self.square))
+
+
 class Blocks:
     """A block-diagonal matrix, with a ``scipy.sparse.csr_array`` per surface."""
 
@@ -175,6 +195,7 @@ class Problem:
         f = np.concatenate([space.net.poles.reshape(-1, 3) for space in spaces.values()])
         self.f = f - f[self.seen].mean(axis=0)
         self._solvers: dict[tuple[float, bytes, bool], Solver] = {}
+        self._pull: tuple[Array, Array] | None = None
         trends = (np.zeros_like(s.net.poles) if s.trend is None else s.trend for s in spaces.values())
         above = f - np.concatenate([each.reshape(-1, 3) for each in trends])
         self.above = above - above[self.seen].mean(axis=0)
@@ -300,11 +321,13 @@ class Problem:
         away = np.concatenate([each.ravel() for each in every])
         return faded(away, width)[:, None]
 
-    def gains(self, delta: Array, target: Array, amounts: Sequence[float]) -> list[float]:
-        """By how much amounts of a displacement bring each surface nearer to a target, as squared norms."""
-        size = np.repeat(amounts, [space.free.size for space in self.spaces.values()])[:, None]
-        done = size * delta
-        return [float(part.sum()) for part in self.split(done * (self.mass @ (2 * target - done))).values()]
+    def gains(self, delta: Array, target: Array) -> Gains:
+        """By how much a displacement brings each surface nearer to a target, both ``(points, 3)``."""
+        if self._pull is None or self._pull[0] is not target:
+            self._pull = target, self.mass @ target
+        linear, square = (delta * self._pull[1]).sum(axis=1), (delta * (self.mass @ delta)).sum(axis=1)
+        ends = np.cumsum([0, *(space.free.size for space in self.spaces.values())])[:-1]
+        return Gains(np.add.reduceat(linear, ends), np.add.reduceat(square, ends))
 
     def split(self, values: Array) -> dict[int, Array]:
         """Values of all points, ``(points, k)``, by surface, ``(nu, nv, k)`` each."""

@@ -16,12 +16,13 @@ from mracad.edit.tolerances import Tolerances
 from mracad.edit.trial import Trial
 from mracad.inspect.roughness import Growth, worse
 from mracad.inspect.seams import seams
-from mracad.inspect.survey import changes, surveys
+from mracad.inspect.survey import surveys
 from mracad.occ.view import view
 from mracad.seam.interface import joints
 from mracad.seam.wishes import Wishes
 from tests.edit import halves, panels
 from tests.edit.models import fitted, rotation, sheet
+from tests.inspect.ramps import changes
 from tests.model.shapes import cylinder
 
 ALLOWED = Growth(0.02, 0.02, 0.02, 0.1, 60.0)
@@ -40,7 +41,7 @@ def no_rougher(model, after):
     """Whether all surfaces are no rougher than they were, at nine points a span."""
     both = list(zip(model.surfaces, after.surfaces, strict=True))
     watched = surveys(
-        [(old.net, [model.faces[i] for i in old.faces], new.net.u, new.net.v) for old, new in both], points=9
+        [(old.net.over(new.net.u, new.net.v), [model.faces[i] for i in old.faces]) for old, new in both], points=9
     )
     return not any(worse(change, ALLOWED) for change in changes(watched, [new.net for _, new in both]))
 

@@ -7,7 +7,8 @@ from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
 from mracad.inspect.places import SIDES, SLOPE
 from mracad.inspect.roughness import Growth, Rougher, better, places, worse
-from mracad.inspect.survey import changes, surveys
+from mracad.inspect.survey import surveys
+from tests.inspect.ramps import changes
 from tests.model.shapes import face
 
 WIDTH = 10.0
@@ -22,7 +23,7 @@ def strip(height, length=100.0, breadth=20.0):
 
 
 def change(before, after, width=WIDTH):
-    seen = surveys([(before, [face()], after.u, after.v)], reaches=[(width, width)])
+    seen = surveys([(before.over(after.u, after.v), [face()])], reaches=[(width, width)])
     return changes(seen, [after])[0]
 
 

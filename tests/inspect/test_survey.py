@@ -11,13 +11,15 @@ from scipy.spatial.transform import Rotation
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
 from mracad.inspect.curvature import forms_at_once, forms_one_by_one
+from mracad.inspect.ramp import STEEP
 from mracad.inspect.roughness import Change, Growth, Rougher, Roughness, worse
-from mracad.inspect.survey import POINTS, RIPPLE, STEEP, changes, surveys
+from mracad.inspect.survey import POINTS, RIPPLE, surveys
+from tests.inspect.ramps import changes
 from tests.model.shapes import circle, cylinder, face, graph, plane, rectangle, roof, sphere, torus
 
 
 def survey(net, faces=None, points=8):
-    return surveys([(net, faces or [face()], net.u, net.v)], points)[0]
+    return surveys([(net, faces or [face()])], points)[0]
 
 
 def rough(net, faces=None, points=8):
@@ -25,7 +27,7 @@ def rough(net, faces=None, points=8):
 
 
 def change(before, after, faces=None, points=POINTS):
-    seen = surveys([(before, faces or [face()], after.u, after.v)], points)
+    seen = surveys([(before.over(after.u, after.v), faces or [face()])], points)
     return changes(seen, [after])[0]
 
 
@@ -274,7 +276,7 @@ def test_many_surfaces_at_once_are_as_each_by_itself():
     disc = face([circle((0.5, 0.5), 0.3)])
     faces = [[disc], [face()], [disc], [face()], [face()], [face()]]
     later = [moved(net, net.poles * [1, 1.1, 1]) for net in nets]
-    together = changes(surveys([(n, f, n.u, n.v) for n, f in zip(nets, faces, strict=True)]), later)
+    together = changes(surveys(list(zip(nets, faces, strict=True))), later)
     for net, new, each, found in zip(nets, later, faces, together, strict=True):
         assert found == change(net, new, each)
 
@@ -295,7 +297,7 @@ def test_singular_points_count_only_where_they_change():
     before = cone(12)
 
     def found(after):
-        (survey,) = surveys([(before, [face()], after.u, after.v)], singular=10.0)
+        (survey,) = surveys([(before.over(after.u, after.v), [face()])], singular=10.0)
         (each,) = changes([survey], [after])
         return each
 

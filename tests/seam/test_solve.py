@@ -209,7 +209,7 @@ def test_gains_are_what_comes_nearer():
     rng = np.random.default_rng(2)
     delta, target = (rng.standard_normal(p.f.shape) for _ in range(2))
     amounts, half = (0.3, 0.8), len(p.f) // 2
-    for k, gain in enumerate(p.gains(delta, target, amounts)):
+    for k, gain in enumerate(p.gains(delta, target).of(np.array(amounts))):
         part = slice(k * half, (k + 1) * half)
         mass = spaces[k].forms.mass
         left, before = target[part] - amounts[k] * delta[part], target[part]
