@@ -78,30 +78,14 @@ class Net:
             ``S``; ``(S, Su, Sv)``; or ``(S, Su, Sv, Suu, Suv, Svv)``.
         """
         uv = np.asarray(uv, dtype=float).reshape(-1, 2)
-        poles = homogeneous(self.poles, self.weights)
-        orders = [(a, b) for total in range(derivatives + 1) for a, b in _pairs(total)]
-        out = np.empty((len(orders), len(uv), poles.shape[2]))
-        step = max(_BLOCK // ((self.u.degree + 1) * (self.v.degree + 1) * poles.shape[2]), 1)
-        for begin in range(0, len(uv), step):
-            block = slice(begin, begin + step)
-            out[:, block] = self._sums(poles, uv[block], derivatives, orders, side)
-        stack = tuple(out)
-        if self.weights is not None:
-            stack = surface_quotient(stack)
+        size = (self.u.degree + 1) * (self.v.degree + 1) * (self.poles.shape[2] + (self.weights is not None))
+        step = max(_BLOCK // size, 1)
+        parts = [
+            Collocation.of(self.u, self.v, uv[begin : begin + step], derivatives, side).evaluate(self)
+            for begin in range(0, max(len(uv), 1), step)
+        ]
+        stack = parts[0] if len(parts) == 1 else tuple(np.concatenate(each) for each in zip(*parts, strict=True))
         return stack if derivatives else stack[0]
-
-    def _sums(
-        self, poles: Array, uv: Array, derivatives: int, orders: list[tuple[int, int]], side: tuple[Side, Side]
-    ) -> Array:
-        first_u, in_u = jet(self.u, uv[:, 0], range(derivatives + 1), side[0])
-        first_v, in_v = jet(self.v, uv[:, 1], range(derivatives + 1), side[1])
-        row = (first_u[:, None] + np.arange(self.u.degree + 1)) % self.u.count
-        column = (first_v[:, None] + np.arange(self.v.degree + 1)) % self.v.count
-        local = poles.reshape(-1, poles.shape[2])[row[:, :, None] * self.v.count + column[:, None, :]]
-        q, a, b, k = local.shape
-        partial = np.matmul(in_u, local.reshape(q, a, b * k)).reshape(q, derivatives + 1, b, k)
-        full = np.matmul(in_v[:, None], partial)
-        return np.array([full[:, r, s] for r, s in orders])
 
     @overload
     def grid(self, us: Array, vs: Array, derivatives: Literal[0] = 0, side: tuple[Side, Side] = ...) -> Array: ...  # type: ignore[overload-overlap]
@@ -195,6 +179,45 @@ class Net:
         if v != self.v:
             poles = refinement(self.v, v).apply(poles, 1)
         return Net(u, v, *euclidean(poles, self.weights is not None))
+
+
+@dataclass(frozen=True, eq=False)
+class Collocation:
+    """The functions of two knot vectors at scattered parameters, for surfaces over these knots.
+
+    Attributes
+    ----------
+    index : ndarray of int (q, du + 1, dv + 1)
+        Control points, u-major.
+    in_u, in_v : ndarray (q, derivatives + 1, d + 1)
+        Values and derivatives of the functions of each.
+    derivatives : {0, 1, 2}
+    """
+
+    index: Array
+    in_u: Array
+    in_v: Array
+    derivatives: int
+
+    @classmethod
+    def of(cls, u: KnotVector, v: KnotVector, uv: Array, derivatives: int, side: tuple[Side, Side]) -> Collocation:
+        """Arguments as for :meth:`Net.evaluate`."""
+        first_u, in_u = jet(u, uv[:, 0], range(derivatives + 1), side[0])
+        first_v, in_v = jet(v, uv[:, 1], range(derivatives + 1), side[1])
+        row = (first_u[:, None] + np.arange(u.degree + 1)) % u.count
+        column = (first_v[:, None] + np.arange(v.degree + 1)) % v.count
+        return cls(row[:, :, None] * v.count + column[:, None, :], in_u, in_v, derivatives)
+
+    def evaluate(self, net: Net) -> tuple[Array, ...]:
+        """Points and derivatives, ``(q, k)`` each, in the order of :meth:`Net.evaluate`."""
+        poles = homogeneous(net.poles, net.weights)
+        local = poles.reshape(-1, poles.shape[2])[self.index]
+        q, a, b, k = local.shape
+        partial = np.matmul(self.in_u, local.reshape(q, a, b * k)).reshape(q, self.derivatives + 1, b, k)
+        full = np.matmul(self.in_v[:, None], partial)
+        orders = [order for total in range(self.derivatives + 1) for order in _pairs(total)]
+        stack = tuple(np.ascontiguousarray(full[:, r, s]) for r, s in orders)
+        return stack if net.weights is None else surface_quotient(stack)
 
 
 def pairs(us: ArrayLike, vs: ArrayLike) -> Array:

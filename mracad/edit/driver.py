@@ -255,7 +255,7 @@ def _tried(
     target = wish.target(trial.problem, members, joined)
     if wish.fades and trial.pose.share is not None:
         target = trial.pose.share * target
-    wished = float(trial.problem.gains(target, target).of(1.0).sum())
+    wished = float(trial.gains(target, target).of(1.0).sum())
     found, possible = [trial.nothing(least * wished)], trial.most(target) > least * wished
     for batch in wish.ways(trial.problem, target, trial.width) if possible else ():
         first = len(found)
@@ -293,7 +293,7 @@ def _explained(trial: Trial, moved: dict[int, Moved], target: Array) -> dict[int
 def _confirmed(trial: Trial, members: Mapping[int, Sheet], found: Sequence[Verdict], target: Array) -> dict[int, Moved]:
     """The result that is worth most when judged closely."""
     best: dict[int, Moved] = {}
-    most, wanted = (-1.0, 0.0), float(trial.problem.gains(target, target).of(1.0).sum())
+    most, wanted = (-1.0, 0.0), float(trial.gains(target, target).of(1.0).sum())
     nets = {i: space.net for i, space in trial.problem.spaces.items()}
     lasting = trial.problem.free.size <= LASTING
     looks = [closely(members[i], net) for i, net in nets.items()]

@@ -18,7 +18,6 @@ from mracad.edit.watch import BISECTIONS, Tried, Watch, amounts, displaced
 from mracad.inspect.places import Placed
 from mracad.inspect.roughness import Change, Worse, better, places, worse
 from mracad.seam.interface import Joints
-from mracad.seam.solve import Gains
 
 Array = np.ndarray
 
@@ -41,6 +40,26 @@ EASINGS = 2
 
 FINER = 3
 """Steps from one Greville point to the next at which deviations are sampled."""
+
+
+@dataclass(frozen=True, eq=False)
+class Gains:
+    """By how much an amount a of a displacement δ brings each surface nearer to a target t, as a squared norm.
+
+    ‖t‖² − ‖t − a δ‖² = a (2 δᵀ M t − a δᵀ M δ)
+
+    Attributes
+    ----------
+    linear, square : ndarray (surfaces,)
+        δᵀ M t and δᵀ M δ.
+    """
+
+    linear: Array
+    square: Array
+
+    def of(self, amounts: Array | float) -> Array:
+        """The gains of amounts ``(surfaces,)``."""
+        return np.asarray(amounts * (2 * self.linear - amounts * self.square))
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,8 +119,8 @@ class Trial:
         detail = max(sheet.detail for sheet in members.values())
         self.pose = pose(scene, members, joined, self.width, detail, finer=finer)
         self.problem = self.pose.problem
-        self.jumps = Jumps(scene, members, joined, self.width)
         spaces = self.problem.spaces
+        self.jumps = Jumps(scene, {i: space.net for i, space in spaces.items()}, joined, self.width)
         surfaces = [(space.net, members[i].base, members[i].faces) for i, space in spaces.items()]
         self.nets = [space.net for space in spaces.values()]
         self.stretches = [members[i].stretch for i in spaces]
@@ -114,7 +133,11 @@ class Trial:
         if not self.problem.free.any():
             return 0.0
         nearest = target if self.problem.soft is not None else self.problem.nearest(target)
-        return float(self.problem.gains(nearest, target).of(1.0).sum())
+        return float(self.gains(nearest, target).of(1.0).sum())
+
+    def gains(self, delta: Array, target: Array) -> Gains:
+        """By how much a displacement brings each surface nearer to a target, both ``(points, 3)``."""
+        return Gains(*self.problem.products(delta, target))
 
     def nothing(self, least: float = 0.0) -> Verdict:
         """The verdict on no change, with a gain that others have to exceed."""
@@ -129,7 +152,7 @@ class Trial:
             every = zip(self.nets, self._split(delta), self.stretches, strict=True)
             within = [bounded(net, part, bound, s.times(self.width)).reshape(-1, 3) for net, part, s in every]
             delta = self.problem.nearest(np.concatenate(within))
-        tried, nearer = Tried(self.watch, self.nets, self._split(delta)), self.problem.gains(delta, target)
+        tried, nearer = Tried(self.watch, self.nets, self._split(delta)), self.gains(delta, target)
         return self._verdict(tried, nearer, self._floor(nearer, others), BISECTIONS[len(self.nets) > 1])
 
     def settled(self, verdict: Verdict) -> Verdict:
@@ -217,8 +240,8 @@ class Trial:
         for surfaces, most in zip(self.pose.owners, room, strict=True):
             for i in surfaces & ceiling.keys():
                 ceiling[i] = min(ceiling[i], most)
-        moved = {i: displaced(*both) for i, both in zip(ceiling, zip(self.nets, tried.parts, strict=True), strict=True)}
-        for i, most in self.jumps.room(moved).items():
+        both = zip(ceiling, self.nets, tried.parts, strict=True)
+        for i, most in self.jumps.room({i: displaced(net, part) for i, net, part in both}).items():
             ceiling[i] = min(ceiling[i], most)
         return np.array(list(ceiling.values()))
 

@@ -108,26 +108,6 @@ class Soft:
     between: Any = None
 
 
-@dataclass(frozen=True, eq=False)
-class Gains:
-    """By how much an amount a of a displacement δ brings each surface nearer to a target t, as a squared norm.
-
-    ‖t‖² − ‖t − a δ‖² = a (2 δᵀ M t − a δᵀ M δ)
-
-    Attributes
-    ----------
-    linear, square : ndarray (surfaces,)
-        δᵀ M t and δᵀ M δ.
-    """
-
-    linear: Array
-    square: Array
-
-    def of(self, amounts: Array | float) -> Array:
-        """The gains of amounts ``(surfaces,)``."""
-        return np.asarray(amounts * (2 * self.linear - amounts * self.square))
-
-
 class Blocks:
     """A block-diagonal matrix, with a ``scipy.sparse.csr_array`` per surface."""
 
@@ -321,13 +301,14 @@ class Problem:
         away = np.concatenate([each.ravel() for each in every])
         return faded(away, width)[:, None]
 
-    def gains(self, delta: Array, target: Array) -> Gains:
-        """By how much a displacement brings each surface nearer to a target, both ``(points, 3)``."""
+    def products(self, delta: Array, target: Array) -> tuple[Array, Array]:
+        """δᵀ M t and δᵀ M δ of displacements ``(points, 3)``, by surface."""
         if self._pull is None or self._pull[0] is not target:
             self._pull = target, self.mass @ target
-        linear, square = (delta * self._pull[1]).sum(axis=1), (delta * (self.mass @ delta)).sum(axis=1)
         ends = np.cumsum([0, *(space.free.size for space in self.spaces.values())])[:-1]
-        return Gains(np.add.reduceat(linear, ends), np.add.reduceat(square, ends))
+        both = (delta * each for each in (self._pull[1], self.mass @ delta))
+        linear, square = (np.add.reduceat(each.sum(axis=1), ends) for each in both)
+        return linear, square
 
     def split(self, values: Array) -> dict[int, Array]:
         """Values of all points, ``(points, k)``, by surface, ``(nu, nv, k)`` each."""

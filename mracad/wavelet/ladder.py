@@ -11,6 +11,7 @@ from mracad.bspline.basis import gauss
 from mracad.bspline.knots import Array, KnotVector
 from mracad.bspline.surface import Net
 from mracad.errors import UsageError
+from mracad.memo import kept
 
 _RESOLUTION = 1_000_000
 _POSITIONS = 16
@@ -123,6 +124,7 @@ def ladder_for_scale(
     return kv if thinned == kv else thinned
 
 
+@kept(128)
 def arc_lengths(net: Net, direction: int) -> Array:
     """Mean length of the iso-curves on each knot span.
 

@@ -7,6 +7,7 @@ from scipy.sparse import csr_array
 
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
+from mracad.edit.trial import Gains
 from mracad.model.cells import quadrature
 from mracad.seam.energy import forms
 from mracad.seam.solve import Constrained, Problem, Soft, Space
@@ -209,7 +210,7 @@ def test_gains_are_what_comes_nearer():
     rng = np.random.default_rng(2)
     delta, target = (rng.standard_normal(p.f.shape) for _ in range(2))
     amounts, half = (0.3, 0.8), len(p.f) // 2
-    for k, gain in enumerate(p.gains(delta, target).of(np.array(amounts))):
+    for k, gain in enumerate(Gains(*p.products(delta, target)).of(np.array(amounts))):
         part = slice(k * half, (k + 1) * half)
         mass = spaces[k].forms.mass
         left, before = target[part] - amounts[k] * delta[part], target[part]
