@@ -44,7 +44,7 @@ def room(model, movable, bend, keep="as-is"):
     scene = Scene(model, sheets(model, movable, Filter(WIDTH)), joined, Tolerances())
     net = scene.sheets[0].net
     offset = patch(-LENGTH, bend) - patch(-LENGTH, 0.0)
-    return Jumps(scene, {0}, joined, WIDTH).room({0: displaced(net, offset)}).get(0)
+    return Jumps(scene, {0: net}, joined, WIDTH).room({0: displaced(net, offset)}).get(0)
 
 
 @pytest.mark.parametrize(("movable", "sharing"), [({0}, 1), ({0, 1}, 2)])
