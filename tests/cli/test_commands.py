@@ -1,5 +1,7 @@
 """The commands on the samples: what they print, what they write, what they leave alone."""
 
+import contextlib
+import io
 import json
 import os
 import re
@@ -12,21 +14,32 @@ import pytest
 from tests.judge import judge
 
 
-def test_the_four_lines(mracad, samples, tmp_path):
-    result = mracad("smooth", samples / "panel.step", "--scale", "16mm", "-o", tmp_path / "out.step")
-    assert result.code == 0 and result.err == ""
-    found, deviation, seams, valid = result.out.splitlines()
+@pytest.fixture(scope="module")
+def smoothed(samples, tmp_path_factory):
+    """A panel smoothed at 16 mm, the report, and what was said."""
+    from mracad_cli.__main__ import main
+
+    folder = tmp_path_factory.mktemp("smoothed")
+    out, report = folder / "out.step", folder / "report.json"
+    with contextlib.redirect_stdout(io.StringIO()) as told, contextlib.redirect_stderr(io.StringIO()) as noted:
+        words = ["smooth", samples / "panel.step", "--scale", "16mm", "-o", out, "--report", report]
+        assert main([str(word) for word in words]) == 0
+    return out, json.loads(report.read_text()), told.getvalue(), noted.getvalue()
+
+
+def test_the_four_lines(smoothed):
+    *_, told, noted = smoothed
+    assert noted == ""
+    found, deviation, seams, valid = told.splitlines()
     assert found == "panel.step: 6 NURBS faces: 6 smoothed at 16mm"
     assert deviation.startswith("deviation: max 0.") and " on #" in deviation
     assert seams.startswith("seams of NURBS faces: 7 smooth of 7, angle ≤ ") and "(was " in seams
     assert valid.startswith("valid: yes, as read back (was yes); wrote out.step, ")
 
 
-def test_coupled_seams_move_and_are_counted(mracad, samples, tmp_path):
-    out = tmp_path / "out.step"
-    result = mracad("smooth", samples / "panel.step", "--scale", "16mm", "--edges", "coupled", "-o", out)
-    assert result.code == 0
-    assert result.out.splitlines()[2].endswith("; 7 of 17 edges moved with both faces (stayed: 10 × free edge)")
+def test_coupled_seams_move_and_are_counted(samples, smoothed):
+    out, _, told, _ = smoothed
+    assert told.splitlines()[2].endswith("; 7 of 17 edges moved with both faces (stayed: 10 × free edge)")
     after = judge(out)
     assert after.validity.valid and len(after.seams) == 7
     assert max(m.gap for m in after.seams) <= 1e-9 and max(m.angle for m in after.seams) <= 1e-5
@@ -101,21 +114,19 @@ def test_selection_and_hold(mracad, samples, tmp_path):
         assert found == edited if edited is not None else len(found) == 1
 
 
-def test_dry_run_writes_only_the_report(mracad, samples, tmp_path):
+def test_dry_run_writes_only_the_report(mracad, small, tmp_path):
     out, report = tmp_path / "out.step", tmp_path / "report.json"
-    result = mracad("smooth", samples / "panel.step", "--scale", "16mm", "--dry-run", "-o", out, "--report", report)
+    words = ["smooth", small[0], "--scale", "4mm", "--dry-run", "-o", out]
+    result = mracad(*words, "--report", report)
     assert result.code == 0 and "dry run, nothing written" in result.out
     assert report.exists() and not out.exists()
     out.touch()
-    words = ["smooth", samples / "panel.step", "--scale", "16mm", "--dry-run", "-o", out]
     assert mracad(*words).code == 0 and not out.read_bytes()
     assert mracad(*words, "--report", report).code == 2
 
 
-def test_the_report_says_everything(mracad, samples, tmp_path):
-    words = ["--scale", "16mm", "--edges", "frozen", "--json", "-o", tmp_path / "out.step"]
-    result = mracad("smooth", samples / "panel.step", *words)
-    body = json.loads(result.out)
+def test_the_report_says_everything(smoothed):
+    _, body, *_ = smoothed
     assert body["written"] == ["out.step"] and body["options"]["scale"] == "16mm"
     assert body["valid"]["before"]["valid"] is True and body["valid"]["after"]["valid"] is True
     assert len(body["faces"]) == 6
@@ -192,15 +203,14 @@ def run(*words, **settings):
     return subprocess.run([sys.executable, "-m", "mracad_cli", *map(str, words)], capture_output=True, **settings)
 
 
-def test_streams_and_equal_bytes_in_any_process(samples, tmp_path):
+def test_streams_and_equal_bytes_in_any_process(samples, smoothed, tmp_path):
     words = ["smooth", "-", "--scale", "16mm", "-o", "-"]
-    data = (samples / "panel.step").read_bytes()
-    one, two = run(*words, input=data), run(*words, input=data, env={**os.environ, "PYTHONHASHSEED": "7"})
-    assert one.returncode == two.returncode == 0
-    assert one.stdout.startswith(b"ISO-10303-21;") and one.stdout == two.stdout
-    assert b"smoothed at 16mm" in one.stderr and str(tmp_path).encode() not in one.stdout
-    header = one.stdout[: one.stdout.index(b"DATA;")]
-    assert b"--scale 16mm" in header and b"mracad" in header
+    data, settings = (samples / "panel.step").read_bytes(), {**os.environ, "PYTHONHASHSEED": "7"}
+    here, there = run(*words, input=data, env=settings), smoothed[0].read_bytes()
+    assert here.returncode == 0 and here.stdout.startswith(b"ISO-10303-21;")
+    assert b"smoothed at 16mm" in here.stderr and str(tmp_path).encode() not in here.stdout
+    (header, *shape), (_, *same) = (each.partition(b"DATA;") for each in (here.stdout, there))
+    assert shape == same and b"--scale 16mm" in header and b"mracad" in header
 
 
 HEAVY = "'OCP', 'numpy', 'scipy', 'cadquery', 'numba', 'matplotlib', 'rich', 'mracad_cli.options'"
@@ -229,10 +239,8 @@ def test_importing_the_library_loads_no_numerical_library():
     assert subprocess.run([sys.executable, "-c", probe]).returncode == 0
 
 
-def test_the_library_does_what_the_command_does(mracad, samples, tmp_path):
+def test_the_library_does_what_the_command_does(samples, smoothed, tmp_path):
     import mracad as library
 
-    out = tmp_path / "out.step"
-    assert mracad("smooth", samples / "panel.step", "--scale", "16mm", "-o", out).code == 0
     library.smooth(samples / "panel.step", scale="16mm").write(tmp_path / "library.step")
-    assert out.read_bytes() == (tmp_path / "library.step").read_bytes()
+    assert smoothed[0].read_bytes() == (tmp_path / "library.step").read_bytes()

@@ -19,10 +19,10 @@ ELSEWHERE = {
     "batch if_changed": "job/batch/test_batch.py::test_a_changed_input_or_recipe_is_done_again_and_nothing_else",
     "batch jobs": "job/batch/test_batch.py::test_the_outputs_do_not_depend_on_the_number_of_workers",
     "batch keep_going": "job/batch/test_batch.py::test_fail_fast_stops_and_retry_tries_again",
-    "batch memory_limit": "job/batch/test_batch.py::test_five_bad_files_of_a_hundred_cost_five",
+    "batch memory_limit": "job/batch/test_batch.py::test_five_bad_files_of_forty_cost_five",
     "batch report_html": "job/batch/test_batch.py::test_pages_come_from_the_workers_and_a_missing_one_is_made_again",
     "batch retry": "job/batch/test_batch.py::test_fail_fast_stops_and_retry_tries_again",
-    "batch time_limit": "job/batch/test_batch.py::test_five_bad_files_of_a_hundred_cost_five",
+    "batch time_limit": "job/batch/test_batch.py::test_five_bad_files_of_forty_cost_five",
 }
 """Options whose effect needs more than two calls, and the tests of it."""
 

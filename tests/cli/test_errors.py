@@ -122,23 +122,23 @@ def test_bad_usage_in_a_process_of_its_own(samples, tmp_path, words, says):
     assert result.stderr.startswith("mracad: ") and result.stderr.count("\n") == 1 and says in result.stderr
 
 
-def test_a_dry_run_needs_no_output(mracad, samples):
-    result = mracad("smooth", samples / "panel.step", "--scale", "16mm", "--dry-run")
+def test_a_dry_run_needs_no_output(mracad, small):
+    result = mracad("smooth", small[0], "--scale", "4mm", "--dry-run")
     assert result.code == 0 and "dry run, nothing written" in result.out
 
 
-def test_nothing_is_written_when_a_report_cannot_be_made(mracad, samples, tmp_path, monkeypatch):
+def test_nothing_is_written_when_a_report_cannot_be_made(mracad, small, tmp_path, monkeypatch):
     from mracad_cli.render import json as render
 
     monkeypatch.setattr(render, "report", lambda _: {"figure": object()})
     for words in (["--json"], ["--report", tmp_path / "report.json"]):
         words += ["--dry-run"] if "--report" in words else ["-o", tmp_path / "out.step", "--depfile", tmp_path / "d"]
-        assert mracad("smooth", samples / "blade.step", "--scale", "5%", *words).code == 70
+        assert mracad("smooth", small[0], "--scale", "4mm", *words).code == 70
         assert not list(tmp_path.iterdir())
 
 
-def test_nothing_is_written_when_nobody_reads_the_result(samples, tmp_path):
-    words = ["smooth", str(samples / "blade.step"), "--scale", "5%", "-o", "out.step", "--report", "report.json"]
+def test_nothing_is_written_when_nobody_reads_the_result(small, tmp_path):
+    words = ["smooth", str(small[0]), "--scale", "4mm", "-o", "out.step", "--report", "report.json"]
     reader, writer = os.pipe()
     os.close(reader)
     command = [sys.executable, "-m", "mracad_cli", *words]

@@ -100,8 +100,8 @@ def test_a_seam_beside_a_face_with_nothing_to_smooth_stays(keep):
         assert new.bend - old.bend <= 1e-3 / 30
 
 
-def test_gaps_and_tilts_are_pulled_shut_where_asked(rough_halves):
-    _, left, right = rough_halves
+def test_gaps_and_tilts_are_pulled_shut_where_asked():
+    _, left, right = halves.surfaces(NOISE, (15, 30))
     before, after, report = smoothed(left, right, close_gaps=True, fit_g1=0.5)
     (old, _), (new, _) = seam(before), seam(after)
     assert treatment(report) == ("mended", None)
