@@ -163,7 +163,7 @@ class Trial:
 
     def left(self, verdict: Verdict, shares: Sequence[float]) -> Verdict:
         """The same verdict with other amounts."""
-        return replace(verdict, amounts=shares)
+        return replace(verdict, amounts=shares, extra=0.0)
 
     def _verdict(self, tried: Tried, nearer: Gains, floor: Array, steps: int) -> Verdict:
         ceilings = self._ceilings(tried) if np.isfinite(floor).any() else np.zeros(len(floor))
