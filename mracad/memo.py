@@ -32,6 +32,29 @@ def kept(most: int) -> Callable[[Function], Function]:
     return wrap
 
 
+class Recent:
+    """Texts by key, the most recent ones up to a total length, until all caches are cleared."""
+
+    def __init__(self, most: int) -> None:
+        self._most = most
+        self._held: dict[str, bytes] = {}
+        _CACHES.append(self)
+
+    def find(self, key: str) -> bytes | None:
+        """The text of a key."""
+        return self._held.get(key)
+
+    def keep(self, key: str, text: bytes) -> None:
+        """Keep a text, and no longer the oldest ones where they are too much together."""
+        self._held[key] = text
+        while sum(map(len, self._held.values())) > self._most:
+            del self._held[next(iter(self._held))]
+
+    def cache_clear(self) -> None:
+        """Keep nothing."""
+        self._held.clear()
+
+
 def clear() -> None:
     """Clear all caches."""
     for cache in _CACHES:

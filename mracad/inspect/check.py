@@ -180,11 +180,15 @@ def tolerances(model: Model, validity: Validity, limit: float | None) -> Layer:
 def mesh(found: Triangles, open_faces: set[int]) -> Layer:
     """Whether the mesh of closed bodies is watertight."""
     findings = [Finding("no-mesh", (face,)) for face in found.missing]
+    open_sides = np.sort(unpaired(found.sides), axis=1)
+    beside = np.flatnonzero(np.isin(found.sides, open_sides).all(axis=1))
     lookup: dict[tuple[int, int], set[int]] = defaultdict(set)
-    for (a, b), face in zip(np.sort(found.sides, axis=1).tolist(), np.repeat(found.faces, 3).tolist(), strict=True):
+    for (a, b), face in zip(
+        np.sort(found.sides[beside], axis=1).tolist(), found.faces[beside // 3].tolist(), strict=True
+    ):
         lookup[a, b].add(face)
     holes: dict[tuple[int, ...], tuple[float, float, float]] = {}
-    for a, b in np.sort(unpaired(found.sides), axis=1).tolist():
+    for a, b in open_sides.tolist():
         owners = lookup[a, b]
         if not owners <= open_faces:
             x, y, z = found.points[[a, b]].mean(axis=0).tolist()

@@ -9,14 +9,18 @@ import numpy as np
 
 Array = np.ndarray
 _BLOCK = 200_000  # pairs of triangles tested at once
+_ROUNDING = 1e-11  # of a volume; beyond, its sign is certain, and so is that of every test that follows
 
 
 def unpaired(sides: Array) -> Array:
     """The sides ``(k, 2)`` of triangles that do not occur exactly once in each direction."""
-    unique, counts = np.unique(sides, axis=0, return_counts=True)
-    known = {tuple(side): count for side, count in zip(unique.tolist(), counts.tolist(), strict=True)}
-    bad = [(a, b) for (a, b), count in known.items() if count != 1 or known.get((b, a)) != 1]
-    return np.array(bad, int).reshape(-1, 2)
+    most = int(sides.max(initial=0)) + 1
+    keys, counts = np.unique(sides[:, 0].astype(np.int64) * most + sides[:, 1], return_counts=True)
+    there, back = np.divmod(keys, most)
+    partners = back * most + there
+    place = np.minimum(np.searchsorted(keys, partners), max(len(keys) - 1, 0))
+    bad = (counts != 1) | (keys[place] != partners) | (counts[place] != 1)
+    return np.column_stack([there[bad], back[bad]])
 
 
 def crossings(points: Array, corners: Array, parts: Array) -> tuple[Array, Array]:
@@ -31,18 +35,36 @@ def crossings(points: Array, corners: Array, parts: Array) -> tuple[Array, Array
     """
     found, where = [np.empty((0, 2), int)], [np.empty((0, 3))]
     spots = points[corners]
+    planes = _Planes(spots)
     for pairs in _near(spots, parts):
         shared = (corners[pairs[:, 0]][:, :, None] == corners[pairs[:, 1]][:, None, :]).any(axis=(1, 2))
         pairs = pairs[~shared]
         for one, other in ((0, 1), (1, 0)):
+            across = pairs[planes.across(spots, pairs[:, one], pairs[:, other])]
             for side in range(3):
-                start, end = spots[pairs[:, one], side], spots[pairs[:, one], (side + 1) % 3]
-                share = _pierced(start, end, spots[pairs[:, other]])
+                start, end = spots[across[:, one], side], spots[across[:, one], (side + 1) % 3]
+                share = _pierced(start, end, spots[across[:, other]])
                 hit = ~np.isnan(share)
-                found.append(pairs[hit])
+                found.append(across[hit])
                 where.append(start[hit] + share[hit, None] * (end - start)[hit])
     pairs, first = np.unique(np.concatenate(found), axis=0, return_index=True)
     return pairs, np.concatenate(where)[first]
+
+
+class _Planes:
+    """The planes of triangles."""
+
+    def __init__(self, spots: Array) -> None:
+        self._origins, u, v = spots[:, 0], spots[:, 1] - spots[:, 0], spots[:, 2] - spots[:, 0]
+        self._normals = np.cross(u, v)
+        self._sizes = np.linalg.norm(u, axis=1) * np.linalg.norm(v, axis=1)
+
+    def across(self, spots: Array, ones: Array, others: Array) -> Array:
+        """Whether a triangle is not wholly on one side of the plane of another, by more than rounding."""
+        off = spots[ones] - self._origins[others][:, None]
+        height = np.einsum("kij,kj->ki", off, self._normals[others])
+        room = _ROUNDING * self._sizes[others] * np.abs(off).max(axis=(1, 2))
+        return np.asarray((height.min(axis=1) <= room) & (height.max(axis=1) >= -room))
 
 
 def _pierced(start: Array, end: Array, triangle: Array) -> Array:
@@ -78,10 +100,16 @@ def _near(spots: Array, parts: Array) -> Iterable[Array]:
     step = np.arange(cells.sum()) - np.repeat(np.cumsum(cells) - cells, cells)
     i, rest = np.divmod(step, (span[:, 1] * span[:, 2])[which])
     j, k = np.divmod(rest, span[which, 2])
-    place = np.column_stack([first[which] + np.stack([i, j, k], axis=1), parts[which]])
-    order = np.lexsort(place.T)
+    grid = (first + span).max(axis=0)
+
+    def numbered(at: Array, part: Array) -> Array:
+        """One number for each cell of a part."""
+        return np.asarray(((part * grid[0] + at[..., 0]) * grid[1] + at[..., 1]) * grid[2] + at[..., 2])
+
+    place = numbered(first[which] + np.stack([i, j, k], axis=1), parts[which].astype(np.int64))
+    order = np.argsort(place, kind="stable")
     place, which = place[order], which[order]
-    breaks = np.flatnonzero((np.diff(place, axis=0) != 0).any(axis=1)) + 1
+    breaks = np.flatnonzero(np.diff(place)) + 1
     starts, ends = np.concatenate([[0], breaks]), np.concatenate([breaks, [len(which)]])
     position = np.arange(len(which))
     partners = np.repeat(ends, ends - starts) - position - 1  # members of the cell after this one
@@ -90,6 +118,9 @@ def _near(spots: Array, parts: Array) -> Iterable[Array]:
         count = partners[begin:end]
         a = np.repeat(position[begin:end], count)
         b = a + 1 + np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
-        pairs = np.sort(np.column_stack([which[a], which[b]]), axis=1)
-        meet = (low[pairs[:, 0]] <= high[pairs[:, 1]]).all(axis=1) & (low[pairs[:, 1]] <= high[pairs[:, 0]]).all(axis=1)
-        yield np.unique(pairs[meet], axis=0)
+        cells, a, b = place[a], which[a], which[b]
+        for axis in range(3):
+            meet = (low[a, axis] <= high[b, axis]) & (low[b, axis] <= high[a, axis])
+            cells, a, b = cells[meet], a[meet], b[meet]
+        once = cells == numbered(np.maximum(first[a], first[b]), parts[a].astype(np.int64))  # of several shared cells
+        yield np.column_stack([np.minimum(a, b), np.maximum(a, b)])[once]

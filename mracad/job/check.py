@@ -5,8 +5,9 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass, field
+from functools import cache, partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
@@ -19,6 +20,7 @@ from mracad.inspect.seams import seams
 from mracad.inspect.verdict import Finding, Layer, Verdict
 from mracad.job import guard
 from mracad.job.judge import Judged, Original
+from mracad.model.facts import Triangles, Validity
 from mracad.spec.quantity import length
 from mracad.spec.steps import Check
 
@@ -127,6 +129,7 @@ class CheckLimits:
     layer_seconds: float | None = None
 
 
+Made = TypeVar("Made")
 SLOW = frozenset({"self-intersection", "mesh"})
 """Slow layers."""
 
@@ -151,8 +154,10 @@ def _layered(
     senses = file.senses if file else ()
     inward = {face for place, face in told.items() if senses[place] == model.faces[face].reversed} - known
     unseen = "" if known or not flipped else f"; {len(flipped)} faces of the file were turned round"
-    brep = limited("brep", lambda: layers.brep(kernel_check(document), inward), allowed)
-    validity = kernel_check(document, faces=None if brep.status in ("pass", "fail") else ())
+    validity = limited("brep", lambda: kernel_check(document), allowed, returns=Validity)
+    brep = validity if isinstance(validity, Layer) else layers.brep(validity, inward)
+    validity = kernel_check(document, faces=()) if isinstance(validity, Layer) else validity
+    mesh = cache(partial(triangles, document))
     open_faces = {edge.sides[0].face for edge in model.edges if edge.free}
     found = [
         _file(file, document) if file else Layer("file", "skipped", why),
@@ -162,10 +167,10 @@ def _layered(
         brep,
         layers.shells(model, validity, known | layers.turned(looks(document))),
         layers.seams(model, measures, allowed.seams),
-        limited("self-intersection", lambda: _crossed(document, measures, model.diagonal), allowed, slow),
+        limited("self-intersection", lambda: _crossed(mesh, measures, model.diagonal), allowed, slow),
         layers.tolerances(model, validity, allowed.tolerance),
         limited("walls", lambda: _walls(document, allowed.wall), allowed),
-        limited("mesh", lambda: layers.mesh(triangles(document), open_faces), allowed, slow),
+        limited("mesh", lambda: layers.mesh(mesh(None), open_faces), allowed, slow),
     ]
     return Verdict(name, tuple(found), _valid(found, validity.solids))
 
@@ -221,14 +226,21 @@ def _file(file: Stated, document: Document) -> Layer:
     )
 
 
-def limited(name: str, make: Callable[[], Layer], limits: CheckLimits, slow: Collection[str] | None = None) -> Layer:
-    """A layer, made in a child process with a time limit, so that a crash is contained; skipped if not in ``slow``."""
+def limited(
+    name: str,
+    make: Callable[[], Made],
+    limits: CheckLimits,
+    slow: Collection[str] | None = None,
+    returns: type = Layer,
+) -> Made | Layer:
+    """What is made for a layer, in a child process if it has a time limit, so that a crash is contained; a layer that
+    says so if there is nothing, or it is not in ``slow``."""
     if slow is not None and name not in slow:
         return Layer(name, "skipped", "not asked for")
     if limits.layer_seconds is None:
         return make()
     try:
-        return guard.run(make, Layer, limits.layer_seconds)
+        return guard.run(make, returns, limits.layer_seconds)
     except guard.TimeLimitError:
         return Layer(name, "time limit", f"more than {limits.layer_seconds:g} s")
     except CrashError as error:
@@ -244,24 +256,24 @@ def _load(faces: int, stated: int, unseen: str, unloaded: Callable[[], list[str]
     return Layer("load", "fail" if lost else "pass", text, lost, {"faces": faces, "stated": stated})
 
 
-def _crossed(document: Document, measures: list[SeamMeasure], diagonal: float) -> Layer:
+def _crossed(meshed: Callable[[float | None], Triangles], measures: list[SeamMeasure], diagonal: float) -> Layer:
     """Faces that cross, on a mesh and again on a finer one: crossings on the coarser one alone are its own error."""
-    from mracad.occ.triangles import triangles
-
     touching = {frozenset(m.faces) for m in measures if not m.sewn}
 
-    def crossing(chord: float | None) -> dict[tuple[int, int], tuple[float, float, float]]:
-        mesh = triangles(document, chord)
-        pairs, places = crossings(mesh.points, mesh.corners, mesh.parts)
+    def crossing(chord: float | None, among: Collection[int] = ()) -> dict[tuple[int, int], tuple[float, float, float]]:
+        mesh = meshed(chord)
+        chosen = np.isin(mesh.faces, list(among)) if among else slice(None)
+        numbers = mesh.faces[chosen]
+        pairs, places = crossings(mesh.points, mesh.corners[chosen], mesh.parts[chosen])
         found: dict[tuple[int, int], tuple[float, float, float]] = {}
-        for (a, b), (x, y, z) in zip(np.sort(mesh.faces[pairs], axis=1).tolist(), places.tolist(), strict=True):
+        for (a, b), (x, y, z) in zip(np.sort(numbers[pairs], axis=1).tolist(), places.tolist(), strict=True):
             if frozenset((a, b)) not in touching:
                 found.setdefault((a, b), (x, y, z))
         return found
 
     first = crossing(None)
     if first:
-        again = crossing(1e-4 * diagonal)
+        again = crossing(1e-4 * diagonal, {face for pair in first for face in pair})
         first = {faces: where for faces, where in first.items() if faces in again}
     findings = [Finding("crossing", faces, where=where) for faces, where in sorted(first.items())]
     text = f"{len(findings)} crossings" if findings else "none found"

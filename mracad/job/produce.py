@@ -161,20 +161,24 @@ class _Copies:
         self._made: dict[tuple[str, str], Facts] = {}
 
     @cached_property
+    def document(self) -> Document:
+        return self.original()
+
+    @cached_property
     def input(self) -> Facts:
         from mracad.occ.facts import facts
 
-        return facts(self.original())
+        return facts(self.document)
 
     def mesh(self, target: Target) -> Written:
         """A mesh of the input."""
-        return written(self.original(), target).written
+        return written(self.document, target).written
 
     def of(self, target: Target) -> tuple[Facts, Facts]:
         """Facts of the input and of its copy; of the input twice if there is no copy: nothing is forgiven."""
         key = target.format, target.schema
         if key not in self._made:
-            data = written(self.original(), target).data
+            data = written(self.document, target).data
             try:
                 self._made[key] = _read_back(data, target)
             except Exception as error:

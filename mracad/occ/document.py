@@ -151,12 +151,25 @@ class Document:
 
     def checked(self) -> Document:
         """The document, if it has faces, all on surfaces; raises FileError."""
-        if not any(part.faces.Extent() for part in self.parts):
+        grounds = [
+            BRep_Tool.Surface_s(TopoDS.Face_s(faces.FindKey(i)), TopLoc_Location())
+            for _, _, faces in self._definitions()
+            for i in range(1, faces.Extent() + 1)
+        ]
+        if not grounds:
             raise no_faces(self.name)
-        for index, face in enumerate(self.faces):
-            if BRep_Tool.Surface_s(face, TopLoc_Location()) is None:
-                raise FileError(f"'{self.name}': #{index + 1} is a mesh, not a surface", "export surfaces or solids")
+        if None in grounds:
+            number = grounds.index(None) + 1
+            raise FileError(f"'{self.name}': #{number} is a mesh, not a surface", "export surfaces or solids")
         return self
+
+    def _definitions(self) -> Iterator[tuple[TDF_Label, TopoDS_Shape, TopTools_IndexedMapOfShape]]:
+        """The shape definitions that may hold geometry, and their faces."""
+        for label in labels(self.shape_tool.GetShapes):
+            if XCAFDoc_ShapeTool.IsSimpleShape_s(label):
+                shape, faces = XCAFDoc_ShapeTool.GetShape_s(label), TopTools_IndexedMapOfShape()
+                TopExp.MapShapes_s(shape, TopAbs_FACE, faces)
+                yield label, shape, faces
 
     @property
     def unit(self) -> str:
@@ -190,12 +203,8 @@ class Document:
                 tints.setdefault(key, tint)
         parts: list[Part] = []
         first = first_edge = 0
-        for label in labels(self.shape_tool.GetShapes):
-            if not XCAFDoc_ShapeTool.IsSimpleShape_s(label):
-                continue
-            shape = XCAFDoc_ShapeTool.GetShape_s(label)
-            faces, edges = TopTools_IndexedMapOfShape(), TopTools_IndexedMapOfShape()
-            TopExp.MapShapes_s(shape, TopAbs_FACE, faces)
+        for label, shape, faces in self._definitions():
+            edges = TopTools_IndexedMapOfShape()
             for i in range(1, faces.Extent() + 1):
                 TopExp.MapShapes_s(faces.FindKey(i), TopAbs_EDGE, edges)
             key = label_key(label)

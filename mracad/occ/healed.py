@@ -23,7 +23,7 @@ from OCP.Standard import Standard_Failure
 from OCP.TCollection import TCollection_ExtendedString
 from OCP.TDocStd import TDocStd_Application, TDocStd_Document
 
-from mracad import cache, note
+from mracad import cache, memo, note
 from mracad.occ.document import Document
 from mracad.occ.labels import Title
 from mracad.occ.load import Text
@@ -32,6 +32,7 @@ from mracad.occ.units import Units
 from mracad.version import __version__
 
 _COUNT = 8  # bytes
+_RECENT = memo.Recent(1 << 26)  # where there is no cache: an edit may need its input once more
 
 
 class _Rest(msgspec.Struct):
@@ -62,12 +63,15 @@ def through_cache(file: Text, how: tuple[str | None, ...], read: Callable[[], Do
     opened = _opened(found, file.name) if found else None
     if opened:
         return opened
-    document = read()
     with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "document"
+        path, recent = Path(folder) / "document", None if cache.folder() else _RECENT.find(key)
+        if recent:
+            path.write_bytes(recent)
+            return _opened(path, file.name) or read()
+        document = read()
         opened = _opened(path, file.name) if _saved(document, path) else None
         if opened:
-            cache.keep(key, path.read_bytes())
+            (cache if cache.folder() else _RECENT).keep(key, path.read_bytes())
     return opened or document
 
 

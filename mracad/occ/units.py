@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 from OCP.STEPConstruct import STEPConstruct_UnitContext
@@ -32,7 +33,9 @@ UNITS = {
 }
 _ALIASES = {"inch": "in", "foot": "ft", "feet": "ft", "metre": "m", "meter": "m", "micron": "um", "µm": "um"}
 # dimensions and tolerances, which the kernel writes in memory units whatever the unit of the output
-_TOLERANCES = re.compile(rb"\b(GEOMETRIC_TOLERANCE|DIMENSIONAL_SIZE|DIMENSIONAL_LOCATION)\b")
+_TOLERANCES = b"GEOMETRIC_TOLERANCE", b"DIMENSIONAL_SIZE", b"DIMENSIONAL_LOCATION"
+_CONTEXT = b"GLOBAL_UNIT_ASSIGNED_CONTEXT"
+_ENTITY = re.compile(rb"#(\d+)\s*=\s*\(")
 _SAME = 1e-9  # relative difference below which two factors are the same unit
 
 
@@ -98,7 +101,8 @@ def of_file(model: StepData_StepModel, text: bytes, override: str | None = None)
         return Units()
     mm = UNITS[name][0] if override else stated
     kernel_mm = stated / mm
-    return Units(kernel_mm=kernel_mm) if _TOLERANCES.search(text) else Units(name, mm, kernel_mm)
+    stated_in_memory = any(True for word in _TOLERANCES for _ in _places(word, text))
+    return Units(kernel_mm=kernel_mm) if stated_in_memory else Units(name, mm, kernel_mm)
 
 
 def metres(mm: float) -> float:
@@ -107,10 +111,22 @@ def metres(mm: float) -> float:
     return min((near, math.nextafter(near, 0.0), math.nextafter(near, math.inf)), key=lambda m: abs(m * 1000.0 - mm))
 
 
+def _places(word: bytes, text: bytes) -> Iterator[int]:
+    """Where a whole word is in a text; the word as such is found much faster than an expression."""
+    whole, place = re.compile(rb"\b" + word + rb"\b"), text.find(word)
+    while place >= 0:
+        if whole.match(text, place):
+            yield place
+        place = text.find(word, place + len(word))
+
+
 def _factors(model: StepData_StepModel, text: bytes) -> list[float]:
     """Millimetres per unit of every unit context in the file, ascending, as the kernel itself computes them."""
     found = []
-    for match in re.finditer(rb"#(\d+)\s*=\s*\([^;]*?\bGLOBAL_UNIT_ASSIGNED_CONTEXT\b", text):
+    for place in _places(_CONTEXT, text):
+        match = _ENTITY.search(text, text.rfind(b";", 0, place) + 1, place)
+        if match is None:
+            continue
         number = model.NextNumberForLabel(f"#{match[1].decode()}", 0, True)
         units = getattr(model.Value(number), "GlobalUnitAssignedContext", None) if number else None
         if units is not None:

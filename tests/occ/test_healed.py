@@ -5,7 +5,7 @@ from dataclasses import fields
 
 import pytest
 
-from mracad import cache
+from mracad import cache, memo
 from mracad.errors import FileError
 from mracad.occ.document import Document
 from mracad.occ.files import read, write
@@ -43,6 +43,15 @@ def test_a_second_read_gives_the_same_document_and_bytes(refined_file, reads, tm
     expected = written(without, tmp_path / "out.step")
     assert written(first, tmp_path / "out.step") == expected
     assert written(second, tmp_path / "out.step") == expected
+
+
+def test_without_a_cache_an_input_is_healed_once_until_the_next_file(reads, tmp_path, monkeypatch):
+    monkeypatch.setenv("MRACAD_CACHE", "off")
+    first, second = (written(read(SAMPLES / "trimmed.step"), tmp_path / "out.step") for _ in range(2))
+    assert first == second and len(reads) == 1
+    memo.clear()
+    assert written(read(SAMPLES / "trimmed.step"), tmp_path / "out.step") == first and len(reads) == 2
+    assert not cache.size()[0]
 
 
 def test_names_colours_and_instances_come_from_the_cache(reads, tmp_path):
