@@ -412,12 +412,12 @@ def observed(mracad, folder, place, given, old):
     return result.code, text, re.sub(r"[\d.]+ s\b", "", result.err), files, schemas
 
 
+@pytest.mark.usefixtures("quick")
 @pytest.mark.parametrize(("case", "first"), list(cases()))
 def test_an_option_has_an_effect(case, first, mracad, folder, tmp_path, monkeypatch, pytestconfig):
     if not (first or pytestconfig.getoption("--long")):
         pytest.skip("declared once for several commands: pytest --long tries it on each")
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("mracad.job.batch.pool.Pool", declared.Here)
     base, changed, old = words(case)
     without = once(mracad, folder, tmp_path / "without", base, old)
     given = observed(mracad, folder, tmp_path / "with", changed, old)

@@ -5,9 +5,7 @@ from collections import Counter
 from pathlib import Path
 
 import pytest
-from mracad_cli.render import plot
 
-from mracad.spec import pictures
 from tests.cli import declared
 
 LEAST = 0.3
@@ -36,31 +34,9 @@ def rows(command, small, every):
         yield [*command.split(), *(named.get(a, a) for a in arguments), *(word for words in given for word in words)]
 
 
-@pytest.fixture
-def quick(monkeypatch):
-    """Small pictures, plots without a search for their layout, few ladders: how well all this looks is not asked."""
-    size_of, packed = pictures.size_of, plot._packed
-
-    def plain(figure, form):
-        figure.set_layout_engine("none")
-        return packed(figure, form)
-
-    for name, value in (
-        ("job.batch.pool.Pool", declared.Here),
-        ("report.figures.SIZE", "96x64"),
-        ("report.figures.PAIR", "96x64"),
-        ("report.figures.ALONE", {}),
-        ("report.shades.SAMPLES", 100),
-        ("view.picture.size_of", lambda text: tuple(min(side, 120) for side in size_of(text))),
-        ("wavelet.shrink.FEW", 1),
-        ("wavelet.shrink.SPINS", 1),
-    ):
-        monkeypatch.setattr(f"mracad.{name}", value)
-    monkeypatch.setattr(plot, "_packed", plain)
-
-
+@pytest.mark.usefixtures("quick")
 @pytest.mark.parametrize("command", declared.commands())
-def test_pairs_of_options(command, mracad, small, quick, tmp_path, monkeypatch, pytestconfig):
+def test_pairs_of_options(command, mracad, small, tmp_path, monkeypatch, pytestconfig):
     codes = Counter()
     for number, words in enumerate(rows(command, small, pytestconfig.getoption("--long"))):
         folder = tmp_path / str(number)

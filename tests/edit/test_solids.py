@@ -22,7 +22,7 @@ from mracad.spec.steps import Smooth
 from samples.models import documents
 from tests.occ.test_mesh import corners, is_watertight
 
-NOISE, SPANS = 0.05, 8
+NOISE, SPANS = 0.05, 6
 
 
 def rounded_box():

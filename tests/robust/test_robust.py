@@ -210,7 +210,7 @@ def command(*words):
     )
 
 
-def test_limits_on_the_command_line(samples, tmp_path):
+def test_limits_on_the_command_line(mracad, samples, tmp_path):
     out = tmp_path / "out.step"
     words = ["smooth", samples / "panel.step", "--scale", "16mm", "-o", out]
     late = command(*words, "--time-limit", "0.005min")
@@ -228,4 +228,4 @@ def test_limits_on_the_command_line(samples, tmp_path):
         ["--memory-limit", "9" * 400],
         ["--memory-limit", "much"],
     ):
-        assert command("info", samples / "panel.step", *wrong).returncode == 2
+        assert mracad("info", samples / "panel.step", *wrong).code == 2
