@@ -40,17 +40,19 @@ class Constrained:
     free : ndarray of bool (n,)
     slack : float
         ε, relative: the weight of the form against contradictory conditions in a single pass.
+    places : ndarray (n, 2) of int, optional
+        Places of the unknowns, if they are the control points of one net.
     """
 
-    def __init__(self, form: Any, rows: Any, free: Array, slack: float = SLACK) -> None:
+    def __init__(self, form: Any, rows: Any, free: Array, slack: float = SLACK, places: Array | None = None) -> None:
         from scipy.sparse import block_array, diags_array, eye_array
 
         self.free, self.size = np.flatnonzero(free), len(free)
-        form = form.tocsr()[self.free][:, self.free]
+        form = form.tocsr() if free.all() else form.tocsr()[self.free][:, self.free]
         diagonal = form.diagonal()
         self.scale = 1.0 / np.sqrt(diagonal + LEAST * diagonal.max(initial=0.0) + 1e-300)
         scaling = diags_array(self.scale)
-        self.form = (scaling @ form @ scaling + LEAST * eye_array(len(self.free))).tocsr()
+        self.form = _scaled(form, self.scale)
         whole, some = _lengths(rows), _lengths(rows.tocsr()[:, self.free])
         rows = (rows.tocsr()[:, self.free] @ scaling).tocsr()
         length = _lengths(rows)
@@ -61,7 +63,7 @@ class Constrained:
         self._solve = (
             nested(block_array([[self.form, self.rows.T], [self.rows, -slack * eye_array(count)]]))
             if count
-            else Definite(self.form)
+            else Definite(self.form, None if places is None else places[self.free])
         )
 
     def __call__(
@@ -114,6 +116,22 @@ class Constrained:
         out = np.zeros((self.size, x.shape[1]))
         out[self.free] = self.scale[:, None] * x
         return out
+
+
+def _scaled(form: Any, scale: Array) -> Any:
+    """A matrix scaled from both sides, with :data:`LEAST` added to its diagonal."""
+    from scipy.sparse import csr_array, eye_array
+
+    row = np.repeat(np.arange(len(scale), dtype=form.indices.dtype), np.diff(form.indptr))
+    data = scale[row]
+    data *= form.data
+    data *= scale[form.indices]
+    own = np.flatnonzero(row == form.indices)
+    scaled = csr_array((data, form.indices, form.indptr), shape=form.shape)
+    if len(own) < len(scale):
+        return (scaled + LEAST * eye_array(len(scale))).tocsr()
+    data[own] += LEAST
+    return scaled
 
 
 def _lengths(rows: Any) -> Array:

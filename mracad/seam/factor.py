@@ -1,4 +1,4 @@
-"""Sparse positive definite systems: band Cholesky where the band is narrow, as on nets of surfaces."""
+"""Sparse positive definite systems: band Cholesky where the band is narrow, as on small nets of surfaces."""
 
 from __future__ import annotations
 
@@ -8,11 +8,16 @@ from typing import Any
 
 import numpy as np
 
+from mracad.seam.fronts import Fronts
+
 Array = np.ndarray
 
 WIDEST = 50.0
 """Largest bandwidth, over the fourth root of the number of unknowns, for which a band is faster than nested
 dissection."""
+
+BROAD = 400
+"""Smallest bandwidth for which the fronts of a net are faster than a band."""
 
 LOST = 1e-9
 """Relative residual allowed after one refinement; factors that leave more need pivoting."""
@@ -25,9 +30,11 @@ class Definite:
     ----------
     matrix : scipy.sparse matrix (n, n)
         Symmetric positive definite, up to rounding.
+    places : ndarray (n, 2) of int, optional
+        Places of the unknowns on a net: only near ones depend on each other.
     """
 
-    def __init__(self, matrix: Any) -> None:
+    def __init__(self, matrix: Any, places: Array | None = None) -> None:
         from scipy.linalg.lapack import dpbtrf
 
         matrix = matrix.tocsr()
@@ -36,6 +43,10 @@ class Definite:
         if not matrix.shape[0]:
             return
         self._order, width = _ordered(matrix)
+        if width >= BROAD and places is not None:
+            with suppress(np.linalg.LinAlgError):
+                self._other = Fronts(matrix, places)
+                return
         if width <= WIDEST * matrix.shape[0] ** 0.25:
             band, failed = dpbtrf(_band(matrix, self._order, width), lower=1, overwrite_ab=1)
             self._band = None if failed else band

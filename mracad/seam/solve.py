@@ -129,7 +129,7 @@ class Blocks:
         """The whole matrix."""
         from scipy.sparse import block_diag
 
-        return block_diag(self.parts, format="csr")
+        return self.parts[0] if len(self.parts) == 1 else block_diag(self.parts, format="csr")
 
 
 class Problem:
@@ -278,7 +278,9 @@ class Problem:
                 division = Division(layout, joined, along)
                 return Divided(parts, diagonal, soft, self.rows, free, division, self.effort.left)
         form = Blocks(list(parts)).tocsr()
-        return Constrained(form if soft is None else form + soft, self.rows, free)
+        alone = [np.indices(space.free.shape).reshape(2, -1).T for space in self.spaces.values()]
+        places = alone[0] if len(alone) == 1 else None
+        return Constrained(form if soft is None else form + soft, self.rows, free, places=places)
 
     def _layout(self, stiffness: float) -> Layout:
         """The layout of control points, and how far the effect of a joint reaches among them."""
