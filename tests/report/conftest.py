@@ -23,7 +23,16 @@ class Made:
     body: dict
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module", autouse=True)
+def small_pictures():
+    """Pages with pictures that are quickly drawn."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("mracad.report.figures.SIZE", "240x160")
+        patch.setattr("mracad.report.figures.PAIR", "360x150")
+        yield
+
+
+@pytest.fixture(scope="module")
 def made(tmp_path_factory):
     from mracad_cli.__main__ import main
 
