@@ -19,6 +19,7 @@ def model(small, tmp_path):
     return path
 
 
+@pytest.mark.usefixtures("quick")
 @pytest.mark.parametrize("encoding, name", [(None, RIGHT), ("cp1251", WRONG)])
 def test_the_name_reaches_info_and_every_output(mracad, model, tmp_path, encoding, name):
     said = ["--encoding", encoding] if encoding else []

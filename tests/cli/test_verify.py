@@ -55,6 +55,7 @@ def test_a_file_that_lacks_a_face_is_not_written(mracad, small: list[Path], tmp_
     assert b"OPEN_SHELL" in target.read_bytes()
 
 
+@pytest.mark.usefixtures("quick")
 def test_a_batch_does_not_write_it_either(mracad, small: list[Path], tmp_path: Path) -> None:
     """A batch says for each file what it is as read back; verification can be switched off there, too."""
     steps = recipe(tmp_path, '[[step]]\nuse = "smooth"\nscale = "4mm"\n')

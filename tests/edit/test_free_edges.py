@@ -18,7 +18,7 @@ NOISE, BAND = 0.3, 8.0
 
 @pytest.fixture(scope="module")
 def noisy():
-    return panels.whole(32, NOISE)[1]
+    return panels.whole(24, NOISE)[1]
 
 
 def errors(net):
