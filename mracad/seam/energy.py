@@ -11,7 +11,7 @@ span.  The energy of second derivatives is covariant: independent of the paramet
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -22,7 +22,7 @@ from mracad.bspline.jets import jets
 from mracad.bspline.knots import KnotVector, Side
 from mracad.bspline.surface import Net
 from mracad.model.cells import Quadrature
-from mracad.seam.integrals import Order, Sites, integrals, sites
+from mracad.seam.integrals import Order, Sites, integrals, nothing, sites
 from mracad.seam.stretch import EVEN, Stretch, stretched
 
 Array = np.ndarray
@@ -34,7 +34,7 @@ FLATTEST = 1e-4
 """Least ratio of the metric's singular values: where it is smaller (at poles), the shorter direction is floored."""
 
 
-_AT_ONCE = 400_000
+_AT_ONCE = 100_000
 """Points of the quadrature handled at a time."""
 
 
@@ -79,35 +79,32 @@ def forms(
     stretch : Stretch
         Lengths by direction in the bending.
     """
-    along = sites(net.u, quadrature.u, quadrature.wu), sites(net.v, quadrature.v, quadrature.wv)
-    frame, area = _frames(metric, along, stretch)
-    area = np.where(quadrature.mask, area, 0.0)
-    mass, bend = _squared(net, along, area, frame)
+    mass, bending = nothing(net.u, net.v), nothing(net.u, net.v)
+    blocks = list(_blocks(net, quadrature))
+    usual = _usual(metric, [along for along, _ in _blocks(net, quadrature, False)]) if len(blocks) > 1 else None
+    for along, mask in blocks:
+        frame, area = _frames(metric, along, stretch, usual)
+        density, bend = _squared(net, along, np.where(mask, area, 0.0), frame)
+        integrals(along, {(ORDERS[0], ORDERS[0]): density}, mass)
+        integrals(along, bend, bending)
     periodic, scale = (net.u.periodic, net.v.periodic), net.weights
     smooth, sharp = _kinks(net, metric, quadrature, creases, stretch)
-    area = _sparse(integrals(along, {(ORDERS[0], ORDERS[0]): mass}), periodic, scale)
-    bending = _sparse(integrals(along, bend), periodic, scale)
-    return Forms(area, bending + smooth if smooth.nnz else _on_pattern(bending, area), sharp)
+    area, whole = _sparse(mass, periodic, scale), _sparse(bending, periodic, scale)
+    return Forms(area, whole + smooth if smooth.nnz else _on_pattern(whole, area), sharp)
 
 
 def masses(net: Net, quadrature: Quadrature) -> Forms:
     """Mass alone of displacements of a net in its own metric; parameters as for :func:`forms`."""
     from scipy.sparse import csr_array
 
-    (pieces, points), across = quadrature.u.shape, sites(net.v, quadrature.v, quadrature.wv)
-    form = np.zeros((net.u.count, net.v.count, 2 * net.u.degree + 1, 2 * net.v.degree + 1))
-    step = max(1, _AT_ONCE // (points * quadrature.v.size))
-    for begin in range(0, pieces, step):
-        mask = quadrature.mask[begin * points : (begin + step) * points]
-        if mask.any():
-            part = slice(begin, begin + step)
-            along = sites(net.u, quadrature.u[part], quadrature.wu[part]), across
-            xu, xv = _jets(net, along)[1:3]
-            e, f, g = _dot(xu, xu), _dot(xu, xv), _dot(xv, xv)
-            area = np.sqrt(np.maximum(e * g - f * f, 0.0)) * (along[0].weight.reshape(-1, 1) * along[1].weight.ravel())
-            if net.weights is not None:
-                area = area / _jets(Net(net.u, net.v, net.weights[..., None]), along)[0, 0] ** 2
-            form += integrals(along, {(ORDERS[0], ORDERS[0]): np.where(mask, area, 0.0)})
+    form = nothing(net.u, net.v)
+    for along, mask in _blocks(net, quadrature):
+        xu, xv = _jets(net, along, 1)[1:]
+        e, f, g = _dot(xu, xu), _dot(xu, xv), _dot(xv, xv)
+        area = np.sqrt(np.maximum(e * g - f * f, 0.0)) * (along[0].weight.reshape(-1, 1) * along[1].weight.ravel())
+        if net.weights is not None:
+            area = area / _jets(Net(net.u, net.v, net.weights[..., None]), along)[0, 0] ** 2
+        integrals(along, {(ORDERS[0], ORDERS[0]): np.where(mask, area, 0.0)}, form)
     none = csr_array((net.u.count * net.v.count,) * 2)
     return Forms(_sparse(form, (net.u.periodic, net.v.periodic), net.weights), none, none)
 
@@ -118,12 +115,22 @@ def slopes(net: Net, metric: Net, quadrature: Quadrature) -> Any:
     xu, xv = _jets(metric, along)[1:3]
     e, f, g = _dot(xu, xu), _dot(xu, xv), _dot(xv, xv)
     area = np.sqrt(np.maximum(e * g - f * f, 0.0)) * (along[0].weight.reshape(-1, 1) * along[1].weight.ravel())
-    e, f, g = _floored(e, f, g)
+    e, f, g = _floored(e, f, g, (np.median(e), np.median(g)))
     frame = np.zeros((5, 3, *e.shape))
     frame[0, 0], frame[1, 1] = 1 / np.sqrt(e), np.sqrt(e / (e * g - f * f))
     frame[0, 1] = -f / e * frame[1, 1]
     _, slope = _squared(net, along, np.where(quadrature.mask, area, 0.0), frame)
     return _sparse(integrals(along, slope), (net.u.periodic, net.v.periodic), net.weights)
+
+
+def _blocks(net: Net, quadrature: Quadrature, inside: bool = True) -> Iterator[tuple[tuple[Sites, Sites], Array]]:
+    """Pieces along u with some points on the faces (or all), for as many points as are handled at a time, and masks."""
+    (pieces, points), across = quadrature.u.shape, sites(net.v, quadrature.v, quadrature.wv)
+    step = max(1, _AT_ONCE // max(points * quadrature.v.size, 1))
+    for begin in range(0, pieces, step):
+        mask, part = quadrature.mask[begin * points : (begin + step) * points], slice(begin, begin + step)
+        if not inside or mask.any():
+            yield (sites(net.u, quadrature.u[part], quadrature.wu[part]), across), mask
 
 
 def _squared(
@@ -220,12 +227,21 @@ def _sloped(net: Net, metric: Net, uv: Array, axis: int, side: Side) -> tuple[Ar
     return index, _Side((dn - (f / g)[:, None] * dt) / height[:, None], height, np.sqrt(g))
 
 
-def _frames(metric: Net, along: tuple[Sites, Sites], stretch: Stretch) -> tuple[Array, Array]:
+def _usual(metric: Net, blocks: Iterable[tuple[Sites, Sites]]) -> tuple[Any, Any]:
+    """Medians of |X_u|² and |X_v|² over all points."""
+    found = [[_dot(x, x).ravel() for x in _jets(metric, along, 1)[1:]] for along in blocks]
+    e, g = (np.concatenate(each) for each in zip(*found, strict=True))
+    return np.median(e, overwrite_input=True), np.median(g, overwrite_input=True)
+
+
+def _frames(
+    metric: Net, along: tuple[Sites, Sites], stretch: Stretch, usual: tuple[Any, Any] | None = None
+) -> tuple[Array, Array]:
     """Coefficients in H̃_11, √2 H̃_12, H̃_22 of ∂_u, ∂_v, ∂_uu, ∂_uv, ∂_vv, ``(5, 3, qu, qv)``; areas ``(qu, qv)``."""
     xu, xv, xuu, xuv, xvv = _jets(metric, along)[1:]
     e, f, g = _dot(xu, xu), _dot(xu, xv), _dot(xv, xv)
     root = np.sqrt(np.maximum(e * g - f * f, 0.0))
-    e, f, g = _floored(e, f, g)
+    e, f, g = _floored(e, f, g, usual or (np.median(e), np.median(g)))
     det = e * g - f * f
     christoffel = []
     for second in (xuu, xuv, xvv):
@@ -247,9 +263,9 @@ def _frames(metric: Net, along: tuple[Sites, Sites], stretch: Stretch) -> tuple[
     return frame, root * (along[0].weight.reshape(-1, 1) * along[1].weight.ravel())
 
 
-def _floored(e: Array, f: Array, g: Array) -> tuple[Array, Array, Array]:
-    """A first fundamental form, with floors against division by zero where it degenerates."""
-    mean_u, mean_v = (np.sqrt(np.median(x)) for x in (e, g))
+def _floored(e: Array, f: Array, g: Array, usual: tuple[Any, Any]) -> tuple[Array, Array, Array]:
+    """A first fundamental form, with floors against division by zero where it is far below its usual e and g."""
+    mean_u, mean_v = np.sqrt(usual)
     e, g = np.maximum(e, (FLATTEST**0.5 * mean_u) ** 2), np.maximum(g, (FLATTEST**0.5 * mean_v) ** 2)
     return e, np.clip(f, -0.999 * np.sqrt(e * g), 0.999 * np.sqrt(e * g)), g
 
@@ -266,10 +282,10 @@ def _over_weights(
     return area / w**2, np.stack([value, slope_u, slope_v, fuu, fuv, fvv])
 
 
-def _jets(net: Net, along: tuple[Sites, Sites]) -> Array:
-    """Points and derivatives ``(6, k, qu, qv)`` by ``ORDERS``."""
+def _jets(net: Net, along: tuple[Sites, Sites], most: int = 2) -> Array:
+    """Points and derivatives ``(6, k, qu, qv)`` by ``ORDERS``, up to an order."""
     shape = along[0].at.size, along[1].at.size
-    found = jets(net, along[0].at, along[1].at, np.ones(shape, bool), np.zeros(net.poles.shape[2]), 2)
+    found = jets(net, along[0].at, along[1].at, np.ones(shape, bool), np.zeros(net.poles.shape[2]), most)
     return np.ascontiguousarray(found.reshape(*found.shape[:2], *shape[::-1]).swapaxes(2, 3))
 
 

@@ -52,7 +52,9 @@ def sites(knots: KnotVector, at: Array, weight: Array) -> Sites:
     return Sites(knots, first.reshape(at.shape)[:, 0], at, weight, table.reshape(*at.shape, 3, knots.degree + 1))
 
 
-def integrals(along: tuple[Sites, Sites], coefficients: Mapping[tuple[Order, Order], Array]) -> Array:
+def integrals(
+    along: tuple[Sites, Sites], coefficients: Mapping[tuple[Order, Order], Array], form: Array | None = None
+) -> Array:
     """The form of given coefficients.
 
     Parameters
@@ -60,6 +62,8 @@ def integrals(along: tuple[Sites, Sites], coefficients: Mapping[tuple[Order, Ord
     along : pair of Sites
     coefficients : mapping of pairs of orders to ndarray (points_u, points_v)
         c_αβ times the weights of the points, for one of (α, β) and (β, α).
+    form : ndarray (nu, nv, 2p + 1, 2q + 1), optional
+        A form of these functions, to which the result is added.
 
     Returns
     -------
@@ -72,8 +76,10 @@ def integrals(along: tuple[Sites, Sites], coefficients: Mapping[tuple[Order, Ord
     for both, values in coefficients.items():
         low, high = sorted(both)
         pairs.setdefault((low[0], high[0]), []).append((low[1], high[1], values))
-    form = np.zeros((u.knots.count, 2 * p + 1, v.knots.count * (2 * q + 1)))
-    rows = max(1, _BLOCK // (len(pairs) * gu * form.shape[2] * 2))
+    if form is None:
+        form = nothing(u.knots, v.knots)
+    stencil = form.swapaxes(1, 2).reshape(u.knots.count, 2 * p + 1, v.knots.count * (2 * q + 1))
+    rows = max(1, _BLOCK // (len(pairs) * gu * stencil.shape[2] * 2))
     for begin in range(0, su, rows):
         part = slice(begin, begin + rows)
         lines = slice(begin * gu, min(begin + rows, su) * gu)
@@ -86,8 +92,13 @@ def integrals(along: tuple[Sites, Sites], coefficients: Mapping[tuple[Order, Ord
         count = len(tables[0])
         outer = np.concatenate(tables, axis=1).reshape(count, len(found) * gu, -1).swapaxes(1, 2)
         along_v = np.concatenate([each.reshape(count, gu, -1) for each in found], axis=1)
-        _added(form, u, part, np.matmul(outer, along_v).reshape(count, p + 1, p + 1, -1))
-    return form.reshape(u.knots.count, 2 * p + 1, v.knots.count, 2 * q + 1).swapaxes(1, 2)
+        _added(stencil, u, part, np.matmul(outer, along_v).reshape(count, p + 1, p + 1, -1))
+    return form
+
+
+def nothing(u: KnotVector, v: KnotVector) -> Array:
+    """The form that is zero, ``(nu, nv, 2p + 1, 2q + 1)``."""
+    return np.zeros((u.count, 2 * u.degree + 1, v.count, 2 * v.degree + 1)).swapaxes(1, 2)
 
 
 def _inner(v: Sites, parts: list[tuple[int, int, Array]], mirrored: bool) -> Array:
