@@ -9,6 +9,7 @@ the recipe smooths and checks them.  On a busy machine compare processor times a
 from __future__ import annotations
 
 import contextlib
+import json
 import resource
 import subprocess
 import sys
@@ -154,6 +155,40 @@ def lost(folder: Path, files: int) -> None:
     print(f"cluster of 2, one killed at a third: {files} files in {remote:.1f} s (local {local:.1f} s), same: {same}")
 
 
+def scaled(folder: Path, files: int) -> None:
+    """A cluster of two workers beside one, both warm; on a busy machine, the share of time that they work counts."""
+    words = (recipe(folder, RECIPE), "--json", "-O")
+    few, many = models(folder / "few", 2 * len(SAMPLES)), models(folder / "many", files)
+    walls, busy = dict[int, float](), dict[int, float]()
+    for count in (1, 2):
+        with cluster(count) as (address, processes):
+            timed(*words, folder / f"warm{count}", few, "--cluster", address)
+            before = sum(map(spent, processes))
+            start = time.perf_counter()
+            code, out, err = batch(*words, folder / f"out{count}", many, "--cluster", address)
+            walls[count] = time.perf_counter() - start
+            used = sum(map(spent, processes)) - before
+        assert code == 0, err
+        lines = [json.loads(line) for line in out.splitlines()]
+        work = sum(line["seconds"] for line in lines[:-1])
+        busy[count] = work / lines[-1]["summary"]["seconds"] / count
+        print(
+            f"cluster of {count}: {files} files in {walls[count]:.1f} s; processor time {used:.1f} s; each worker "
+            f"works {busy[count]:.1%} of the time between first and last file"
+        )
+    same = outputs(folder / "out1") == outputs(folder / "out2")
+    print(
+        f"  two workers are {walls[1] / walls[2]:.2f} times as fast as one, {2 * busy[2] / busy[1]:.2f} times by the "
+        f"time that they work; same bytes: {same}"
+    )
+
+
+def spent(process: subprocess.Popen[bytes]) -> float:
+    """Processor seconds of a process and its children."""
+    top = psutil.Process(process.pid)
+    return sum(sum(each.cpu_times()[:2]) for each in (top, *top.children(recursive=True)))
+
+
 def main() -> None:
     files = int(sys.argv[1]) if len(sys.argv) > 1 else 200
     tasks: dict[str, Callable[[Path], None]] = {
@@ -162,6 +197,7 @@ def main() -> None:
         "memory": memory,
         "flight": lambda folder: flight(),
         "killed": lambda folder: killed(folder, min(files, 100), 20),
+        "scaled": lambda folder: scaled(folder, min(files, 100)),
         "lost": lambda folder: lost(folder, min(files, 40)),
     }
     for name in sys.argv[2:] or tasks:

@@ -20,6 +20,9 @@ Made by `make docs` from the declarations of the commands; `mracad COMMAND --hel
 `-` for a stream, or a [URL](batch.md#in-object-stores). [Formats](formats.md),
 [defaults of options](shell.md#defaults), [steps of recipes](steps.md).
 
+A `LENGTH` is `5mm`, `0.2in` or `2%` (of the diagonal of the model). Plain numbers and coordinates are millimetres,
+whatever the unit of the file: for a file in inches, too, `--scale 5` is 5 mm.
+
 Results go to standard output, everything else to standard error. An error is one line: what, where, what to do. Nothing
 is written then.
 

@@ -26,6 +26,8 @@ _PACKAGES = {"s3": "s3fs", "s3a": "s3fs", "gs": "gcsfs", "gcs": "gcsfs"}
 _WHOLE = frozenset({*_PACKAGES, "abfs", "abfss", "az", "oss", "memory"})
 """Protocols of object stores: objects appear whole, buckets are not made, folders need not be."""
 
+_CHECK = "check its path and permissions"
+
 _SILENT = logging.NullHandler()
 """For gcsfs, which would tell of every attempt on standard error, with tracebacks."""
 
@@ -198,9 +200,15 @@ def read(place: str | os.PathLike[str]) -> bytes:
     try:
         return where.read_bytes()
     except OSError as error:
-        reason = {IsADirectoryError: "it is a folder", FileNotFoundError: "there is no such file"}
-        why = reason.get(type(error), error.strerror or str(error))
-        raise FileError(f"cannot read '{where}': {why}", "check its path and permissions") from error
+        if isinstance(error, FileNotFoundError):
+            raise missing(where) from error
+        why = "it is a folder" if isinstance(error, IsADirectoryError) else error.strerror or str(error)
+        raise FileError(f"cannot read '{where}': {why}", _CHECK) from error
+
+
+def missing(path: Path) -> FileError:
+    """The error for a file that does not exist."""
+    return FileError(f"cannot read '{path}': there is no such file", _CHECK)
 
 
 def head(where: Location, size: int) -> bytes:

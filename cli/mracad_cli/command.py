@@ -25,6 +25,12 @@ if TYPE_CHECKING:
     from mracad_cli.running import Kept
 
 
+LENGTHS = (
+    "LENGTH is 5mm, 0.2in or 2% (of the model's diagonal). Plain numbers and coordinates are millimetres, whatever the "
+    "unit of the file."
+)
+
+
 class Command(click.Command):
     """A command that reports a crash of the kernel, or an exceeded limit, as an error.
 
@@ -37,6 +43,7 @@ class Command(click.Command):
     guarded = True
     defaulted = True
     replaces = False
+    edits = True
 
     def __init__(self, *args: Any, examples: str, **how: Any) -> None:
         super().__init__(*args, **how)
@@ -58,7 +65,15 @@ class Command(click.Command):
             with formatter.section(title):
                 formatter.write_dl([record for param in params if (record := param.get_help_record(ctx))])
 
+    def notes(self, ctx: click.Context) -> list[str]:
+        """What the help says about the values of options."""
+        lengths = any(param.make_metavar(ctx) == "LENGTH" for param in self.get_params(ctx))
+        return [LENGTHS] if lengths else []
+
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        for note in self.notes(ctx):
+            formatter.write_paragraph()
+            formatter.write_text(note)
         with formatter.section("Examples" if len(self.examples) > 1 else "Example"):
             for line in self.examples:
                 formatter.write(f"  {line}\n")
@@ -134,10 +149,12 @@ class Command(click.Command):
         """Do the work of the command, in a child process where it is guarded."""
         from mracad.job import guard
         from mracad_cli.journal import Ended
+        from mracad_cli.outputs import check_inputs
 
         def work() -> Ended:
             try:
                 with told():
+                    check_inputs(ctx)
                     code = click.Command.invoke(self, ctx)
                     sys.stdout.flush()
             finally:
@@ -212,6 +229,12 @@ def groups(root: click.Command) -> dict[str, click.Group]:
     names = root.list_commands(context) if isinstance(root, click.Group) else []
     found = {name: root.get_command(context, name) for name in names}  # type: ignore[attr-defined]
     return {name: each for name, each in found.items() if isinstance(each, click.Group)}
+
+
+class Unedited(Command):
+    """A command that shows or writes a model as it is."""
+
+    edits = False
 
 
 class Unguarded(Command):

@@ -15,8 +15,9 @@ from mracad import note
 from mracad.errors import FileError, UsageError, needing
 from mracad.formats import FORMATS, Format, by_extension
 from mracad.spec.fields import dashed
-from mracad.store import Location, Url, is_url, location
-from mracad_cli.options import PAGES, PICTURES, Reading, Reports, Writing
+from mracad.store import Location, Url, is_url, location, missing
+from mracad_cli.options import PAGES, PICTURES, Reading, Reports, Writing, model
+from mracad_cli.params import Declared
 from mracad_cli.say import json_text, say, warn
 
 OF = {
@@ -120,6 +121,17 @@ def _check_scalars(formats: Collection[Format]) -> None:
             raise UsageError(f"scalar: {format.name.upper()} holds no numbers at points", f"write {able}")
     if not any(format.scalars for format in formats):
         raise UsageError("scalar: no mesh is written", f"add an output in {able}, or leave --scalar out")
+
+
+def check_inputs(ctx: click.Context) -> None:
+    """Refuse inputs on this machine that do not exist, before outputs that do; those of a batch fail one by one."""
+    for param in ctx.command.params:
+        given = ctx.params.get(param.name or "")
+        for text in (given if isinstance(given, tuple | list) else [given]) if given and param.nargs == 1 else ():
+            naming = param.type.field.naming if isinstance(param.type, Declared) else None
+            file = text if param.type is model else naming.file(text) if naming else None
+            if file and file != "-" and isinstance(where := location(file), Path) and not where.exists():
+                raise missing(where)
 
 
 def check_reports(*paths: str | None, overwrite: bool) -> None:

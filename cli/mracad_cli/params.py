@@ -152,7 +152,9 @@ class Declared(click.ParamType):
         return self.field.one(value)
 
     def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem[str]]:
-        found = [text for text in self.field.begins if text.startswith(incomplete)]
+        begins = self.field.begins
+        kept = () if getattr(ctx.command, "edits", True) else begins.edited
+        found = [text for text in begins.texts if text.startswith(incomplete) and text not in kept]
         naming = self.field.naming
         if naming and incomplete.startswith(naming.prefix):
             ending = (naming.ending,) if isinstance(naming.ending, str) else naming.ending

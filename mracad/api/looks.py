@@ -161,16 +161,13 @@ def render(thing: Any, given: dict[str, Any], tell: Function) -> Rendered:
     ('1/mm²', b'PNG')
     """
     from mracad.job.output import drawn
-    from mracad.spec.pictures import show_of
+    from mracad.spec.pictures import show_of, unedited
 
     whole = opened(thing, change=False)
     document, wanted = whole.document, chosen(Picture, given, whole)
     show = show_of(wanted.show)
     if not document.reports:
-        if show.kind == "deviation" and not show.of:
-            raise UsageError("show: deviation needs a file from which it is measured", "write deviation:REF.step")
-        if show.kind == "treatment":
-            raise UsageError("show: treatment is what an edit did", "give a Document that an edit returned")
+        unedited(show, hint="give a Document that an edit returned")
         if wanted.wipe and not wanted.before:
             raise UsageError("wipe: there is no other model", "add --before REF.step")
     tell("drawing", 0, 1)

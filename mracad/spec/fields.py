@@ -36,9 +36,10 @@ def nearest(word: str, known: Iterable[str], otherwise: str = "") -> str:
 
 @dataclass(frozen=True)
 class Begins:
-    """How the texts of a field may begin, or be, for completion in shells."""
+    """How the texts of a field may begin, or be, for completion in shells; some only where something is edited."""
 
     texts: tuple[str, ...]
+    edited: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -63,8 +64,7 @@ class Field:
     bounds : tuple of Meta
     form : callable or None
         ``form(text, name)`` reads its texts, or raises UsageError.
-    begins : tuple of str
-        See :class:`Begins`.
+    begins : Begins
     section : str
         What it is about, as a title in the help; ``""`` if its step alone has it.
     """
@@ -79,7 +79,7 @@ class Field:
     naming: Naming | None
     bounds: tuple[Meta, ...]
     form: Callable[[str, str], object] | None
-    begins: tuple[str, ...]
+    begins: Begins
     section: str
 
     @property
@@ -198,6 +198,6 @@ def _field(owner: str, section: str, field: structs.FieldInfo, hint: Any) -> Fie
         next((note for note in notes if isinstance(note, Naming)), None),
         tuple(meta for meta in metas if (meta.gt, meta.ge, meta.le) != (None, None, None)),
         next((note for note in notes if callable(note)), None),
-        next((note.texts for note in notes if isinstance(note, Begins)), ()),
+        next((note for note in notes if isinstance(note, Begins)), Begins(())),
         section,
     )

@@ -33,6 +33,9 @@ SHOWS = "shaded", "zebra", "isophotes", "curvature", "deviation", "roughness", "
 ALONE = "features", "treatment"
 """Those that show no model beside another."""
 
+EDITED = "deviation", "treatment"
+"""Those that only an edit can show; deviation unless a file is named."""
+
 STRIPED = "zebra", "isophotes"
 """Those with stripes."""
 
@@ -99,6 +102,14 @@ def show_of(text: str, name: str = "show") -> Show:
     return Show(kind, rest)
 
 
+def unedited(show: Show, name: str = "show", hint: str = "give it to an edit, such as smooth, with -o OUT.png") -> None:
+    """Refuse what only an edit can show; raises UsageError."""
+    if show.kind == "deviation" and not show.of:
+        raise UsageError(f"{name}: deviation needs a file from which it is measured", "write deviation:REF.step")
+    if show.kind == "treatment":
+        raise UsageError(f"{name}: treatment is what an edit did", hint)
+
+
 def scalar_of(text: str, name: str = "scalar") -> Show:
     """The numbers that a text such as ``"curvature:mean"`` asks for; raises UsageError."""
     kind = text.partition(":")[0]
@@ -151,10 +162,10 @@ def section_of(text: str, name: str = "section") -> tuple[int, float]:
     return AXES.index(axis.strip()), PLACE.read(place, name)
 
 
-ShowText = Annotated[str, Naming(prefix="deviation:"), show_of, Begins(SHOWN)]
+ShowText = Annotated[str, Naming(prefix="deviation:"), show_of, Begins(SHOWN, EDITED)]
 """The type of a field that tells what a picture shows."""
 
-ScalarText = Annotated[str, Naming(prefix="deviation:"), scalar_of, Begins(SCALARS)]
+ScalarText = Annotated[str, Naming(prefix="deviation:"), scalar_of, Begins((*SCALARS, "deviation:"), EDITED)]
 """The type of a field that tells which numbers the points of a mesh have."""
 
 ViewText = Annotated[str, views_of, Begins(tuple(VIEWS))]

@@ -62,6 +62,12 @@ def test_texts_of_options(here):
     assert completed("repeat", "--fill", "h") == ["hexagons,spacing:"]
 
 
+def test_what_only_edits_show_is_offered_to_them_alone():
+    assert completed("smooth", "--show", "t") == ["treatment"] and completed("render", "--show", "t") == []
+    assert completed("smooth", "--show", "dev")[:2] == ["deviation", "deviation:"]
+    assert completed("convert", "--scalar", "dev") == completed("render", "--show", "dev") == ["deviation:"]
+
+
 def test_no_numerical_library_is_loaded_and_no_default_is_read(here):
     (here / "mracad.toml").write_text("this is wrong")
     words = {"_MRACAD_COMPLETE": "bash_complete", "COMP_WORDS": "mracad smooth --keep g", "COMP_CWORD": "3"}

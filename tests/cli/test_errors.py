@@ -159,3 +159,23 @@ def test_debug_shows_the_traceback_of_an_error_and_nothing_else_changes(mracad, 
     plain, debug = (mracad("info", tmp_path / "none.step", *words) for words in ((), ("--debug",)))
     assert debug.code == plain.code == 3 and "Traceback" not in plain.err
     assert debug.err.startswith("Traceback") and debug.err.endswith(plain.err)
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["smooth", "none.step", "--scale", "9mm", "-o", "out.step"],
+        ["render", "in.step", "--before", "none.step", "-o", "out.png"],
+        ["convert", "in.step", "--scalar", "deviation:none.step", "-o", "out.vtp"],
+        ["compose", "in.step", "none.mra", "-o", "out.step"],
+        ["repeat", "in.step", "--feature", "none.png,width:3mm,height:1mm", "--at", "1,2,3", "-o", "out.step"],
+        ["compare", "none.step", "in.step", "--report-html", "out.html"],
+    ],
+)
+def test_inputs_that_are_missing_come_before_outputs_that_exist(mracad, tmp_path, monkeypatch, words):
+    monkeypatch.chdir(tmp_path)
+    for name in ("in.step", words[-1]):
+        (tmp_path / name).write_text("precious")
+    result = mracad(*words)
+    one_line(result, 3)
+    assert "cannot read 'none." in result.err and (tmp_path / words[-1]).read_text() == "precious"

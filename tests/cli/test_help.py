@@ -1,5 +1,6 @@
 """The help of every command: options under titles, and an example that goes through."""
 
+import json
 import shlex
 
 import click
@@ -24,6 +25,17 @@ def test_options_stand_under_titles_each_once(command, mracad):
         flag = max(option.opts, key=len)
         found = [line.replace(",", " ").split() for line in lines if line.startswith("  -")]
         assert sum(flag in words[:2] for words in found) == 1, flag
+
+
+def test_what_lengths_mean_is_told_where_they_are_taken(mracad):
+    said = "Plain numbers and coordinates are millimetres, whatever the unit of the file."
+    assert said in " ".join(helped("smooth", mracad).split()) and said not in " ".join(helped("env", mracad).split())
+
+
+def test_plain_numbers_are_millimetres_in_a_file_in_inches(mracad, small):
+    result = mracad("offset", small[0], "--input-unit", "in", "--distance", "1", "--dry-run", "--json")
+    assert result.code == 0, result.err
+    assert max(face["largest"] for face in json.loads(result.out)["deviation"]) == pytest.approx(1.0, rel=0.05)
 
 
 def test_titles_tell_what_options_are_about(mracad):

@@ -25,13 +25,24 @@ def test_a_model_is_compared_with_a_reference(mracad, samples, tmp_path, small_p
     blade = samples / "blade.step"
     same = mracad("report", blade, blade, "-o", tmp_path / "b.html", "--json")
     body = json.loads(same.out)
-    assert body["compare"]["passed"] is True
+    assert body["compare"]["equal"] is True and "passed" not in body["compare"]
     page = Read((tmp_path / "b.html").read_text(encoding="utf-8"))
     assert "no differences" in " ".join(page.texts)
     faces = page.tables["faces"]
     waves = [row[faces["keys"].index("shortest_wavelength")] for row in faces["rows"] if row]
     analytic = [face["smoothing"] == "analytic" for face in body["faces"]]
     assert any(analytic) and all(wave == [None, "–"] for wave, flat in zip(waves, analytic, strict=True) if flat)
+
+
+def test_models_are_equal_where_nothing_differs():
+    from mracad_cli.render.report import _unjudged
+
+    from mracad.inspect.verdict import Layer, Verdict
+
+    def equal(*statuses):
+        return _unjudged(Verdict("a.step", tuple(Layer(status, status) for status in statuses), True))["equal"]
+
+    assert equal("pass", "skipped") and not equal("pass", "noted")
 
 
 @pytest.fixture

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import click
 
-from mracad.errors import UsageError
+from mracad.spec.pictures import show_of, unedited
 from mracad_cli import options, running
-from mracad_cli.command import Command
+from mracad_cli.command import Unedited
 from mracad_cli.options import Reading, Writing
 from mracad_cli.outputs import check_outputs, deliver_models, load
 from mracad_cli.say import json_text
 from mracad_cli.steps import produced
 
 
-@click.command(cls=Command, help=__doc__, examples="mracad convert part.igs -o part.step -o part.stl")
+@click.command(cls=Unedited, help=__doc__, examples="mracad convert part.igs -o part.step -o part.stl")
 @options.apply(options.reading(), options.writing, running.printing)
 def command(reading: Reading, writing: Writing, as_json: bool) -> int:
     import time
@@ -21,8 +21,9 @@ def command(reading: Reading, writing: Writing, as_json: bool) -> int:
     from mracad_cli.render import json, text
 
     start = time.perf_counter()
-    if any(show.kind == "deviation" and not show.of for show in writing.scalars.shows):
-        raise UsageError("scalar: deviation needs a file from which it is measured", "write deviation:REF.step")
+    unedited(show_of(writing.picture.show))
+    for scalar in writing.scalars.shows:
+        unedited(scalar, "scalar")
     targets = check_outputs(writing)
     document, done = produced(reading, load(reading.file), writing, targets, ())
     found = text.found(done.made)

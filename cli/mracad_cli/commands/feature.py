@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import click
 
 from mracad.errors import UsageError
 from mracad.spec.quantity import LENGTH
 from mracad.spec.sources import source
 from mracad.spec.steps import Extract, Make, Selection
+from mracad.store import Location, location
 from mracad_cli import options, running
 from mracad_cli.command import Group
 from mracad_cli.options import Reading
@@ -111,9 +110,9 @@ def make(given: Make, output: str, overwrite: bool, as_json: bool) -> None:
     deliver({output: save(found)}, [json_text(body)] if as_json else said)
 
 
-def _target(output: str, overwrite: bool) -> Path:
+def _target(output: str, overwrite: bool) -> Location:
     """The path of a feature file to write; refuses others."""
-    path = Path(output)
+    path = location(output)
     if path.suffix != ".feature":
         raise UsageError(f"cannot write {path}: unknown extension {path.suffix!r}", "use .feature")
     check_target(path, overwrite)

@@ -11,9 +11,9 @@ import click
 
 from mracad.errors import UsageError
 from mracad.formats import FORMATS, by_extension
-from mracad.spec.pictures import Picture, show_of
+from mracad.spec.pictures import Picture, show_of, unedited
 from mracad_cli import options, running
-from mracad_cli.command import Command
+from mracad_cli.command import Unedited
 from mracad_cli.options import Reading
 from mracad_cli.outputs import check_reports, deliver, read
 from mracad_cli.progress import Progress
@@ -23,7 +23,7 @@ DRAWN = [extension for format in FORMATS.values() if format.kind == "picture" fo
 """Extensions of pictures."""
 
 
-@click.command(cls=Command, help=__doc__, examples=Picture.example)
+@click.command(cls=Unedited, help=__doc__, examples=Picture.example)
 @options.apply(
     options.reading(),
     options.option(
@@ -45,10 +45,7 @@ def command(reading: Reading, output: str, picture: Picture, overwrite: bool, as
 
     start = time.perf_counter()
     show = show_of(picture.show)
-    if show.kind == "deviation" and not show.of:
-        raise UsageError("show: deviation needs a file from which it is measured", "write deviation:REF.step")
-    if show.kind == "treatment":
-        raise UsageError("show: treatment is what an edit did", "give it to an edit, such as smooth, with -o OUT.png")
+    unedited(show)
     if picture.wipe and not picture.before:
         raise UsageError("wipe: there is no other model", "add --before REF.step")
     format = FORMATS["png"] if output == "-" else by_extension(output, "picture")

@@ -44,6 +44,8 @@ def page(name: str, command: click.Command, root: click.Context) -> str:
     for title, params in options.items():
         lines.append(f".SS {escaped(title)}")
         lines += _terms(record for param in params if (record := param.get_help_record(context)))
+    for note in command.notes(context) if isinstance(command, Command) else ():
+        lines += [".PP", *_filled(note)]
     lines += [".SH EXAMPLES", *_block(examples)] if examples else []
     return "\n".join([*lines, *_end(["mracad(1)"])]) + "\n"
 

@@ -14,6 +14,7 @@ from mracad_cli.render import info, json, text
 
 if TYPE_CHECKING:
     from mracad.inspect.spectrum import Spectrum
+    from mracad.inspect.verdict import Verdict as Differences
     from mracad.occ.document import Document
 
 SCALE = "2%"
@@ -82,7 +83,7 @@ def told(
     lines = info.summary(seen)
     if compared and reference:
         found = compared.verdict.noting()  # no limits were given
-        body["compare"] = json.verdict(found, ())
+        body["compare"] = _unjudged(found)
         lines += [f"compared with {reference.name}: {_differing(body['compare'])}", *text.layer_lines(found)]
     return Told(document, reference, body, lines, spectra(seen.model, faces))
 
@@ -106,9 +107,8 @@ def page(report: Told) -> Page:
     names = [document.name, *([reference.name] if reference else [])]
     verdicts = [_valid(body["check"])]
     if "compare" in body:
-        layers = body["compare"]["layers"]
-        equal = all(layer["status"] != "noted" for layer in layers)
-        verdicts.append(Verdict("comparison", _differing(body["compare"]), equal or None, layers))
+        found = body["compare"]
+        verdicts.append(Verdict("comparison", _differing(found), found["equal"] or None, found["layers"]))
     compared = both(document, reference) if reference else []
     figures = [*compared, *alone(document, "zebra" if compared else ""), *_plots(document.name, report.spectra)]
     return Page(
@@ -131,6 +131,13 @@ def page(report: Told) -> Page:
             Table("seams", "Seams", SEAMS, body["seams"]["each"]),
         ],
     )
+
+
+def _unjudged(found: Differences) -> dict[str, Any]:
+    """A comparison without limits: nothing passes or fails, the models are equal or not."""
+    body = json.verdict(found, ())
+    equal = all(layer.status != "noted" for layer in found.layers)
+    return {"file": body["file"], "equal": equal, "valid": body["valid"], "layers": body["layers"]}
 
 
 def _valid(body: Mapping[str, Any]) -> Verdict:
