@@ -11,12 +11,10 @@ from mracad.bspline.surface import Net
 from mracad.edit.target import Sheet
 from mracad.edit.tolerances import Tolerances
 from mracad.model.brep import Model
-from mracad.model.cells import quadrature
 from mracad.seam.conditions import doubled, matched
 from mracad.seam.conditions import rows as seam_rows
 from mracad.seam.contact import Contact, Rows
 from mracad.seam.contact import rows as contact_rows
-from mracad.seam.energy import forms
 from mracad.seam.guide import Led, led
 from mracad.seam.interface import Joints, away, contact, mended_ends, rims, twists
 from mracad.seam.metric import seen
@@ -152,7 +150,7 @@ def pose(
     spaces, contacts = {}, [contact(seam) for seam in joined.loose]
     for i, net in nets.items():
         sheet = members[i]
-        form = forms(net, sheet.metric, quadrature(net, sheet.faces), sheet.creases, sheet.stretch)
+        form = sheet.measured(net)
         points = seen(net, form)
         held, more = rims(scene.model, net, sheet.all_faces, movable, joined)
         held &= ~mended_ends(scene.model, net, i, sheet.all_faces, movable, joined, width / 2)

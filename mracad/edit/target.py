@@ -35,6 +35,9 @@ TREND, BASE = 2.5, 6.0
 DETAIL = 1e-7, 1e-6
 """Least displacement that counts as detail: the tolerance of coincidence, mm, and a share of the wavelength."""
 
+KEPT = 20_000_000
+"""Largest number of entries of forms that are kept from one step to the next: 400 MB."""
+
 ROUGHEST = 2.0
 """Bending of what a trend leaves of its surface, over that of the surface, above which it does not follow it."""
 
@@ -143,6 +146,8 @@ class Sheet:
         that oscillates around a mark would hide new waves there.
     detail : float
         Largest displacement of a control point if nothing were held, mm.
+    form : Forms, optional
+        Mass and bending of displacements of ``net``, if kept.
     """
 
     index: int
@@ -158,6 +163,13 @@ class Sheet:
     trend: Net
     base: Net
     detail: float = 0.0
+    form: Forms | None = None
+
+    def measured(self, net: Net) -> Forms:
+        """Mass and bending of displacements of the surface over the knots of a net."""
+        if net is self.net and self.form is not None:
+            return self.form
+        return forms(net, self.metric, quadrature(net, self.faces), self.creases, self.stretch)
 
     @property
     def movable(self) -> frozenset[int]:
@@ -177,12 +189,14 @@ def stiffness(wavelength: float) -> float:
 
 def sheets(model: Model, movable: Collection[int], wish: Wish) -> dict[int, Sheet]:
     """The surfaces with faces (``movable``) that an edit may move, by index."""
-    found = {}
+    found, kept = {}, 0
     for surface in model.surfaces:
         every = tuple(model.faces[i] for i in surface.faces)
         faces = tuple(face for face in every if face.index in movable)
         if faces:
-            found[surface.index] = _sheet(surface.index, surface.net, every, faces, wish)
+            sheet = _sheet(surface.index, surface.net, every, faces, wish)
+            kept += sheet.form.mass.nnz if sheet.form else 0
+            found[surface.index] = sheet if kept <= KEPT else replace(sheet, form=None)
     return found
 
 
@@ -203,7 +217,7 @@ def _sheet(index: int, origin: Net, every: tuple[Face, ...], faces: tuple[Face, 
     if not _follows(trend, net, metric, form):
         trend = net.with_poles(np.zeros_like(net.poles))
     reach = stretch.times(wish.spread * wavelength)
-    sheet = Sheet(index, origin, net, every, faces, metric, sharp, wavelength, stretch, reach, trend, base)
+    sheet = Sheet(index, origin, net, every, faces, metric, sharp, wavelength, stretch, reach, trend, base, form=form)
     alone = Problem({index: Space(net, form, depends, depends, sheet.trend.poles)})
     return replace(sheet, detail=wish.detail(alone, sheet))
 

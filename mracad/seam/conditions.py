@@ -23,6 +23,7 @@ from mracad.bspline.basis import basis
 from mracad.bspline.functions import functions
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
+from mracad.memo import kept
 from mracad.seam.border import Border
 from mracad.seam.joint import Joint
 from mracad.seam.natural import Seam
@@ -50,19 +51,25 @@ def matched(nets: Mapping[int, Net], seams: Sequence[Seam]) -> dict[int, Net]:
 
     Both sides of every seam then have the same splines along it.
     """
-    result = _elevated(nets, seams)
+    result, changed = _elevated(nets, seams), set(nets)
     for _ in nets:  # knots are passed on from seam to seam
-        wanted: dict[int, tuple[list[float], list[float]]] = {i: ([], []) for i in result}
+        wanted: dict[int, tuple[list[float], list[float]]] = {}
         for seam in seams:
+            if seam.a.surface not in changed and seam.b.surface not in changed:
+                continue
             a, b = (_inner(_along(result[border.surface], border), border) for border in (seam.a, seam.b))
+            if a == b:
+                continue
             for border, own, other in ((seam.a, a, b), (seam.b, b, a)):
                 share = np.array([*other], float)
                 missing = np.maximum(np.array([*other.values()], int) - _counts(own, share), 0)
-                wanted[border.surface][1 - border.axis].extend(_near(result, border, np.repeat(share, missing)))
-        if not any(u or v for u, v in wanted.values()):
+                more = _near(result, border, np.repeat(share, missing))
+                wanted.setdefault(border.surface, ([], []))[1 - border.axis].extend(more)
+        changed = {i for i, (u, v) in wanted.items() if u or v}
+        if not changed:
             break
-        for i, new in wanted.items():
-            both = zip(new, (result[i].u, result[i].v), strict=True)
+        for i in changed:
+            both = zip(wanted[i], (result[i].u, result[i].v), strict=True)
             result[i] = result[i].refined(*(_most(each, SAME * knots.period) for each, knots in both))
     return result
 
@@ -104,9 +111,13 @@ def _elevated(nets: Mapping[int, Net], seams: Sequence[Seam]) -> dict[int, Net]:
     """The nets, raised along seams to the highest degree of those that are joined there."""
     degrees = {(i, axis): knots.degree for i, net in nets.items() for axis, knots in enumerate((net.u, net.v))}
     sides = [[(border.surface, 1 - border.axis) for border in (seam.a, seam.b)] for seam in seams]
-    for _ in nets:
-        for pair in sides:
-            degrees |= dict.fromkeys(pair, max(degrees[each] for each in pair))
+    unequal = True
+    while unequal:
+        unequal = False
+        for one, other in sides:
+            if degrees[one] != degrees[other]:
+                degrees[one] = degrees[other] = max(degrees[one], degrees[other])
+                unequal = True
     return {i: net.over(net.u.elevated(degrees[i, 0]), net.v.elevated(degrees[i, 1])) for i, net in nets.items()}
 
 
@@ -247,17 +258,24 @@ def _plain(knots: KnotVector, column: Array, value: Array) -> tuple[Array, Array
     asked: Array = np.zeros((len(column), len(used)))
     np.add.at(asked, (np.arange(len(column))[:, None], place.reshape(column.shape)), value)
     if asked.size <= MOST_PLAIN:
-        first, local = basis(knots, knots.greville())
-        table = np.zeros((knots.count, knots.count))
-        table[np.arange(knots.count)[:, None], first[:, None] + np.arange(local.shape[1])] = local
-        plain: Array = np.linalg.solve(table, asked)
-        plain += np.linalg.solve(table, asked - table @ plain)
+        table, inverse = _collocation(knots)
+        plain: Array = inverse @ asked
+        plain += inverse @ (asked - table @ plain)
         plain[np.abs(plain) <= ROUNDING * np.abs(plain).max(initial=0.0)] = 0.0
         same = np.abs(table @ plain - asked).max(initial=0.0) <= ROUNDING * np.abs(asked).max(initial=0.0)
         if same and np.count_nonzero(plain) < np.count_nonzero(asked):
             asked = plain
     row, place = np.nonzero(asked)
     return row, used[place], asked[row, place]
+
+
+@kept(64)
+def _collocation(knots: KnotVector) -> tuple[Array, Array]:
+    """The functions at the Greville points, ``(n, n)``, and the inverse of this matrix."""
+    first, local = basis(knots, knots.greville())
+    table = np.zeros((knots.count, knots.count))
+    table[np.arange(knots.count)[:, None], first[:, None] + np.arange(local.shape[1])] = local
+    return table, np.linalg.inv(table)
 
 
 def _terms(joint: Joint, order: int, share: Array, breaks: Array, sides: Sequence[Any]) -> tuple[Array, Array]:

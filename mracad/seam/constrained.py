@@ -48,18 +48,21 @@ class Constrained:
         from scipy.sparse import block_array, diags_array, eye_array
 
         self.free, self.size = np.flatnonzero(free), len(free)
-        form = form.tocsr() if free.all() else form.tocsr()[self.free][:, self.free]
+        form = part(form.tocsr(), self.free)
         diagonal = form.diagonal()
         self.scale = 1.0 / np.sqrt(diagonal + LEAST * diagonal.max(initial=0.0) + 1e-300)
-        scaling = diags_array(self.scale)
-        self.form = _scaled(form, self.scale)
-        whole, some = _lengths(rows), _lengths(rows.tocsr()[:, self.free])
-        rows = (rows.tocsr()[:, self.free] @ scaling).tocsr()
-        length = _lengths(rows)
-        self.there = np.flatnonzero((length > 0) & (some > HELD * whole))
-        self.length = length[self.there]
-        self.rows = (diags_array(1.0 / self.length) @ rows[self.there]).tocsr()
-        count = self.rows.shape[0]
+        self.form = scaled(form, self.scale)
+        count = rows.shape[0]
+        if count:
+            rows = rows.tocsr()
+            whole, rows = lengths(rows), rows[:, self.free]
+            some, rows = lengths(rows), (rows @ diags_array(self.scale)).tocsr()
+            length = lengths(rows)
+            self.there = np.flatnonzero((length > 0) & (some > HELD * whole))
+            self.length, count = length[self.there], len(self.there)
+            self.rows = (diags_array(1.0 / self.length) @ rows[self.there]).tocsr()
+        else:
+            self.there, self.length, self.rows = np.arange(0), np.ones(0), rows
         self._solve = (
             nested(block_array([[self.form, self.rows.T], [self.rows, -slack * eye_array(count)]]))
             if count
@@ -87,6 +90,8 @@ class Constrained:
         ndarray (n, k)
         """
         b = self.scale[:, None] * right[self.free]
+        if not len(self.there):
+            return self._whole(self._solve(b))
         owed = np.zeros((self.rows.shape[0], right.shape[1]))
         if goal is not None:
             owed += goal[self.there] / self.length[:, None]
@@ -95,7 +100,7 @@ class Constrained:
             begun = start[self.free] / self.scale[:, None]
             owed, size = owed - self.rows @ begun, float(np.abs(begun).max(initial=0.0))
         x, y = np.zeros_like(b), np.zeros_like(owed)
-        most = (MOST if exactly else PASSES) if len(y) else 1
+        most = MOST if exactly else PASSES
         residual, lacking, missed = b, owed, np.inf
         for done in range(1, most + 1):
             step = self._solve(np.concatenate([residual, lacking]))
@@ -118,7 +123,33 @@ class Constrained:
         return out
 
 
-def _scaled(form: Any, scale: Array) -> Any:
+def lengths(rows: Any) -> Array:
+    """Euclidean norms of the rows of a ``scipy.sparse.csr_array``."""
+    row = np.repeat(np.arange(rows.shape[0]), np.diff(rows.indptr))
+    return np.asarray(np.sqrt(np.bincount(row, rows.data * rows.data, rows.shape[0])))
+
+
+def part(form: Any, points: Array) -> Any:
+    """Some rows and the same columns of a ``scipy.sparse.csr_array``."""
+    if len(points) == form.shape[1]:
+        return form
+    form = form[points]
+    place = np.full(form.shape[1], -1, np.int32)
+    place[points] = np.arange(len(points))
+    column = place[form.indices]
+    return taken(form, column >= 0, column, len(points))
+
+
+def taken(form: Any, which: Array, columns: Array | None = None, width: int | None = None) -> Any:
+    """Some entries of a matrix, moved to other columns if given."""
+    from scipy.sparse import csr_array
+
+    ends = np.append(0, np.cumsum(which))[form.indptr].astype(np.int32)
+    columns = form.indices if columns is None else columns
+    return csr_array((form.data[which], columns[which], ends), shape=(form.shape[0], width or form.shape[1]))
+
+
+def scaled(form: Any, scale: Array) -> Any:
     """A matrix scaled from both sides, with :data:`LEAST` added to its diagonal."""
     from scipy.sparse import csr_array, eye_array
 
@@ -132,8 +163,3 @@ def _scaled(form: Any, scale: Array) -> Any:
         return (scaled + LEAST * eye_array(len(scale))).tocsr()
     data[own] += LEAST
     return scaled
-
-
-def _lengths(rows: Any) -> Array:
-    """Euclidean norms of the rows of a sparse matrix."""
-    return np.asarray(np.sqrt(np.asarray(rows.multiply(rows).sum(axis=1)).ravel()))

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from mracad.seam.constrained import LEAST, MET, MOST
+from mracad.seam.constrained import LEAST, MET, MOST, lengths, part, scaled, taken
 from mracad.seam.factor import Definite
 from mracad.seam.strips import Division, Layout, coloured
 
@@ -123,14 +123,14 @@ class Divided:
         division: Division,
         left: float = LEFT,
     ) -> None:
-        from scipy.sparse import csr_array, diags_array, vstack
+        from scipy.sparse import diags_array, vstack
 
         layout, strips = division.layout, division.strips
         self.size, self.left = len(free), left
         diagonal = diagonal if soft is None else diagonal + soft.diagonal()
         self.scale = free / np.sqrt(diagonal + LEAST * diagonal[free].max(initial=0.0) + 1e-300)
         rows = (rows @ diags_array(self.scale)).tocsr()
-        length = np.sqrt(np.asarray(rows.multiply(rows).sum(axis=1)).ravel())
+        length = lengths(rows)
         self.there = np.flatnonzero(length > 0)
         self.length = length[self.there]
         self.rows = (diags_array(1.0 / self.length) @ rows[self.there]).tocsr()
@@ -145,15 +145,11 @@ class Divided:
         tied_form, making = [], _Strips(strips, layout, self.rows, self.tied)
         for form, begin, end in zip(forms, layout.ends[:-1], layout.ends[1:], strict=True):
             own = slice(begin, end)
-            scale = self.scale[own]
-            form = (form if soft is None else form + soft[own, own]).tocsr()
-            row = np.repeat(np.arange(end - begin), np.diff(form.indptr))
-            data = form.data * scale[row] * scale[form.indices] + LEAST * (row == form.indices)
-            form = csr_array((data, form.indices, form.indptr), shape=form.shape)
+            form = scaled((form if soft is None else form + soft[own, own]).tocsr(), self.scale[own])
             inside, bound, other = (
                 np.flatnonzero(each) for each in (free[own] & ~tied[own], tied[own], near[own] & ~tied[own])
             )
-            self.insides.append((begin + inside, Definite(_part(form, inside))))
+            self.insides.append((begin + inside, Definite(part(form, inside))))
             firm = _widened(form[bound], own, self.size)
             tied_form.append(firm if apart is None else (firm + apart[begin + bound]).tocsr())
             making.add(begin + other, _widened(form[other], own, self.size), begin + bound, tied_form[-1])
@@ -303,8 +299,8 @@ class _Strips:
         self.place[points] = np.arange(len(points))
         column = self.place[form.indices]
         self.place[points] = -1
-        own = _taken(form, column >= 0, column, len(points))
-        return _Strip(points, _taken(form, column < 0), self.pull[points], Definite(own))
+        own = taken(form, column >= 0, column, len(points))
+        return _Strip(points, taken(form, column < 0), self.pull[points], Definite(own))
 
     def done(self) -> tuple[Array, list[_Colour]]:
         """The points about strips, and the strips by colour."""
@@ -313,24 +309,6 @@ class _Strips:
         conditions = [np.unique(self.made[i].rows.indices) for i in range(len(self.strips))]
         colours = coloured(self.strips, conditions, len(self.owner))
         return about, [_Colour.of([self.made.pop(i) for i in those], self.place, len(about)) for those in colours]
-
-
-def _part(form: Any, points: Array) -> Any:
-    """Some rows and the same columns of a matrix."""
-    form = form[points]
-    place = np.full(form.shape[1], -1, np.int32)
-    place[points] = np.arange(len(points))
-    column = place[form.indices]
-    return _taken(form, column >= 0, column, len(points))
-
-
-def _taken(form: Any, which: Array, columns: Array | None = None, width: int | None = None) -> Any:
-    """Some entries of a matrix, moved to other columns if given."""
-    from scipy.sparse import csr_array
-
-    ends = np.append(0, np.cumsum(which))[form.indptr].astype(np.int32)
-    columns = form.indices if columns is None else columns
-    return csr_array((form.data[which], columns[which], ends), shape=(form.shape[0], width or form.shape[1]))
 
 
 def _widened(form: Any, own: slice, size: int) -> Any:

@@ -6,8 +6,10 @@ contacts along trim curves; every other edge is a rim.  A seam keeps the continu
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -78,19 +80,19 @@ class Joints:
     zones: tuple[Zone, ...] = ()
     slides: tuple[Slide, ...] = ()
 
-    @property
+    @cached_property
     def moving(self) -> frozenset[int]:
         """Edges that move."""
         exact = (edge for seam in self.exact for edge in (seam.edge, seam.twin))
         loose = (edge for seam in self.loose for edge in (seam.edge, seam.twin))
         return self.open.union(self.closing, exact, loose, (slide.edge for slide in self.slides))
 
-    @property
+    @cached_property
     def orders(self) -> dict[int, int]:
         """Derivatives that edges keep with their other side, where they stay."""
         return {edge: meeting.order for edge, meeting in self.meetings.items()}
 
-    @property
+    @cached_property
     def mended(self) -> tuple[Seam | TrimmedSeam, ...]:
         """Seams whose gap or angle is mended."""
         exact = (seam for seam in self.exact if seam.joint.close or seam.joint.fit)
@@ -109,9 +111,20 @@ class Joints:
 
     def among(self, surfaces: Collection[int]) -> Joints:
         """The joints between some surfaces; edges to all others are rims."""
-        exact = tuple(s for s in self.exact if s.a.surface in surfaces and s.b.surface in surfaces)
-        loose = tuple(s for s in self.loose if s.a.surface in surfaces and s.b.surface in surfaces)
-        return replace(self, exact=exact, loose=loose)
+        members, count = frozenset(surfaces), len(self.exact)
+        kept = sorted({k for i in members for k, other in self._beside.get(i, ()) if other in members})
+        first = bisect_left(kept, count)
+        exact, loose = (self.exact[k] for k in kept[:first]), (self.loose[k - count] for k in kept[first:])
+        return replace(self, exact=tuple(exact), loose=tuple(loose))
+
+    @cached_property
+    def _beside(self) -> dict[int, list[tuple[int, int]]]:
+        """The place of each seam of a surface among all, and the surface beyond it."""
+        found: dict[int, list[tuple[int, int]]] = {}
+        for k, (a, b) in enumerate(self.pairs()):
+            found.setdefault(a, []).append((k, b))
+            found.setdefault(b, []).append((k, a))
+        return found
 
 
 def joints(model: Model, movable: Collection[int], wishes: Wishes) -> Joints:

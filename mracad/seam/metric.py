@@ -48,7 +48,7 @@ def seen(net: Net, masses: Forms) -> Array:
     us, vs = net.u.greville(), net.v.greville()
     area = np.linalg.norm(cross(net.tangents(us, vs, 0), net.tangents(us, vs, 1)), axis=-1)
     area = np.minimum(area, np.median(area))  # unusually large areas say little about the function
-    whole = np.multiply.outer(*(gram(knots).toarray().diagonal() for knots in (net.u, net.v))) * area
+    whole = np.multiply.outer(*(gram(knots).diagonal() for knots in (net.u, net.v))) * area
     mass = masses.mass.diagonal().reshape(whole.shape)
     return np.asarray((mass > BARELY * whole) & (mass > 0))
 

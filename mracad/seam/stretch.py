@@ -14,7 +14,7 @@ w / 4 …; the first of these that hardly turns within w / 2π shows the shape a
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
 
@@ -22,7 +22,6 @@ import numpy as np
 
 from mracad.bspline.jets import jets
 from mracad.bspline.surface import Net
-from mracad.bspline.vectors import cross
 from mracad.wavelet.project import at_scale
 
 Array = np.ndarray
@@ -90,10 +89,10 @@ class Limit:
         left = np.ones(p.shape, bool)
         for length, net in self.looks:
             every = jets(net, u, v, np.ones((u.size, v.size), bool), net.poles.mean(axis=(0, 1)), 2)
-            xu, xv, *second = np.moveaxis(every.reshape(6, 3, v.size, u.size).swapaxes(2, 3), 1, -1)[1:]
-            normal = cross(xu, xv)
-            normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-300)
-            a, b, c = ((normal * each).sum(axis=-1) for each in second)
+            xu, xv, *second = every.reshape(6, 3, v.size, u.size)[1:]
+            normal = xu[1] * xv[2] - xu[2] * xv[1], xu[2] * xv[0] - xu[0] * xv[2], xu[0] * xv[1] - xu[1] * xv[0]
+            size = np.maximum(np.sqrt(_dot(normal, normal)), 1e-300)
+            a, b, c = (np.ascontiguousarray((_dot(normal, each) / size).T) for each in second)
             now = p * p * a, p * (q * a + r * b), q * q * a + 2 * q * r * b + r * r * c
             found = np.where(left, now, found)
             mean, half = _halves(now)
@@ -156,10 +155,11 @@ class Stretch:
             return root
         bent = self.limit.shape(u, v, frame)
         scale = self.limit.length / THETA
-        inverse, limit = _power(root, lambda x: x**-4.0), _power(bent, lambda x: (scale * x) ** 4)
+        inverse = root if self.even else _power(root, lambda x: 1.0 / _fourth(x))
+        limit = _power(bent, lambda x: _fourth(scale * x))
         a, b, c = (one + other for one, other in zip(inverse, limit, strict=True))
         least = max(self.lengths) ** -4.0  # rounding must not make a large sum smaller than its first term
-        return _power((a, b, c), lambda x: np.maximum(x, least) ** -0.25)
+        return _power((a, b, c), lambda x: 1.0 / np.sqrt(np.sqrt(np.maximum(x, least))))
 
 
 EVEN = Stretch()
@@ -189,6 +189,14 @@ def _halves(form: Form) -> tuple[Array, Array]:
     """Half the sum and half the difference of the eigenvalues of a form."""
     a, b, c = form
     return (a + c) / 2, np.hypot((a - c) / 2, b)
+
+
+def _dot(a: Sequence[Array] | Array, b: Sequence[Array] | Array) -> Array:
+    return np.asarray(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
+
+
+def _fourth(x: Array) -> Array:
+    return np.asarray((x * x) * (x * x))
 
 
 def _power(form: Form, of: Callable[[Array], Array]) -> Form:
