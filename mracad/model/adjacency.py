@@ -57,7 +57,7 @@ def coinciding(model: Model, gap: float = GAP) -> list[tuple[Edge, Edge, tuple[S
     free = [e for e in model.edges if e.free and len(e.points) > 1]
     found: dict[tuple[int, int], tuple[Edge, Edge, tuple[Side, Side]]] = {}
     space = np.array([model.spaces[e.part] if model.spaces else 0 for e in free])
-    for i, j in _candidates(model, free, gap, lambda i: space == space[i]):
+    for i, j in _candidates(model, free, gap, lambda those, i: space[those] == space[i]):
         edge, other = free[i], free[j]
         if (j, i) in found:
             continue
@@ -80,7 +80,7 @@ def touching(model: Model) -> frozenset[int]:
     stands = np.array([(model.spaces[edge.part], number) for edge, number, _ in free]).reshape(-1, 2)
     placed = [edge for _, _, edge in free]
     found: set[int] = set()
-    for i, j in _candidates(model, placed, GAP, lambda i: (stands != stands[i]).any(axis=1), alike=True):
+    for i, j in _candidates(model, placed, GAP, lambda those, i: (stands[those] != stands[i]).any(axis=1), alike=True):
         if placed[i].index not in found or placed[j].index not in found:
             off, _ = _carried(placed[i].points, placed[j])
             if np.linalg.norm(off, axis=1).max() <= reach(model, placed[i], placed[j]):
@@ -95,7 +95,7 @@ def _placed(edge: Edge, frame: Array) -> Edge:
 
 
 def _candidates(
-    model: Model, free: list[Edge], gap: float, eligible: Callable[[int], Array], alike: bool = False
+    model: Model, free: list[Edge], gap: float, eligible: Callable[[Array, int], Array], alike: bool = False
 ) -> Iterator[tuple[int, int]]:
     """Pairs (i, j) of edges where j is among those ``eligible`` for i, of different faces (or ``alike``), and ends and
     middle of i are near points of j."""
@@ -107,14 +107,40 @@ def _candidates(
     low = np.array([line.min(axis=0) for line in lines]) - steps[:, None]
     high = np.array([line.max(axis=0) for line in lines]) + steps[:, None]
     face = np.array([e.sides[0].face for e in free])
+    boxes = _Boxes(low, high)
     for i, line in enumerate(lines):
         probes = line[[0, len(line) // 2, -1]]
-        inside = ((probes >= low[:, None]) & (probes <= high[:, None])).all(axis=(1, 2))
-        inside &= eligible(i)
-        for j in np.flatnonzero(inside if alike else inside & (face != face[i])):
+        inside = boxes.around(probes)
+        inside = inside[eligible(inside, i)]
+        for j in inside if alike else inside[face[inside] != face[i]]:
             apart = np.linalg.norm(probes[:, None] - lines[j], axis=2).min(axis=1)
             if (apart <= steps[j]).all():
                 yield i, int(j)
+
+
+class _Boxes:
+    """Boxes, from which those around points are found: sorted by their lower ends, those of a size together."""
+
+    def __init__(self, low: Array, high: Array) -> None:
+        self.low, self.high = low, high
+        self.axis = int(np.ptp(low, axis=0).argmax())
+        size = (high - low)[:, self.axis]
+        kind = np.ceil(np.log2(np.maximum(size / size.max(initial=1e-300), 1e-9)))
+        self.kinds: list[tuple[float, Array, Array]] = []
+        for each in np.unique(kind):
+            of = np.flatnonzero(kind == each)
+            of = of[np.argsort(low[of, self.axis], kind="stable")]
+            self.kinds.append((float(size[of].max()) * (1 + 1e-9), of, low[of, self.axis]))
+
+    def around(self, points: Array) -> Array:
+        """Indices of the boxes with all of some points inside, ascending."""
+        at, found = points[:, self.axis], []
+        first, last = float(at.min()), float(at.max())
+        for size, order, low in self.kinds:
+            begin = np.searchsorted(low, last - size - 1e-9 * abs(last))
+            near = order[begin : np.searchsorted(low, first, side="right")]
+            found.append(near[((points >= self.low[near][:, None]) & (points <= self.high[near][:, None])).all((1, 2))])
+        return np.sort(np.concatenate(found))
 
 
 def length(edge: Edge) -> float:

@@ -273,9 +273,16 @@ class _Strips:
         from scipy.sparse import csr_array, vstack
 
         surface = len(self.forms)
-        penalty = PENALTY * (self.pull[tied] @ self.rows)
+        pull = self.pull[tied]
+        own, there = np.unique(pull.indices, return_inverse=True)
+        rows = self.rows[own]
+        points_of, place = np.unique(rows.indices, return_inverse=True)  # few columns: products take memory for each
+        pull = csr_array((pull.data, there, pull.indptr), shape=(len(tied), len(own)))
+        rows = csr_array((rows.data, place, rows.indptr), shape=(len(own), len(points_of)))
+        penalty = PENALTY * (pull @ rows)
         penalty.sort_indices()
-        penalty = csr_array((penalty.data, self.tied[penalty.indices], penalty.indptr), shape=tied_form.shape)
+        joined = self.tied[points_of][penalty.indices]
+        penalty = csr_array((penalty.data, joined, penalty.indptr), shape=tied_form.shape)
         self.forms[surface] = vstack([form, tied_form + penalty], format="csr")
         self.reached[self.forms[surface].indices] = True
         self.row[np.concatenate([points, tied])] = np.arange(len(points) + len(tied))

@@ -225,11 +225,8 @@ def _unsewn(
 def _twin(model: Model, edge: Edge, face: int) -> Edge | None:
     """The free edge of a face that coincides as a whole with another free edge, which lies on one of that face."""
     own = length(edge)
-    others = [
-        other
-        for other in model.edges
-        if other.free and other.sides[0].face == face and abs(length(other) - own) <= WHOLE * own
-    ]
+    around = (model.edges[index] for index in sorted({trim.edge for trim in model.faces[face].trims}))
+    others = [other for other in around if other.free and abs(length(other) - own) <= WHOLE * own]
     nearest = min(others, key=lambda other: apart(model, edge, other), default=None)
     return nearest if nearest and apart(model, edge, nearest) <= reach(model, edge, nearest) else None
 
