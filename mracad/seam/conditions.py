@@ -121,11 +121,17 @@ def _elevated(nets: Mapping[int, Net], seams: Sequence[Seam]) -> dict[int, Net]:
     return {i: net.over(net.u.elevated(degrees[i, 0]), net.v.elevated(degrees[i, 1])) for i, net in nets.items()}
 
 
-def _inner(knots: KnotVector, border: Border) -> dict[float, int]:
+def _inner(knots: KnotVector, border: Border) -> Mapping[float, int]:
     """Fractions of the knots along a seam, and their multiplicities."""
+    return _between(knots, border.start, border.stop)
+
+
+@kept(1024)
+def _between(knots: KnotVector, start: float, stop: float) -> Mapping[float, int]:
+    """Fractions of the knots between two parameters, and their multiplicities; seams often share their knots."""
     breaks, counts = knots.repeated()
     counts = np.minimum(counts, knots.degree)  # an end of a surface may lie inside a seam
-    share = (breaks - border.start) / (border.stop - border.start)
+    share = (breaks - start) / (stop - start)
     order = np.argsort(share)
     return {float(x): int(n) for x, n in zip(share[order], counts[order], strict=True) if SAME < x < 1 - SAME}
 
@@ -188,21 +194,26 @@ def rows(
     from scipy.sparse import csr_array
 
     first, total = laid_out(nets)
-    implied = _implied(seams)
+    implied: dict[int, list[int]] = {}
+    for number, end in _implied(seams):
+        implied.setdefault(number, []).append(end)
     spaces = coarse or {i: (net.u, net.v) for i, net in nets.items()}
     entries: list[tuple[Array, Array, Array]] = [(np.empty(0, int), np.empty(0, int), np.empty(0))]
     count, mended = 0, [np.empty(0, bool)]
     for number, seam in enumerate(seams):
+        asked: KnotVector | None = None
         for order in range(seam.joint.order + 1):
             knots = _asked(spaces, seam, order if everywhere else 0)
-            share = knots.greville()
-            sides = [(_sided(nets[b.surface], b, share), first[b.surface]) for b in (seam.b, seam.a)]
+            if knots != asked:
+                asked, share = knots, knots.greville()
+                sides = [(_sided(nets[b.surface], b, share), first[b.surface]) for b in (seam.b, seam.a)]
             column = np.concatenate([begin + index for (index, _), begin in sides], axis=1)
             value = np.concatenate(_terms(seam.joint, order, share, knots.breaks, sides), axis=1)
             row, column, value = _plain(knots, column, value)
             if order == 1:
-                asked = ~np.isin(row, [len(share) - 1 if end else 0 for k, end in implied if k == number])
-                row, column, value = row[asked], column[asked], value[asked]
+                ends = [len(share) - 1 if end else 0 for end in implied.get(number, ())]
+                more = ~np.isin(row, ends)
+                row, column, value = row[more], column[more], value[more]
             entries.append((count + row, column, value))
             mended.append(np.full(len(share), (seam.joint.close, seam.joint.fit, False)[order]))
             count += len(share)
@@ -295,13 +306,17 @@ def _asked(spaces: Mapping[int, tuple[KnotVector, KnotVector]], seam: Seam, orde
     For an order above 0, the space in which the condition of that order lies.
     """
     more, lost = (order * max(seam.joint.across.degree, 0), _lost(seam.joint)) if order else (0, 0)
-    found = []
-    for border in (seam.a, seam.b):
-        knots = spaces[border.surface][1 - border.axis]
-        degree, inner = knots.degree + more, _inner(knots, border)
-        counts = [degree + 1, *(min(n + more + lost, degree) for n in inner.values()), degree + 1]
-        found.append(KnotVector.from_multiplicities([0.0, *inner, 1.0], counts, degree))
-    return max(found, key=lambda each: each.count)
+    both = (_fractions(spaces[b.surface][1 - b.axis], b.start, b.stop, more, lost) for b in (seam.a, seam.b))
+    return max(both, key=lambda each: each.count)
+
+
+@kept(1024)
+def _fractions(knots: KnotVector, start: float, stop: float, more: int, lost: int) -> KnotVector:
+    """The knots between two parameters as fractions, of a degree higher by ``more``, and with ``lost`` derivatives less
+    than that leaves."""
+    inner, degree = _between(knots, start, stop), knots.degree + more
+    counts = [degree + 1, *(min(n + more + lost, degree) for n in inner.values()), degree + 1]
+    return KnotVector.from_multiplicities([0.0, *inner, 1.0], counts, degree)
 
 
 def _sided(net: Net, border: Border, share: Array) -> tuple[Array, dict[str, Array]]:

@@ -151,8 +151,11 @@ def seams(model: Model, movable: Collection[int], wishes: Wishes) -> Seams:
     result = Seams(meetings=_meetings(model, wishes, every))
     for edge in own:
         _sort(result, edge, _still(edge, wishes) or _seam(result, model, movable, wishes, (edge, edge), edge.sides))
+    free: dict[int, list[Edge]] = {}
+    for edge in (each for each in model.edges if each.free and unsewn):
+        free.setdefault(edge.sides[0].face, []).append(edge)
     for edge, _, sides in unsewn:
-        _unsewn(result, model, movable, wishes, edge, sides)
+        _unsewn(result, model, movable, wishes, edge, sides, free[sides[1].face])
     for edge, other, sides in unsewn:
         _bound(result, (edge.index, other.index), _fixed(model, movable, sides) or Cause(Still.PART))
     _bound(result, touching(model), Cause(Still.ELSEWHERE))
@@ -204,10 +207,16 @@ def _sort(result: Seams, edge: Edge, seam: Seam | Cause | tuple[Border, Border])
 
 
 def _unsewn(
-    result: Seams, model: Model, movable: Collection[int], wishes: Wishes, edge: Edge, sides: tuple[Side, Side]
+    result: Seams,
+    model: Model,
+    movable: Collection[int],
+    wishes: Wishes,
+    edge: Edge,
+    sides: tuple[Side, Side],
+    free: Sequence[Edge],
 ) -> None:
-    """Treat a free edge that coincides with one of another face."""
-    other = _twin(model, edge, sides[1].face)
+    """Treat a free edge that coincides with one of another face, given the free edges of that."""
+    other = _twin(model, edge, free)
     if edge.index not in result.frozen or (other and other.index not in result.frozen):
         return
     if other is None:
@@ -222,11 +231,10 @@ def _unsewn(
         _sort(result, edge, seam)
 
 
-def _twin(model: Model, edge: Edge, face: int) -> Edge | None:
-    """The free edge of a face that coincides as a whole with another free edge, which lies on one of that face."""
+def _twin(model: Model, edge: Edge, free: Sequence[Edge]) -> Edge | None:
+    """The one of the free edges of a face that coincides as a whole with another free edge."""
     own = length(edge)
-    around = (model.edges[index] for index in sorted({trim.edge for trim in model.faces[face].trims}))
-    others = [other for other in around if other.free and abs(length(other) - own) <= WHOLE * own]
+    others = [other for other in free if abs(length(other) - own) <= WHOLE * own]
     nearest = min(others, key=lambda other: apart(model, edge, other), default=None)
     return nearest if nearest and apart(model, edge, nearest) <= reach(model, edge, nearest) else None
 
