@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+from itertools import product
+
 import numpy as np
 from OCP.BRep import BRep_Tool
 from OCP.BRepBuilderAPI import BRepBuilderAPI_Copy
@@ -57,6 +60,9 @@ def diagonal(document: Document, model: Model) -> float:
         fitted |= outermost
 
 
+_CORNERS = np.array(list(product((0, 1), repeat=3)))  # low (0) or high (1) on each axis
+
+
 class _Fitter:
     """Fits boxes to faces."""
 
@@ -67,6 +73,11 @@ class _Fitter:
             for side in edge.sides:
                 self.edges.setdefault(side.face, set()).add(edge.index)
 
+    @cached_property
+    def rims(self) -> list[Array]:
+        """The box of each edge."""
+        return rims(self.model.edges)
+
     def fitted(self, face: Face, slack: float = 0.0) -> Array:
         """The box of a face in its part's frame, which may miss ``slack``."""
         shape = self.shapes[face.index]
@@ -75,7 +86,7 @@ class _Fitter:
         if face.surface is None and face.kind != "extrusion":
             return _meshed(shape, max(slack, COARSE * float(np.linalg.norm(face.box[1] - face.box[0]))), face.box)
         corners = np.array([BRep_Tool.Pnt_s(TopoDS.Vertex_s(v)).Coord() for v in inside(shape, TopAbs_VERTEX)])
-        own = rims([self.model.edges[k] for k in sorted(self.edges.get(face.index, ()))])
+        own = [self.rims[k] for k in sorted(self.edges.get(face.index, ()))]
         every = np.concatenate([*own, corners.reshape(-1, 3)])
         rim = np.array([every.min(axis=0), every.max(axis=0)]) if len(every) else face.box
         if face.surface is None:  # parameter lines through any of its points end on the boundary
@@ -107,5 +118,4 @@ def _placed(model: Model, document: Document) -> tuple[Array, list[Array]]:
 
 def _corners(bounds: Array, frame: Array) -> Array:
     """The eight corners of a box, placed."""
-    each = np.array([bounds[[a, b, c], [0, 1, 2]] for a in (0, 1) for b in (0, 1) for c in (0, 1)])
-    return placed(each, frame)
+    return placed(bounds[_CORNERS, [0, 1, 2]], frame)

@@ -7,25 +7,21 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from OCP.BRep import BRep_Tool
-from OCP.BRepAdaptor import BRepAdaptor_Curve, BRepAdaptor_Surface
 from OCP.Geom import Geom_Surface
-from OCP.Geom2d import Geom2d_Curve, Geom2d_Line
-from OCP.GeomAbs import GeomAbs_Line, GeomAbs_Plane, GeomAbs_SurfaceType
-from OCP.gp import gp_Ax3, gp_Pnt, gp_Vec
+from OCP.Geom2d import Geom2d_Curve
 from OCP.ShapeFix import ShapeFix_Edge
 from OCP.TopAbs import TopAbs_FORWARD, TopAbs_REVERSED
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS, TopoDS_Edge, TopoDS_Face
 
-from mracad.bspline.surface import Net, curvature
-from mracad.bspline.vectors import cross, unit
+from mracad.bspline.surface import Net
 from mracad.errors import FileError, UsageError
 from mracad.model.brep import Edge, Face, Model, Side, Surface, Trim
-from mracad.model.sampling import SAMPLES, shares
 from mracad.occ.boxes import diagonal
 from mracad.occ.convert import conversion
 from mracad.occ.document import Document
 from mracad.occ.geometry import basis, curves, is_nurbs, nets
+from mracad.occ.samples import NONE, Use, along, beside, parameters
 from mracad.occ.settings import quiet
 from mracad.occ.topology import box, edge_uses, matrix
 
@@ -44,19 +40,6 @@ _KINDS = {
     "Geom_OffsetSurface": "offset",
 }
 _ABSURD = 1e12  # mm: the distance of a planet
-_SPREAD = shares(SAMPLES)
-_NONE = np.empty((0, 3))
-
-
-@dataclass(eq=False)
-class _Use:
-    """An edge as one face has it: the curve in the parameter plane, over ``[first, last]``."""
-
-    face: int
-    edge: int
-    pcurve: Geom2d_Curve
-    first: float
-    last: float
 
 
 @dataclass(eq=False)
@@ -68,7 +51,7 @@ class _Found:
     frames: list[Array] = field(default_factory=list)
     surface_of: list[int | None] = field(default_factory=list)
     surfaces: dict[Geom_Surface, list[int]] = field(default_factory=dict)  # each NURBS surface and its faces
-    uses: list[_Use] = field(default_factory=list)
+    uses: list[Use] = field(default_factory=list)
 
 
 def view(document: Document, convert: Iterable[int] = (), edges: Container[int] | None = None) -> Model:
@@ -136,7 +119,10 @@ def _boxed(boxes: list[Array]) -> float:
 
 def _refuse_absurd(name: str, numbers: Iterable[tuple[int, Array | float]]) -> None:
     """Raise FileError if numbers of a face are infinite, undefined or astronomical."""
-    for face, values in numbers:
+    found = list(numbers)
+    if (np.abs(np.concatenate([np.ravel(values) for _, values in found] or [NONE.ravel()])) < _ABSURD).all():
+        return
+    for face, values in found:
         if not (np.abs(values) < _ABSURD).all():
             raise FileError(
                 f"'{name}' is damaged: #{face + 1} has coordinates or weights beyond {_ABSURD:.0e}", "export it again"
@@ -181,7 +167,7 @@ def _walk(document: Document, chosen: frozenset[int]) -> _Found:
             for position, edge in enumerate(edge_uses(face)):
                 place = part.edge_number(edge)
                 curve = replaced.pcurves[position] if replaced else pcurve(edge, face)
-                found.uses.append(_Use(index, place, curve, *BRep_Tool.Range_s(edge, face)))
+                found.uses.append(Use(index, place, curve, *BRep_Tool.Range_s(edge, face)))
     return found
 
 
@@ -207,133 +193,29 @@ def _trims(found: _Found, edges: Container[int] | None) -> dict[int, tuple[Trim,
 def _edges(document: Document, found: _Found, edges: Container[int] | None) -> Iterator[Edge]:
     """All edges, the chosen ones with samples."""
     part_of = np.repeat(np.arange(len(document.parts)), [part.edges.Extent() for part in document.parts]).tolist()
-    by_edge: list[list[_Use]] = [[] for _ in document.edges]
+    by_edge: list[list[Use]] = [[] for _ in document.edges]
     for use in found.uses:
         by_edge[use.edge].append(use)
     seen = [edges is None or index in edges for index in range(len(by_edge))]
     lost = [BRep_Tool.Degenerated_s(edge) for edge in document.edges]
-    along = [
-        _along(edge) if shown and not gone else (_NONE, _NONE)
-        for edge, shown, gone in zip(document.edges, seen, lost, strict=True)
+    lines = along([None if gone or not shown else e for e, shown, gone in zip(document.edges, seen, lost, strict=True)])
+    shown = [
+        use for use in found.uses if seen[use.edge] and not (lost[use.edge] and found.surface_of[use.face] is None)
     ]
-    fixed = [use for use in found.uses if found.surface_of[use.face] is None and seen[use.edge] and not lost[use.edge]]
-    beside = _beside(found, fixed, along)
+    places = dict(zip(shown, parameters(shown), strict=True))
+    fixed = beside(found.faces, {use: uv for use, uv in places.items() if found.surface_of[use.face] is None}, lines)
     for index, (edge, uses) in enumerate(zip(document.edges, by_edge, strict=True)):
-        points, tangents = along[index]
+        points, tangents = lines[index]
         sides = []
         for use in uses:
-            if not seen[index] or (lost[index] and found.surface_of[use.face] is None):
-                sides.append(Side(use.face, points=_NONE, normals=_NONE))
-            elif found.surface_of[use.face] is None:
-                feet, normals, bends = beside[use]
+            if use not in places:
+                sides.append(Side(use.face, points=NONE, normals=NONE))
+            elif use in fixed:
+                feet, normals, bends = fixed[use]
                 sides.append(Side(use.face, points=feet, normals=normals, curvatures=bends))
             else:
-                sides.append(Side(use.face, uv=_parameters(use)))
+                sides.append(Side(use.face, uv=places[use]))
         yield Edge(
             index, points, tangents, tuple(sides), BRep_Tool.Tolerance_s(edge), lost[index] or not seen[index],
             part_of[index],
         )  # fmt: skip
-
-
-def _along(edge: TopoDS_Edge) -> tuple[Array, Array]:
-    """Points and unit tangents along an edge."""
-    curve = BRepAdaptor_Curve(edge)
-    first, last = curve.FirstParameter(), curve.LastParameter()
-    place = first + (last - first) * _SPREAD
-    if curve.GetType() == GeomAbs_Line:
-        line = curve.Line()
-        direction = np.array(line.Direction().Coord())
-        return np.array(line.Location().Coord()) + place[:, None] * direction, np.tile(direction, (SAMPLES, 1))
-    point, tangent = gp_Pnt(), gp_Vec()
-    rows = []
-    for t in place.tolist():
-        curve.D1(t, point, tangent)
-        rows.append(point.Coord() + tangent.Coord())
-    table = np.array(rows)
-    return table[:, :3], unit(table[:, 3:])
-
-
-def _beside(
-    found: _Found, uses: list[_Use], along: list[tuple[Array, Array]]
-) -> dict[_Use, tuple[Array, Array, Array]]:
-    """Points, outward normals and curvatures across an edge of faces that do not move, by their uses."""
-    sides: dict[_Use, tuple[Array, Array, Array]] = {}
-    grounds = {face: BRepAdaptor_Surface(found.faces[face], False) for face in {use.face for use in uses}}
-    signs = {face: -1.0 if found.faces[face].Orientation() == TopAbs_REVERSED else 1.0 for face in grounds}
-    bent, jets = [], []
-    for use in uses:
-        surface = grounds[use.face]
-        if surface.GetType() == GeomAbs_Plane:
-            plane, points = surface.Plane(), along[use.edge][0]
-            origin = np.array(plane.Location().Coord())
-            normal = np.array(plane.Axis().Direction().Coord()) * signs[use.face] * (1.0 if plane.Direct() else -1.0)
-            feet = points - ((points - origin) @ normal)[:, None] * normal
-            sides[use] = feet, np.tile(normal, (SAMPLES, 1)), np.zeros(SAMPLES)
-        else:
-            bent.append(use)
-            jets.append(_jets(surface, _parameters(use)))
-    if bent:
-        feet, su, sv, *second = np.concatenate(jets).swapaxes(0, 1)
-        sign = np.repeat([signs[use.face] for use in bent], SAMPLES)
-        normals = unit(cross(su, sv))
-        tangents = np.concatenate([along[use.edge][1] for use in bent])
-        bends = sign * curvature((su, sv, *second), cross(normals, tangents))
-        split = (np.split(values, len(bent)) for values in (feet, sign[:, None] * normals, bends))
-        sides |= dict(zip(bent, zip(*split, strict=True), strict=True))
-    return sides
-
-
-def _jets(surface: BRepAdaptor_Surface, uv: Array) -> Array:
-    """Points and derivatives u, v, uu, uv, vv of a surface that is not a plane, ``(k, 6, 3)``."""
-    round_about = _profile(surface, uv[:, 1])
-    if round_about is not None:
-        position, rho, zeta = round_about
-        x, y, z = (np.array(d.Coord()) for d in (position.XDirection(), position.YDirection(), position.Direction()))
-        cos, sin = np.cos(uv[:, 0])[:, None], np.sin(uv[:, 0])[:, None]
-        out, on = cos * x + sin * y, cos * y - sin * x
-        (r, dr, ddr), (h, dh, ddh) = (each[..., None] for each in rho), (each[..., None] for each in zeta)
-        origin = np.array(position.Location().Coord())
-        jet = origin + r * out + h * z, r * on, dr * out + dh * z, -r * out, dr * on, ddr * out + ddh * z
-        return np.stack(jet, axis=1)
-    point, *derivatives = gp_Pnt(), *(gp_Vec() for _ in range(5))
-    du, dv, duu, dvv, duv = derivatives
-    rows = []
-    for u, v in uv.tolist():
-        surface.D2(u, v, point, du, dv, duu, dvv, duv)
-        rows.append(point.Coord() + du.Coord() + dv.Coord() + duu.Coord() + duv.Coord() + dvv.Coord())
-    return np.array(rows).reshape(-1, 6, 3)
-
-
-def _profile(surface: BRepAdaptor_Surface, v: Array) -> tuple[gp_Ax3, Array, Array] | None:
-    """The frame of a surface of revolution of a line or circle, and the profile's distance from the axis and height,
-    with two derivatives each, ``(3, k)``; None for other surfaces."""
-    zero, one = np.zeros_like(v), np.ones_like(v)
-    cos, sin = np.cos(v), np.sin(v)
-    match surface.GetType():
-        case GeomAbs_SurfaceType.GeomAbs_Cylinder:
-            kind = surface.Cylinder()
-            rho, zeta = (kind.Radius() * one, zero, zero), (v, one, zero)
-        case GeomAbs_SurfaceType.GeomAbs_Cone:
-            kind = surface.Cone()
-            slope, rise = np.sin(kind.SemiAngle()), np.cos(kind.SemiAngle())
-            rho, zeta = (kind.RefRadius() + slope * v, slope * one, zero), (rise * v, rise * one, zero)
-        case GeomAbs_SurfaceType.GeomAbs_Sphere:
-            kind = surface.Sphere()
-            r = kind.Radius()
-            rho, zeta = (r * cos, -r * sin, -r * cos), (r * sin, r * cos, -r * sin)
-        case GeomAbs_SurfaceType.GeomAbs_Torus:
-            kind = surface.Torus()
-            r = kind.MinorRadius()
-            rho, zeta = (kind.MajorRadius() + r * cos, -r * sin, -r * cos), (r * sin, r * cos, -r * sin)
-        case _:
-            return None
-    return kind.Position(), np.array(rho), np.array(zeta)
-
-
-def _parameters(use: _Use) -> Array:
-    """Surface parameters at the edge's samples, ``(k, 2)``."""
-    place = use.first + (use.last - use.first) * _SPREAD
-    if isinstance(use.pcurve, Geom2d_Line):
-        line = use.pcurve.Lin2d()
-        return np.array(line.Location().Coord()) + place[:, None] * np.array(line.Direction().Coord())
-    return np.array([point.Coord() for point in map(use.pcurve.Value, place.tolist())])
