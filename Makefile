@@ -23,7 +23,7 @@ export SOURCE_DATE_EPOCH ?= 0
 
 SAMPLES := $(wildcard samples/*.step)
 
-.PHONY: demo example test test-long regress random fuzz lint bench bench-batch bench-fill docs site pictures samples smooth wheel fresh man clean
+.PHONY: demo example test test-long regress random fuzz lint bench bench-batch bench-fill bench-large docs site pictures samples smooth wheel fresh man clean
 
 demo: $(VENV)/ready
 	@mkdir -p build
@@ -67,6 +67,10 @@ bench: $(VENV)/dev
 # 5 000 dimples all over a ball of six patches, to a closed mesh
 bench-fill: $(VENV)/dev
 	$(BIN)/python benchmarks/fill.py
+
+# One face of up to 515 x 515 control points: time, memory, exponents; five minutes
+bench-large: $(VENV)/dev
+	$(BIN)/python benchmarks/large.py
 
 # Batches: what workers gain, kills, a lost cluster worker; some minutes
 bench-batch: $(VENV)/dev

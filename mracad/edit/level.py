@@ -18,7 +18,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -144,32 +144,34 @@ def _of_coarse(joint: Joint) -> Joint:
 
 def projected(problem: Problem, coarse: Coarse, seams: Sequence[Seam]) -> Array:
     """δ to the coarse splines nearest to the surfaces of a problem that seams join, ``(points, 3)``."""
+    f, found = problem.split(problem.f), []
+    for i, space in problem.spaces.items():
+        level = f[i]
+        for axis, pair in enumerate(zip(coarse[i], (space.net.u, space.net.v), strict=True)):
+            level = projection(*pair).apply(level, axis)
+        found.append(level.reshape(-1, 3))
+    delta = np.concatenate(found) - problem.f
+    return np.asarray(delta + _joined(problem, coarse, seams, delta) if seams else delta)
+
+
+def _joined(problem: Problem, coarse: Coarse, seams: Sequence[Seam], change: Array) -> Array:
+    """The least correction, in the Gram matrix, by coarse splines that meets the conditions of seams, of a
+    displacement, both ``(points, 3)``."""
     from scipy.sparse import block_diag, kron
 
-    f = problem.split(problem.f)
-    refinements, grams, alone = [], [], []
+    refinements, grams = [], []
     for i, space in problem.spaces.items():
         net = space.net
         pairs = list(zip(coarse[i], (net.u, net.v), strict=True))
         refinements.append(kron(*(refinement(*pair).tocsr() for pair in pairs)))
         area = math.prod(float(arc_lengths(net, axis).sum()) / fine.period for axis, (_, fine) in enumerate(pairs))
         grams.append(area * kron(*(gram(each).tocsr() for each, _ in pairs)))
-        along_u = projection(*pairs[0]).coarse(f[i], axis=0)
-        alone.append(projection(*pairs[1]).coarse(along_u, axis=1).reshape(-1, 3))
-    p, y = block_diag(refinements, format="csr"), np.concatenate(alone)
-    if seams:
-        y = y + _joined(problem, coarse, seams, (p, block_diag(grams, format="csr"), y))
-    return np.asarray(np.asarray(p @ y) - problem.f)
-
-
-def _joined(problem: Problem, coarse: Coarse, seams: Sequence[Seam], system: tuple[Any, Any, Array]) -> Array:
-    """The least correction, in the Gram matrix, of coarse control points that meets the conditions of seams."""
-    p, form, y = system
+    p, form = block_diag(refinements, format="csr"), block_diag(grams, format="csr")
     nets = {i: space.net for i, space in problem.spaces.items()}
     conditions, mended = rows(nets, seams, coarse=coarse)
-    delta = np.where(mended[:, None], conditions @ (p @ y), conditions @ (p @ y - problem.f))
-    solve = Constrained(form, conditions @ p, np.ones(len(y), dtype=bool), LOOSE)
-    return solve(np.zeros_like(y), goal=-delta, exactly=False)
+    lacking = conditions @ change + np.where(mended[:, None], conditions @ problem.f, 0.0)
+    solve = Constrained(form, conditions @ p, np.ones(p.shape[1], dtype=bool), LOOSE)
+    return np.asarray(p @ solve(np.zeros((p.shape[1], 3)), goal=-lacking, exactly=False))
 
 
 def level(

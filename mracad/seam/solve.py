@@ -227,6 +227,8 @@ class Problem:
             pull = pull - self.soft @ kept
         if self.pull is not None:
             pull = pull + self.pull
+        if not (pull.any() or self.rows.shape[0] or self.guides):  # nothing is in the way
+            return kept
         return np.asarray(kept + self._solver(stiffness, self.free)(pull, start=kept, goal=self.goal))
 
     def response(self, rows: Any, stiffness: float) -> Array:
