@@ -3,10 +3,10 @@
 Usage: python benchmarks/seams.py [SIDE×SPANS …]
        python benchmarks/seams.py --solve [SIDE×SPANS …]
 
-Each quilt has SIDE × SIDE patches of SPANS spans each way, of 100 mm, and is smoothed at seven spans (or three and a
-half where there are but few).  In a process that has smoothed a small one, by phase: reading, viewing, the edit,
-checking and measuring in memory, writing, reading back and judging; the edit by parts; peak memory beside that of the
-kernel's own reading and writing.  From two quilts of the same spans on: the exponent of time in the number of faces.
+Each quilt has SIDE × SIDE patches of SPANS spans each way, of 100 mm, and is smoothed at seven spans.  In a process
+that has smoothed a small one, by phase: reading, viewing, the edit, checking and measuring in memory, writing, reading
+back and judging; the edit by parts; peak memory beside that of the kernel's own reading and writing.  From two quilts
+of the same spans on: the exponent of time in the number of faces.
 
 With ``--solve``: one filter of all patches in one group, beside the elimination of its whole system by SuperLU (up to
 49 patches of 57 spans: more takes 3 GB and minutes).
@@ -38,7 +38,7 @@ PARTS = {
     "joints": ["mracad.seam.interface:joints"],
     "problems": ["mracad.edit.pose:pose"],
     "solving": [f"mracad.seam.solve:Problem.{name}" for name in ("filtered", "nearest", "_factored")],
-    "judging": ["mracad.edit.watch:Watch.changes", "mracad.edit.watch:Watch.still"],
+    "judging": ["mracad.edit.watch:Tried.changes", "mracad.inspect.survey:surveys"],
 }
 """Functions of the edit whose time, without that of each other, is shown."""
 
@@ -46,7 +46,7 @@ PARTS = {
 def quilt(name: str) -> tuple[int, int, str]:
     """Patches along a side, spans and scale."""
     side, spans = map(int, re.split("[x×]", name))
-    return side, spans, f"{(3.5 if spans < FEW else 7.0) * SIZE / spans:.3g}mm"
+    return side, spans, f"{7 * SIZE / spans:.3g}mm"
 
 
 def peak() -> float:
