@@ -9,6 +9,7 @@ from functools import partial
 from typing import BinaryIO
 
 from mracad.api.speech import speaking
+from mracad.api.threads import one_thread
 from mracad.errors import UsageError
 from mracad.formats import FORMATS, by_extension
 from mracad.job.document import Report
@@ -100,7 +101,8 @@ class Document(kernel.Document):
         return self.origin() if self.origin else self
 
     def _write(self, wanted: Target, target: str | os.PathLike[str] | BinaryIO) -> Written:
-        made = produce(self, self.original, self.steps, [wanted], done=self.reports)
+        with one_thread():
+            made = produce(self, self.original, self.steps, [wanted], done=self.reports)
         if made.document is not self:
             self.changed()
             vars(self).update(vars(made.document))

@@ -11,6 +11,7 @@ from mracad.api.past import remember
 from mracad.api.progress import shown
 from mracad.api.speech import explained, speaking
 from mracad.api.things import opened
+from mracad.api.threads import one_thread
 from mracad.api.values import bound, chosen, described, parameters
 from mracad.job.document import Report, play
 from mracad.output import put
@@ -44,7 +45,8 @@ def edit(use: str) -> Callable[..., Any]:
             tell("reading", 0, 1)
             whole = opened(thing, change=True)
             step = Step(use, use, chosen(STEPS[use], given, whole))
-            (report,) = play(whole.document, [step], progress=tell)
+            with one_thread():
+                (report,) = play(whole.document, [step], progress=tell)
             assert isinstance(report, Report)
             if details is not None:
                 _save(report, step, details)

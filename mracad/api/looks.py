@@ -12,6 +12,7 @@ import numpy as np
 from mracad.api.progress import Progress, shown
 from mracad.api.speech import speaking
 from mracad.api.things import Source, opened
+from mracad.api.threads import one_thread
 from mracad.api.values import bound, chosen, described, parameters
 from mracad.errors import UsageError
 from mracad.spec.pictures import Picture
@@ -41,7 +42,7 @@ def _declared(
         @wraps(function)
         def call(*things: Any, **given: Any) -> Any:
             bound(function.__name__, taken, given, *things)
-            with speaking(), shown(given.pop("progress", None)) as tell:
+            with speaking(), one_thread(), shown(given.pop("progress", None)) as tell:
                 return function(*things, given, tell)
 
         call.__doc__ = cleandoc(function.__doc__ or "").replace("{options}", described(struct, own))

@@ -171,7 +171,7 @@ class _Worker:
     def __init__(self) -> None:
         environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
         for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
-            environment.setdefault(name, "1")  # as in a single command: results must not depend on the number of cores
+            environment[name] = "1"  # as in a single command: results must not depend on the number of cores
         with tempfile.TemporaryFile() as page:
             page.truncate(mmap.PAGESIZE)
             self.note = Note(page.fileno())

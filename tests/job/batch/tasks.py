@@ -30,6 +30,10 @@ def hold(count: int) -> None:
     assert held
 
 
+def threads() -> str:
+    return os.environ["OPENBLAS_NUM_THREADS"]
+
+
 def hang() -> None:
     time.sleep(60)
 
