@@ -28,7 +28,7 @@ class _Front:
     later : ndarray (m,) of int
         Unknowns eliminated later on which they depend.
     square : ndarray (k, k)
-        L of their own.
+        L of their own, in the lower triangle.
     below : ndarray (m, k)
         L of the later ones.
     """
@@ -79,25 +79,29 @@ class Fronts:
             marked[begin:end] = False
             later = np.flatnonzero(marked[end:]) + end
             marked[later] = False
-            count = len(own)
+            count, rest = len(own), len(later)
             local[begin:end] = np.arange(count)
-            local[later] = np.arange(count, count + len(later))
-            front = np.zeros((count + len(later), count + len(later)), order="F")
-            line = np.repeat(np.arange(count), np.diff(upper.indptr[begin : end + 1]))
-            front[local[column], line] = upper.data[entries]
+            local[later] = np.arange(count, count + rest)
+            square, below, left = (
+                np.zeros(shape, order="F") for shape in ((count, count), (rest, count), (rest, rest))
+            )
+            line, value, at = (
+                np.repeat(np.arange(count), np.diff(upper.indptr[begin : end + 1])),
+                upper.data[entries],
+                local[column],
+            )
+            inside = at < count
+            square[at[inside], line[inside]] = value[inside]
+            below[at[~inside] - count, line[~inside]] = value[~inside]
             while given:
-                rest, left = given.pop()
-                at = local[rest]
-                front.T[at[:, None], at] += left.T
-            square, failed = dpotrf(front[:count, :count], lower=1, clean=1)
+                _joined((square, below, left), local, *given.pop())
+            square, failed = dpotrf(square, lower=1, clean=0, overwrite_a=1)
             if failed:
                 raise np.linalg.LinAlgError("the matrix is not positive definite")
-            below = dtrsm(1.0, square, front[count:, :count], side=1, lower=1, trans_a=1)
-            if len(later):
-                left = dsyrk(-1.0, below, beta=1.0, c=front[count:, count:], lower=1)
-                waiting.append((later, left))
-            else:
-                waiting.append((later, np.zeros((0, 0))))
+            if rest:
+                below = dtrsm(1.0, square, below, side=1, lower=1, trans_a=1, overwrite_b=1)
+                left = dsyrk(-1.0, below, beta=1.0, c=left, lower=1, overwrite_c=1)
+            waiting.append((later, left))
             self._fronts.append(_Front(slice(begin, end), later, square, below))
 
     def __call__(self, right: Array) -> Array:
@@ -114,6 +118,23 @@ class Fronts:
         found = np.empty_like(right)
         found[self._order] = x
         return found
+
+
+def _joined(front: tuple[Array, Array, Array], local: Array, later: Array, left: Array) -> None:
+    """Add what a front left to the lower triangle of another one, in runs of neighbouring unknowns."""
+    square, below, rest = front
+    at, count = local[later], len(square)
+    steps = np.flatnonzero((np.diff(at) != 1) | (at[1:] == count)) + 1
+    runs = list(zip([0, *steps.tolist()], [*steps.tolist(), len(at)], strict=True))
+    for low, high in runs if len(at) else ():
+        row = int(at[low])
+        for first, last in runs:
+            if first > low:
+                break
+            column, part = int(at[first]), left[low:high, first:last]
+            whole = square if row < count else below if column < count else rest
+            row_in, column_in = row - count * (row >= count), column - count * (column >= count)
+            whole[row_in : row_in + high - low, column_in : column_in + last - first] += part
 
 
 def _dissected(those: Array, places: Array, apart: list[int]) -> list[tuple[Array, int]]:
