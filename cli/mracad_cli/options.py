@@ -238,7 +238,7 @@ _format = option(
     show_default=True,
     help="Format of standard output.",
 )
-_meshes = section(
+meshes = section(
     Title.MESHES,
     option(
         "--chord",
@@ -261,7 +261,7 @@ writing = gathered(
     "writing",
     Writing,
     section(Title.OUTPUT, _output, _format, schema, verify, overwrite, if_changed),
-    _meshes,
+    meshes,
     section(Title.PICTURES, of(Picture, "picture", called=PICTURES)),
 )
 editing = section(

@@ -15,18 +15,15 @@ from mracad import note
 from mracad.errors import FileError, UsageError, needing
 from mracad.formats import FORMATS, Format, by_extension
 from mracad.spec.fields import dashed
+from mracad.spec.pictures import Scalars
 from mracad.store import Location, Url, is_url, location, missing
 from mracad_cli.options import PAGES, PICTURES, Reading, Reports, Writing, model
 from mracad_cli.params import Declared
 from mracad_cli.say import json_text, say, warn
 
-OF = {
-    **dict.fromkeys(PICTURES.values(), ("picture", "OUT.png")),
-    **dict.fromkeys(("chord", "angle"), ("mesh", "OUT.stl")),
-    "ascii_stl": ("stl", "OUT.stl"),
-    "schema": ("step", "OUT.step"),
-}
-"""The kind or name of the formats that options are for, and an output of such a format."""
+MESHES = {**dict.fromkeys(("chord", "angle"), ("mesh", "stl")), "ascii_stl": ("stl", "stl")}
+OF = {**dict.fromkeys(PICTURES.values(), ("picture", "png")), **MESHES, "schema": ("step", "step")}
+"""The kind or name of the formats that options are for, and a format of that kind."""
 
 if TYPE_CHECKING:
     from mracad.job.judge import Judged
@@ -81,9 +78,10 @@ def check_outputs(writing: Writing, beside: Collection[str | None] = (), *, dry:
     if any(format.name == "mp4" for format in formats.values()):
         with needing("video", "cannot write MP4"):
             import imageio_ffmpeg  # noqa: F401
-    _check_options(formats.values(), "-" in paths)
-    if writing.scalars.scalar:
-        _check_scalars(formats.values())
+    given = _check_options(formats.values(), OF, "add -o OUT.{}")
+    if "format" in given and "-" not in paths:
+        raise UsageError("format: nothing is written to standard output", "add -o -, or leave --format out")
+    _check_scalars(formats.values(), writing.scalars, "add an output in {}")
     for format in formats.values():
         writing.picture.check(format.name)
     files = [path for path in paths if path != "-"]
@@ -98,29 +96,36 @@ def check_outputs(writing: Writing, beside: Collection[str | None] = (), *, dry:
     ]
 
 
-def _check_options(formats: Collection[Format], streamed: bool) -> None:
-    """Refuse options on the command line that would have no effect on outputs of these formats."""
+def check_meshes(formats: Collection[Format], scalars: Scalars) -> None:
+    """Refuse options of meshes where a batch writes none."""
+    _check_options(formats, MESHES, "add --format {}")
+    _check_scalars(formats, scalars, "write {} with --format")
+
+
+def _check_options(formats: Collection[Format], kinds: Mapping[str, tuple[str, str]], hint: str) -> list[str]:
+    """Refuse options on the command line that would have no effect on outputs of these formats; returns all given."""
     context = click.get_current_context()
     given = [name for name in context.params if context.get_parameter_source(name) is ParameterSource.COMMANDLINE]
     written = {word for format in formats for word in (format.kind, format.name)}
     for name in given:
-        kind, output = OF.get(name, ("", ""))
+        kind, usual = kinds.get(name, ("", ""))
         if kind and kind not in written:
             what = kind if kind in ("picture", "mesh") else f"{kind.upper()} file"
             option = "ascii" if name == "ascii_stl" else dashed(name)
-            raise UsageError(f"{option}: no {what} is written", f"add -o {output}, or leave --{option} out")
-    if "format" in given and not streamed:
-        raise UsageError("format: nothing is written to standard output", "add -o -, or leave --format out")
+            raise UsageError(f"{option}: no {what} is written", f"{hint.format(usual)}, or leave --{option} out")
+    return given
 
 
-def _check_scalars(formats: Collection[Format]) -> None:
+def _check_scalars(formats: Collection[Format], scalars: Scalars, hint: str) -> None:
     """Refuse numbers at points for meshes that cannot hold them."""
+    if not scalars.scalar:
+        return
     able = ", ".join(each.extensions[0] for each in FORMATS.values() if each.scalars)
     for format in formats:
         if format.kind == "mesh" and not format.scalars:
             raise UsageError(f"scalar: {format.name.upper()} holds no numbers at points", f"write {able}")
     if not any(format.scalars for format in formats):
-        raise UsageError("scalar: no mesh is written", f"add an output in {able}, or leave --scalar out")
+        raise UsageError("scalar: no mesh is written", f"{hint.format(able)}, or leave --scalar out")
 
 
 def check_inputs(ctx: click.Context) -> None:

@@ -173,7 +173,11 @@ WAYS = {
 """For each option, words that give it, and others that it needs; IN, REF and OLD stand for files, LESS for less."""
 
 OWN = {
+    "batch angle": ("--angle 2", "--chord 5mm --format stl"),
+    "batch ascii_stl": ("--ascii", "--format stl"),
+    "batch chord": ("--chord 1mm", "--format stl"),
     "batch format": ("--format brep",),
+    "batch scalar": ("--scalar deviation", "--format ply --chord 1mm"),
     "batch overwrite": ("--overwrite", "OLD out/sheet.step"),
     "check overwrite": ("--overwrite", "OLD a.xml --junit a.xml"),
     "compare overwrite": ("--overwrite", "OLD a.xml --junit a.xml"),

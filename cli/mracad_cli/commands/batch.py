@@ -26,7 +26,7 @@ from mracad.spec.quantity import MEMORY, TIME
 from mracad.store import location
 from mracad_cli import options, running
 from mracad_cli.command import Unguarded
-from mracad_cli.outputs import check_depfile, check_page, check_reports, deliver, depfile_text
+from mracad_cli.outputs import check_depfile, check_meshes, check_page, check_reports, deliver, depfile_text
 from mracad_cli.progress import Progress
 from mracad_cli.say import json_text, say, warn
 from mracad_cli.steps import needed, plan
@@ -112,6 +112,7 @@ _settings = options.gathered(
     options.section(
         options.Title.OUTPUT, options.schema, options.verify, options.overwrite, options.if_changed, options.record
     ),
+    options.meshes,
 )
 _printing = options.section(
     options.Title.RUNNING,
@@ -155,6 +156,7 @@ def command(
     check_depfile(reports.depfile, place.folder, *words)
     folder = location(place.folder)
     items = find(words, folder, place.format or "")
+    check_meshes([FORMATS[item.format] for item in items], settings.scalars)
     if not reports.dry_run:
         return _run(steps, items, place, settings, reports)
     listed = {item.source: str(folder / item.output) for item in items}

@@ -151,7 +151,8 @@ class _Batch:
         """Give a file to the executor; the outcome instead if it is already done or cannot be done."""
         try:
             steps = self.recipe.steps(item.source)
-            files = {file: read(file) for step in steps for file in step.options.files()}
+            named = (*(file for step in steps for file in step.options.files()), *self.settings.scalars.files())
+            files = {file: read(file) for file in named}
             data = read(item.source)
             self._check_target(item)
         except MracadError as error:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+
+from mracad.spec.pictures import Scalars
 
 
 @dataclass(frozen=True)
@@ -29,6 +31,8 @@ class Settings:
     input_unit, encoding : str or None
     schema : str or None
         Of STEP files; by default AP242 for a file in AP242, else AP214.
+    chord, angle, ascii_stl, scalars
+        Of meshes; see :class:`mracad.job.output.Target`.
     verify : bool
         Read each output back and judge it.
     overwrite : bool
@@ -46,6 +50,10 @@ class Settings:
     input_unit: str | None = None
     encoding: str | None = None
     schema: str | None = None
+    chord: str = "0.02%"
+    angle: float = 12.0
+    ascii_stl: bool = False
+    scalars: Scalars = field(default_factory=Scalars)
     verify: bool = True
     overwrite: bool = False
     if_changed: bool = False

@@ -17,6 +17,7 @@ from msgspec import structs
 
 from mracad import memo, note
 from mracad.errors import MracadError
+from mracad.formats import FORMATS
 from mracad.inspect.faults import ReadBack
 from mracad.job.batch.manifest import digest
 from mracad.job.batch.settings import Settings
@@ -59,7 +60,7 @@ class Work:
     format : str
         Format of the output.
     files : mapping
-        Contents of the files that the steps name.
+        Contents of the files that the steps and the settings name.
     epoch : str or None
         ``SOURCE_DATE_EPOCH``.
     versions : mapping
@@ -84,7 +85,9 @@ class Work:
         files = {location(name).name: digest(data) for name, data in self.files.items()}
         steps = [[step.use, step.id, structs.asdict(step.options)] for step in self.steps]
         how = self.settings
-        parts = [self.name, digest(self.data), steps, dict(self.versions), files]
+        parts: list[Any] = [self.name, digest(self.data), steps, dict(self.versions), files]
+        if FORMATS[self.format].kind == "mesh":
+            parts.append([how.chord, how.angle, how.ascii_stl, how.scalars.scalar])
         return digest(
             json.dumps(
                 [*parts, how.input_unit, how.encoding, self.format, how.schema or "", how.verify, self.epoch],
@@ -150,12 +153,16 @@ def do(work: Work) -> Product:
     else:
         os.environ["SOURCE_DATE_EPOCH"] = work.epoch
     memo.clear()
-    target = Target(work.name, work.format, work.settings.schema or "")
+    how = work.settings
+    mesh = how.chord, how.angle, how.ascii_stl
     with tempfile.TemporaryDirectory() as folder:
-        steps = _here(work, Path(folder))
+        places = _here(work, Path(folder))
+        steps = [replace(step, options=step.options.relocated(places)) for step in work.steps]
+        scalars = how.scalars.relocated(places)
+        target = Target(work.name, work.format, how.schema or "", *mesh, scalars=scalars)
         note.doing("reading", work.name)
         document = _read(work)
-        done = produce(document, lambda: _read(work), steps, [target], verify=work.settings.verify)
+        done = produce(document, lambda: _read(work), steps, [target], verify=how.verify)
     page = b""
     if work.pages:
         note.doing("drawing the page")
@@ -187,15 +194,15 @@ def _read(work: Work) -> Document:
     return read(Text(work.data, work.name), work.settings.input_unit, work.settings.encoding)
 
 
-def _here(work: Work, folder: Path) -> list[Step]:
-    """The steps, with the files that they name copied into a folder of this machine."""
+def _here(work: Work, folder: Path) -> dict[str, str]:
+    """The places of the files that the steps and the settings name, copied into a folder of this machine."""
     places: dict[str, str] = {}
     for number, (name, data) in enumerate(work.files.items()):
         place = folder / str(number) / location(name).name
         place.parent.mkdir()
         place.write_bytes(data)
         places[name] = str(place)
-    return [replace(step, options=step.options.relocated(places)) for step in work.steps]
+    return places
 
 
 def _short(result: Report | Judged) -> dict[str, Any]:
