@@ -186,6 +186,22 @@ def test_numbers_at_points_without_a_mesh_for_them_are_refused(
     assert says in result.err and not list(tmp_path.iterdir())
 
 
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["--chord", "1mm"], "chord: no mesh is written; add --format stl"),
+        (["--scalar", "curvature"], "no mesh is written; write .3mf, .ply"),
+        (["--scalar", "curvature", "--format", "stl"], "STL holds no numbers at points"),
+    ],
+)
+def test_a_batch_refuses_options_of_meshes_without_them(mracad, samples, tmp_path, monkeypatch, words, says):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "a.toml").write_text('[[step]]\nuse = "check"\n')
+    result = mracad("batch", "a.toml", samples / "panel.step", "-O", "out", *words)
+    one_line(result, 2)
+    assert says in result.err and not (tmp_path / "out").exists()
+
+
 def test_deviation_at_the_points_of_an_edit_is_from_the_input(mracad, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     x, y = np.meshgrid(np.linspace(0, 30, 8), np.linspace(0, 20, 8), indexing="ij")
