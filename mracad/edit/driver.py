@@ -292,6 +292,7 @@ def _explained(trial: Trial, moved: dict[int, Moved], target: Array) -> dict[int
 
 def _confirmed(trial: Trial, members: Mapping[int, Sheet], found: Sequence[Verdict], target: Array) -> dict[int, Moved]:
     """The result that is worth most when judged closely."""
+    trial.problem.forget()
     best: dict[int, Moved] = {}
     most, wanted = (-1.0, 0.0), float(trial.gains(target, target).of(1.0).sum())
     nets = {i: space.net for i, space in trial.problem.spaces.items()}

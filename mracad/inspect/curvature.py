@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, fields
 from functools import cache
 from types import FunctionType
@@ -68,11 +68,20 @@ class Forms:
         return Forms(*(getattr(self, each.name)[..., points] for each in fields(self)))
 
     @classmethod
-    def joined(cls, parts: Sequence[Forms]) -> Forms:
-        """The forms at the points of all parts, one after another."""
-        if len(parts) == 1:
-            return parts[0]
-        return cls(*(np.concatenate([getattr(part, each.name) for part in parts], axis=-1) for each in fields(cls)))
+    def joined(cls, parts: Iterable[Forms], count: int) -> Forms:
+        """The forms at the points of all parts, one after another, ``count`` in all; no part is kept."""
+        whole, end = None, 0
+        for part in parts:
+            begin, end = end, end + len(part.density)
+            if whole is None:
+                if end == count:
+                    return part
+                every = (getattr(part, each.name) for each in fields(cls))
+                whole = cls(*(np.empty((*values.shape[:-1], count), values.dtype) for values in every))
+            for each in fields(cls):
+                getattr(whole, each.name)[..., begin:end] = getattr(part, each.name)
+        assert whole is not None and end == count
+        return whole
 
 
 class _Work:
@@ -89,7 +98,8 @@ def forms(jet: Array) -> Forms:
     _Work.done += jet.shape[2]
     if _Work.done >= MANY:
         return forms_one_by_one(jet)
-    return Forms.joined([forms_at_once(jet[:, :, i : i + _BLOCK]) for i in range(0, max(jet.shape[2], 1), _BLOCK)])
+    begins = range(0, max(jet.shape[2], 1), _BLOCK)
+    return Forms.joined((forms_at_once(jet[:, :, i : i + _BLOCK]) for i in begins), jet.shape[2])
 
 
 def forms_at_once(jet: Array) -> Forms:

@@ -105,7 +105,8 @@ class _Slope:
 def _in_blocks(survey: Survey, offset: Array) -> Forms:
     """The forms of a face at many points after a displacement."""
     net, rule = survey.net.with_poles(survey.net.poles + offset), survey.rule
-    return Forms.joined([forms(part) for part in blocks(net, rule.u, rule.v, rule.mask, survey.centre)])
+    parts = (forms(part) for part in blocks(net, rule.u, rule.v, rule.mask, survey.centre))
+    return Forms.joined(parts, len(survey.weights))
 
 
 def _change(survey: Survey, slope: _Slope, amount: float, form: Forms) -> Change:

@@ -150,9 +150,10 @@ def _seen(surfaces: Sequence[tuple[Net, Quadrature]]) -> Iterator[tuple[Array | 
             blocks(net, rule.u, rule.v, rule.mask, net.poles.mean(axis=(0, 1)))
             for net, rule in (surfaces[i] for i in members)
         )
-        few = sizes[members].sum() <= KEPT
+        count = int(sizes[members].sum())
+        few = count <= KEPT
         jet = np.concatenate(list(parts), axis=2) if few else None
-        form = forms(jet) if jet is not None else Forms.joined([forms(part) for part in parts])
+        form = forms(jet) if jet is not None else Forms.joined((forms(part) for part in parts), count)
         ends = sizes[members].cumsum()
         for begin, end in zip(ends - sizes[members], ends, strict=True):
             yield None if jet is None else jet[:, :, begin:end], form.part(slice(begin, end))

@@ -257,6 +257,11 @@ class Problem:
         goal = replace(solve.guides, ways=ways).of(delta) - off
         return np.asarray(delta + solve.aimed(ways, goal)(np.zeros_like(delta), start=delta, goal=self.goal))
 
+    def forget(self) -> None:
+        """Drop the factors of a large problem, which will hardly be solved again."""
+        if len(self.free) > KEPT:
+            self._solvers.clear()
+
     def _solver(self, stiffness: float, free: Array) -> Solver:
         """The solver of the form M + stiffness · K and the contacts, with sliding edges unless all rims are free."""
         held = free is self.free
