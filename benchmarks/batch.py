@@ -183,6 +183,25 @@ def scaled(folder: Path, files: int) -> None:
     )
 
 
+def waits(folder: Path, files: int) -> None:
+    """What a cluster costs beside the work, on a machine of any load: files of 1 MB whose work is to wait for 0.5 s."""
+    few, many = shams(folder / "few", 4), shams(folder / "many", files)
+    for path in many.iterdir():
+        path.write_text(f"{path}" + "x" * 1_000_000)
+    words, times = (recipe(folder), "--json", "-O"), []
+    for count in (1, 2):
+        with cluster(count, sham=0.5) as (address, _):
+            batch(*words, folder / f"warm{count}", few, "--cluster", address, sham=0.5)
+            code, out, err = batch(*words, folder / f"out{count}", many, "--cluster", address, sham=0.5)
+        assert code == 0, err
+        times.append(json.loads(out.splitlines()[-1])["summary"]["seconds"])
+    beside = (2 * times[1] - 0.5 * files) / files
+    print(
+        f"cluster, {files} files of 0.5 s each: two workers are {times[0] / times[1]:.2f} times as fast as one; "
+        f"{beside * 1e3:.0f} ms per file beside the work"
+    )
+
+
 def spent(process: subprocess.Popen[bytes]) -> float:
     """Processor seconds of a process and its children."""
     top = psutil.Process(process.pid)
@@ -197,6 +216,7 @@ def main() -> None:
         "memory": memory,
         "flight": lambda folder: flight(),
         "killed": lambda folder: killed(folder, min(files, 100), 20),
+        "waits": lambda folder: waits(folder, 40),
         "scaled": lambda folder: scaled(folder, min(files, 100)),
         "lost": lambda folder: lost(folder, min(files, 40)),
     }
