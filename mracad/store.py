@@ -83,6 +83,9 @@ class Url:
     def resolve(self) -> Url:
         return Url(self.text.rstrip("/"))
 
+    def mkdir(self, parents: bool = False, exist_ok: bool = False) -> None:
+        """Do nothing: folders in stores come with their files."""
+
     def exists(self) -> bool:
         return self._kind() is not None
 

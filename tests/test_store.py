@@ -108,5 +108,6 @@ def test_commands_read_and_write_urls(mracad, samples, memory, tmp_path):
     )
     refused = mracad(*edit)
     assert refused.code == 2 and "depfile: make cannot see memory://in/panel.step" in refused.err
+    assert mracad("man", "memory://man").code == 0 and Url("memory://man/mracad-smooth.1").exists()
     missing = mracad("info", "memory://in/other.step")
     assert missing.code == 3 and missing.err.count("\n") == 1 and "there is no such file" in missing.err

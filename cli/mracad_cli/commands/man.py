@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import click
 
 from mracad.errors import FileError
+from mracad.store import location
 from mracad_cli import options
 from mracad_cli.command import Plain, every, groups
 from mracad_cli.outputs import deliver
@@ -19,7 +18,7 @@ def command(ctx: click.Context, folder: str) -> None:
     from mracad_cli.render import man
 
     try:
-        Path(folder).mkdir(parents=True, exist_ok=True)
+        location(folder).mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise FileError(f"cannot write into {folder}: {error.strerror}", "name another folder") from error
     root = ctx.find_root().command
@@ -30,4 +29,4 @@ def command(ctx: click.Context, folder: str) -> None:
         pages[f"mracad-{name}"] = man.overview(group, own, name)
     for name, page in commands.items():
         pages[f"mracad-{name.replace(' ', '-')}"] = man.page(name, page, ctx.find_root())
-    deliver({str(Path(folder, f"{name}.1")): text for name, text in pages.items()}, [f"wrote {len(pages)} pages"])
+    deliver({str(location(folder) / f"{name}.1"): text for name, text in pages.items()}, [f"wrote {len(pages)} pages"])

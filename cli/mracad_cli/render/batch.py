@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
 from mracad.errors import FileError
-from mracad.store import Location, Url, location
+from mracad.store import Location, location
 
 if TYPE_CHECKING:
     from mracad.job.batch.run import Outcome
@@ -39,8 +39,6 @@ class Pages:
         """Pages for an index, in a folder that is made if needed; raises FileError."""
         path = location(index)
         folder = path.with_name(f"{path.stem}_files")
-        if isinstance(folder, Url):
-            return cls(folder)
         try:
             folder.mkdir(exist_ok=True)
         except OSError as error:

@@ -106,9 +106,8 @@ class Manifest:
         """Write files that belong to outputs, by their paths, absolute or relative to the folder."""
         places = {location(name, self.folder): content for name, content in contents.items()}
         for place in places:
-            if isinstance(place, Path):
-                with contextlib.suppress(OSError):  # writing reports it better
-                    place.parent.mkdir(parents=True, exist_ok=True)
+            with contextlib.suppress(OSError):  # writing reports it better
+                place.parent.mkdir(parents=True, exist_ok=True)
         put_all({p: c for p, c in places.items() if not (if_changed and holds(p, c))}, prefix=UNFINISHED)
 
 
