@@ -14,7 +14,7 @@ w / 4 …; the first of these that hardly turns within w / 2π shows the shape a
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
 
@@ -37,6 +37,37 @@ HALVINGS = 6
 _TWO = 2.0**0.5
 
 
+class Looks:
+    """Lengths (mm), from long to short, and a surface without waves shorter than 2π times each.
+
+    They are taken when needed, because the first is mostly enough.
+
+    Parameters
+    ----------
+    net : Net
+    wavelengths : (float, float)
+        The longest, along u and v, mm.
+    creases : pair of set of float
+    """
+
+    def __init__(
+        self, net: Net, wavelengths: tuple[float, float], creases: tuple[AbstractSet[float], AbstractSet[float]]
+    ) -> None:
+        self.net, self.wavelengths, self.creases = net, wavelengths, creases
+        self._taken: list[tuple[float, Net]] = []
+
+    def __iter__(self) -> Iterator[tuple[float, Net]]:
+        shortest = min(self.wavelengths)
+        for halving in range(HALVINGS + 1):
+            if halving == len(self._taken):
+                now = tuple(w / 2**halving if w == shortest else w for w in self.wavelengths)
+                seen = at_scale(self.net, (now[0], now[1]), self.creases)
+                self._taken.append((shortest / 2**halving / (2 * np.pi), seen))
+            yield self._taken[halving]
+            if self._taken[halving][1].poles is self.net.poles:
+                break
+
+
 @dataclass(frozen=True, eq=False)
 class Limit:
     """The shape of a surface, which limits lengths.
@@ -45,27 +76,19 @@ class Limit:
     ----------
     length : float
         ℓ, mm.
-    looks : tuple of (float, Net)
+    looks : iterable of (float, Net)
         Lengths (mm), from long to short, and the surface without waves shorter than 2π times each.
     """
 
     length: float
-    looks: tuple[tuple[float, Net], ...]
+    looks: Iterable[tuple[float, Net]]
 
     @classmethod
     def of(
         cls, net: Net, wavelengths: tuple[float, float], creases: tuple[AbstractSet[float], AbstractSet[float]]
     ) -> Limit:
         """The limit for a surface from which waves shorter than ``wavelengths`` along u and v (mm) will be removed."""
-        looks = []
-        shortest = min(wavelengths)
-        for halving in range(HALVINGS + 1):
-            now = tuple(w / 2**halving if w == shortest else w for w in wavelengths)
-            seen = at_scale(net, (now[0], now[1]), creases)
-            looks.append((shortest / 2**halving / (2 * np.pi), seen))
-            if seen.poles is net.poles:
-                break
-        return cls(max(wavelengths) / (2 * np.pi), tuple(looks))
+        return cls(max(wavelengths) / (2 * np.pi), Looks(net, wavelengths, creases))
 
     def finer(self, net: Net, lengths: tuple[float, float]) -> tuple[Array, Array]:
         """By how much lengths along u and v (mm) exceed 2 θ r in each span, r the smallest radius, where ℓ exceeds half
