@@ -7,7 +7,7 @@ in the same format (the *copy*) also has is caused by the kernel and is forgiven
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -38,6 +38,7 @@ PLACED = 1e-6
 CONTENT = frozenset({FaultKind.UNREAD, FaultKind.LOST, FaultKind.AREA, FaultKind.VOLUME, FaultKind.BOX})
 """Faults that are not forgiven even if the kernel's own copy has them too."""
 
+_LOCAL = frozenset({FaultKind.GAP, FaultKind.ANGLE})  # faults of the faces that they name, and of nothing else
 _LAID = 1e-8  # mm: an edge is the same if none of its points moved farther
 _TURNED = 2e-5  # radians: and its faces turned by no more
 _NEAR = 0.1  # share of the diagonal: faces that are farther apart are not the same
@@ -134,7 +135,11 @@ class _File:
 
 
 def judge(
-    memory: Facts, file: Facts, slack: Slack, copy: Callable[[], tuple[Facts, Facts]] | None = None
+    memory: Facts,
+    file: Facts,
+    slack: Slack,
+    copy: Callable[[], tuple[Facts, Facts]] | None = None,
+    alike: Callable[[Collection[int]], bool] = lambda faces: False,
 ) -> tuple[tuple[Fault, ...], tuple[Fault, ...]]:
     """The faults of a file, and those that are forgiven because the kernel's own copy has them too.
 
@@ -146,12 +151,16 @@ def judge(
     copy : callable, optional
         Gives the facts of the input and of the kernel's own copy of it, when needed; without it everything except loss
         of content is forgiven.
+    alike : callable, optional
+        Tells whether the file and the copy state some faces in the same way: the copy has the faults that these faces
+        have between them, and need not be read.
     """
     base, new = _File(memory, memory), _File(file, memory, slack.parts)
     faults = tuple(_faults(base, new, slack))
     soft = [fault for fault in faults if fault.reason not in CONTENT]
     again: Counter[tuple[object, ...]] = Counter()
-    if soft and copy:
+    named = {face for fault in soft for face in fault.faces}
+    if soft and copy and not (all(fault.reason in _LOCAL for fault in soft) and alike(named)):
         own = _File(copy()[1], copy()[0], slack.parts)
         again = Counter(fault.key for fault in _beside(own, new, slack, {fault.faces for fault in soft}))
     left = tuple(fault for fault in faults if fault.reason in CONTENT or again[fault.key])
@@ -338,13 +347,3 @@ def match(document: Facts, file: Facts, parts: Collection[int] = ()) -> dict[int
             inside = [f for w, f in whole if (spot[:3] >= w[:3] - room).all() and (spot[3:6] <= w[3:6] + room).all()]
             partners |= {face: inside[0]} if inside else {}
     return partners
-
-
-def blamed(faults: Iterable[Fault], edited: Collection[int], memory: Facts) -> set[int]:
-    """The edited faces blamed for faults: those that they name, else their neighbours, else all."""
-    named = {face for fault in faults for face in fault.faces}
-    own = named & set(edited)
-    if own:
-        return own
-    beside = {face for edge in memory.edges if named.intersection(edge.faces) for face in edge.faces}
-    return beside & set(edited) or set(edited)

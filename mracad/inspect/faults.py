@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
 
-from mracad.model.facts import Counts
+from mracad.model.facts import Counts, Facts
 
 Array = np.ndarray
 
@@ -95,3 +96,13 @@ class ReadBack:
     seams: int = 0
     gap: float = 0.0
     angle: float = 0.0
+
+
+def blamed(faults: Iterable[Fault], edited: Collection[int], memory: Facts) -> set[int]:
+    """The edited faces blamed for faults: those that they name, else their neighbours, else all."""
+    named = {face for fault in faults for face in fault.faces}
+    own = named & set(edited)
+    if own:
+        return own
+    beside = {face for edge in memory.edges if named.intersection(edge.faces) for face in edge.faces}
+    return beside & set(edited) or set(edited)

@@ -7,10 +7,12 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from mracad.errors import EditError, FileError
 from mracad.inspect import accept
 from mracad.inspect.accept import Slack
-from mracad.inspect.faults import Fault, FaultKind, ReadBack
+from mracad.inspect.faults import Fault, FaultKind, ReadBack, blamed
 from mracad.job.document import Progress, Report, play, tell
 from mracad.job.judge import Judged, Original
 from mracad.job.left import Excluded
@@ -23,6 +25,8 @@ if TYPE_CHECKING:
     from mracad.occ.document import Document
     from mracad.occ.files import Written
     from mracad.spec.recipe import Step
+
+_SAME_PLACE = 1e-9  # of the largest coordinate
 
 ROUNDS = 8
 """How often the steps are repeated, each time without the faces that would make the file worse."""
@@ -120,7 +124,7 @@ def produce(
         edited = memory.edited - excluded.keys()
         if not edited:
             break
-        left = accept.blamed((fault for _, fault in faults), edited, memory.facts)
+        left = blamed((fault for _, fault in faults), edited, memory.facts)
         excluded |= dict.fromkeys(left, Excluded.FILE)
     raise _refused(document.name, faults)
 
@@ -158,6 +162,7 @@ class _Copies:
 
     def __init__(self, original: Original) -> None:
         self.original = original
+        self._data: dict[tuple[str, str], bytes] = {}
         self._made: dict[tuple[str, str], Facts] = {}
 
     @cached_property
@@ -174,13 +179,30 @@ class _Copies:
         """A mesh of the input."""
         return written(self.document, target).written
 
+    def data(self, target: Target) -> bytes:
+        """The copy as it is written."""
+        key = target.format, target.schema
+        if key not in self._data:
+            self._data[key] = written(self.document, target).data
+        return self._data[key]
+
+    def states(self, made: Made, document: Document, faces: Collection[int]) -> bool:
+        """Whether the copy states some faces of a document as its file does, entity by entity."""
+        if made.target.format != "step":
+            return False
+        from mracad.occ.check import centres
+        from mracad.occ.entities import alike
+
+        places = np.array(centres(document)) / document.units.mm
+        size = float(np.abs(places[np.isfinite(places)]).max(initial=0.0))
+        return alike(made.data, self.data(made.target), places[sorted(faces)], _SAME_PLACE * size)
+
     def of(self, target: Target) -> tuple[Facts, Facts]:
         """Facts of the input and of its copy; of the input twice if there is no copy: nothing is forgiven."""
         key = target.format, target.schema
         if key not in self._made:
-            data = written(self.document, target).data
             try:
-                self._made[key] = _read_back(data, target)
+                self._made[key] = _read_back(self.data(target), target)
             except Exception as error:
                 if not _unreadable(error):
                     raise
@@ -213,7 +235,9 @@ def _judged(made: Made, memory: _Memory, copies: _Copies) -> Made:
     known = memory.facts
     try:
         file = _read_back(made.data, made.target)
-        found = accept.read_back(file, *accept.judge(known, file, slack, copy))
+        found = accept.read_back(
+            file, *accept.judge(known, file, slack, copy, partial(copies.states, made, memory.document))
+        )
     except Exception as error:
         if not _unreadable(error):
             raise

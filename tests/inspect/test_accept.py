@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import replace
 
 import cadquery as cq
@@ -15,7 +15,7 @@ from OCP.gp import gp_Pnt
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS, TopoDS_Shape
 
-from mracad.inspect import accept
+from mracad.inspect import accept, faults
 from mracad.inspect.accept import Slack, judge
 from mracad.inspect.faults import Fault, FaultKind
 from mracad.inspect.seams import seams
@@ -159,6 +159,24 @@ def test_what_the_kernel_does_as_well_is_forgiven_but_no_loss() -> None:
     assert {fault.reason for fault in left} >= {FaultKind.LOST}
 
 
+def test_the_copy_is_read_unless_it_states_the_faces_in_the_same_way() -> None:
+    memory, file = facts(document(panels(0.1))), facts(document(panels(0.2)))
+    asked: list[object] = []
+
+    def copy() -> tuple[accept.Facts, accept.Facts]:
+        asked.append("copy")
+        return memory, memory
+
+    def alike(faces: Collection[int]) -> bool:
+        asked.append(sorted(faces))
+        return len(asked) == 1
+
+    local = replace(file, spots=memory.spots)  # the box is not the subject
+    assert judge(memory, local, Slack(), copy, alike)[0] == () and asked == [[0, 1]]
+    left, _ = judge(memory, local, Slack(), copy, alike)
+    assert [fault.reason for fault in left] == [FaultKind.ANGLE] and "copy" in asked
+
+
 def test_faces_are_told_whatever_their_numbers() -> None:
     shape = body()
     memory = facts(document(shape.wrapped))
@@ -172,11 +190,11 @@ def test_faces_are_told_whatever_their_numbers() -> None:
 def test_faults_are_put_down_to_edited_faces() -> None:
     memory = facts(document(body().wrapped))
     fault = Fault(FaultKind.GAP, (0, 1))
-    assert accept.blamed([fault], {1, 2}, memory) == {1}
+    assert faults.blamed([fault], {1, 2}, memory) == {1}
     far = replace(fault, faces=(0,))
-    near = accept.blamed([far], set(range(1, memory.count)), memory)
+    near = faults.blamed([far], set(range(1, memory.count)), memory)
     assert near and near == {f for edge in memory.edges if 0 in edge.faces for f in edge.faces} - {0}
-    assert accept.blamed([Fault(FaultKind.SOLIDS)], {3, 4}, memory) == {3, 4}
+    assert faults.blamed([Fault(FaultKind.SOLIDS)], {3, 4}, memory) == {3, 4}
 
 
 @pytest.mark.parametrize("height", [2e-3, 1.0])
