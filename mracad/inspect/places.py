@@ -8,7 +8,7 @@ place) are compared with the largest that the place and its eight neighbours had
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -107,16 +107,16 @@ class Places:
 
     @classmethod
     def of(
-        cls, rule: Quadrature, form: Forms, base: Forms | None, areas: Array, wavelengths: tuple[float, float]
+        cls, rule: Quadrature, form: Forms, base: Array | None, areas: Array, wavelengths: tuple[float, float]
     ) -> Places:
-        """Places of the faces of a quadrature rule, with the forms of the surface and of its base, and areas (mm²), at
-        its points; wavelengths (mm) along u and v."""
+        """Places of the faces of a quadrature rule, with the forms of the surface, shape operator and slope of its base
+        ``(5, q)``, and areas (mm²), at its points; wavelengths (mm) along u and v."""
         (rows, u), (columns, v) = (_divided(rule, form, axis, wavelengths[axis] / SIDES) for axis in (0, 1))
         shape = len(u), len(v)
         cell = rows * shape[1] + columns
         order = np.argsort(cell, kind="stable")
         filled, first = np.unique(cell[order], return_index=True)
-        bare, known = np.zeros(shape), np.zeros((5, len(areas))) if base is None else _bent(base)
+        bare, known = np.zeros(shape), np.zeros((5, len(areas))) if base is None else base
         places = cls(order, first, filled, shape, (u, v), bare, known, bare, bare, bare)
         (area,) = places._gathered(np.add, areas[None])
         area = np.where(area > SMALL * area.max(initial=0.0), area, 0.0)
@@ -148,7 +148,7 @@ class Places:
         lost = np.where(counts, (fell / self.most).max(axis=0), 0.0)
         rise = np.maximum(-fell * self.area, 0.0)
         rise /= np.maximum(rise.mean(axis=(1, 2), keepdims=True), 1e-300)
-        largest = np.stack([form.largest * (areas > 0), turned, unsettled])
+        largest = form.largest * (areas > 0), turned, unsettled
         peaks, turn, singular = self._gathered(np.maximum, largest)
         return Placed(spread, lost, rise, peaks, turn, self._opened(opened), singular, self.area, self.ends)
 
@@ -160,27 +160,33 @@ class Places:
             np.fmax.at(found, tuple(_strip(ends, each) for ends, each in zip(self.ends, at, strict=True)), grew)
         return found
 
-    def _gathered(self, how: np.ufunc, values: Array) -> Array:
-        """Values ``(k, q)`` reduced to one per place by a ufunc, ``(k, nu, nv)``."""
-        found = np.zeros((len(values), self.shape[0] * self.shape[1]))
-        if len(self.first):
-            found[:, self.filled] = how.reduceat(values[:, self.order], self.first, axis=1)
-        return found.reshape(-1, *self.shape)
+    def _gathered(self, how: np.ufunc, values: Iterable[Array]) -> Array:
+        """Several values ``(q,)``, one after another, reduced to one per place by a ufunc, ``(k, nu, nv)``."""
+        found = []
+        for each in values:
+            found.append(np.zeros(self.shape))
+            if len(self.first):
+                found[-1].ravel()[self.filled] = how.reduceat(each[self.order], self.first)
+        return np.array(found)
+
+    def _squares(self, form: Forms, areas: Array) -> Iterator[Array]:
+        """Areas, and bending and variation times areas, of the surface and beyond the base: one at a time, because
+        points may be many."""
+        yield areas
+        yield form.bending * areas
+        yield form.variation * areas
+        for own, base, times in ((form.shape, self.base[:3], (1, 2, 1)), (form.slope, self.base[3:], (1, 1))):
+            total = np.zeros_like(areas)
+            for one, other, k in zip(own, base, times, strict=True):
+                off = one - other
+                total += k * (off * off)
+            yield total * areas
 
     def _means(self, form: Forms, areas: Array) -> tuple[Array, Array]:
         """Means of bending and curvature variation, and of both beyond the base, ``(2, nu, nv)`` each."""
-        off = _bent(form) - self.base
-        off *= off
-        sums = np.stack([areas, form.bending, form.variation, off[0] + 2 * off[1] + off[2], off[3] + off[4]])
-        sums[1:] *= areas
-        sums = self._gathered(np.add, sums)
+        sums = self._gathered(np.add, self._squares(form, areas))
         means = sums[1:] / np.maximum(sums[0], 1e-300)
         return means[:2], means[2:]
-
-
-def _bent(form: Forms) -> Array:
-    """Shape operator and slope, ``(5, q)``."""
-    return np.concatenate([form.shape, form.slope])
 
 
 def _around(figures: Array, least: Array) -> Array:

@@ -116,8 +116,9 @@ def surveys(
     found = []
     seen = _seen([(net, rule) for net, _, rule in ready])
     shapes = _seen([(net, rule) for net, (_, _, rule) in zip(bases, ready, strict=False)])
-    for (net, faces, rule), (jet, form), reach in zip_longest(ready, seen, reaches):
-        _, base = next(shapes, (None, None))
+    bent = (np.concatenate([form.shape, form.slope]) for _, form in shapes)
+    for (net, faces, rule), reach in zip_longest(ready, reaches):
+        base, (jet, form) = next(bent, None), next(seen)
         sides = form.speeds * _spans(rule, (net.u, net.v))
         least = max(CLUSTER[0], CLUSTER[1] * float(np.linalg.norm(np.ptp(net.poles, axis=(0, 1)))))
         regular = form.regular & (sides.min(axis=0) >= least)
