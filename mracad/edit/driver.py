@@ -14,6 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from mracad.bspline.surface import Net
+from mracad.edit.copies import Copies
 from mracad.edit.moved import Moved, Result, closely
 from mracad.edit.pose import Scene, beside_rims
 from mracad.edit.target import Sheet, Wish
@@ -42,6 +43,9 @@ FIRST = 2
 PRICE = 0.05
 """Share of the wanted change that doubling the control points of a surface must add to be worth it."""
 
+MOST = 9.0
+"""Largest factor by which the control points of a surface alone are multiplied."""
+
 CANDIDATES = 3
 """Largest number of displacements that are judged closely after a first look."""
 
@@ -56,9 +60,10 @@ def drive(scene: Scene, wish: Wish, progress: Callable[[int, int], None] | None 
     result: dict[int, Moved] = {}
     exact: list[Seam] = []
     loose: list[TrimmedSeam] = []
+    copies = Copies(scene, wish)
     for group in groups(scene.sheets, scene.joints):
         tell(len(result), len(scene.sheets))
-        alone, tried = _alone(scene, wish, group)
+        alone, tried = _alone(scene, wish, group, copies)
         result |= alone
         able = [i for i in group if i not in alone or alone[i].amount >= LEAST or alone[i].held_back]
         for members in groups(able, scene.joints.among(able)):
@@ -66,7 +71,7 @@ def drive(scene: Scene, wish: Wish, progress: Callable[[int, int], None] | None 
                 exact += [seam for seam in joined.exact if seam.a.surface != seam.b.surface]
                 loose += joined.loose
                 result |= part
-        result |= {i: _by_itself(scene, wish, i) for i in group if i not in result}
+        result |= {i: _by_itself(scene, wish, i, copies) for i in group if i not in result}
     result = {i: result[i].done() for i in scene.sheets}
     moving = {i for i, moved in result.items() if moved.amount > 0}
     exact += [seam for seam in scene.joints.exact if seam.a.surface == seam.b.surface and seam.a.surface in moving]
@@ -88,7 +93,7 @@ def _dropped(wanted: Joints, used: Joints, result: Mapping[int, Moved]) -> dict[
 
 
 def _alone(
-    scene: Scene, wish: Wish, group: Sequence[int]
+    scene: Scene, wish: Wish, group: Sequence[int], copies: Copies
 ) -> tuple[dict[int, Moved], dict[tuple[int, ...], dict[int, Moved]]]:
     """Results for joined surfaces, each edited alone; only for the first few if all succeed together.
 
@@ -105,7 +110,7 @@ def _alone(
             )
             if _through(whole) and not _less(whole, alone):
                 break
-        alone[i] = _by_itself(scene, wish, i)
+        alone[i] = _by_itself(scene, wish, i, copies)
     return alone, tried
 
 
@@ -202,13 +207,22 @@ def groups(surfaces: Iterable[int], joined: Joints) -> list[list[int]]:
     return list(found.values())
 
 
-def _by_itself(scene: Scene, wish: Wish, i: int) -> Moved:
+def _by_itself(scene: Scene, wish: Wish, i: int, copies: Copies) -> Moved:
+    """The best result for a surface alone; that of its original for a copy of one tried before."""
+    moved = copies.result(i)
+    if moved is None:
+        moved = _searched(scene, wish, i)
+        copies.keep(moved)
+    return moved
+
+
+def _searched(scene: Scene, wish: Wish, i: int) -> Moved:
     """The best result for a surface alone, with more control points beside its rims where they pay."""
     joined, sheet = scene.joints.among({i}), scene.sheets[i]
     plain = _attempt(scene, wish, [i], joined)[i]
     size = _points(beside_rims(sheet, joined)) / _points(sheet.net) if scene.refine else 1.0
     least = plain.share + PRICE * (size - 1.0)
-    if size == 1.0 or least >= 1.0:
+    if size == 1.0 or size > MOST or least >= 1.0:
         return plain
     finer = _attempt(scene, wish, [i], joined, {i}, least)[i]
     if finer.share > least:

@@ -61,6 +61,7 @@ class Filter(Wish):
     leads: Mapping[int, int] = field(default_factory=dict)
     limited: bool = False
     fairs: ClassVar[bool] = True
+    alike: ClassVar[bool] = True
     growth: ClassVar[Growth] = GROWTH
 
     def wavelength(self, net: Net, faces: Sequence[Face], creases: Creases) -> float:

@@ -71,6 +71,7 @@ class Coarser(Wish):
     level: float = 0.0
     scale: float | None = None
     fairs: bool = True
+    alike: ClassVar[bool] = True
     spread: ClassVar[float] = math.inf  # waves beside what goes are part of a projection
 
     @property

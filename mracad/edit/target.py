@@ -59,6 +59,8 @@ class Wish(Protocol):
         Whether wavelengths are reduced where radii of curvature are too small for them (default: no).
     lean : bool
         Whether joined surfaces get more control points only if they cannot do without (default: no).
+    alike : bool
+        Whether it asks the same of copies of a surface, wherever they lie (default: no).
     growth : Growth
         How much rougher it may make a face.
     """
@@ -84,6 +86,10 @@ class Wish(Protocol):
 
     @property
     def lean(self) -> bool:
+        return False
+
+    @property
+    def alike(self) -> bool:
         return False
 
     @property

@@ -1,0 +1,109 @@
+"""Copies of a surface, moved or mirrored, with parameters that run otherwise, get the same result without a search."""
+
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+import pytest
+
+from mracad.bspline.knots import KnotVector
+from mracad.bspline.surface import Net
+from mracad.edit import driver
+from mracad.edit.fair import Filter, faired
+from mracad.edit.tolerances import Tolerances
+from mracad.model.brep import Model, Trim
+from mracad.seam.wishes import Wishes
+from tests.edit.models import rotation, segment, sheet
+
+TURN = rotation((1, 2, 3), 0.7) @ np.diag([1.0, 1.0, -1.0])
+
+
+@pytest.fixture(scope="module")
+def net():
+    u, v = (KnotVector.clamped(np.cumsum([0.0, *(1 + 0.2 * np.sin(np.arange(n)))]), 3) for n in (13, 11))
+    x, y = np.meshgrid(u.greville(), v.greville(), indexing="ij")
+    noise = 0.02 * np.random.default_rng(2).standard_normal(x.shape)
+    return Net(u, v, np.stack([x, y, 0.02 * (x - 6) ** 2 + 0.01 * x * y + noise], axis=-1))
+
+
+def moved(values, swapped, flipped):
+    values = values.swapaxes(0, 1) if swapped else values
+    return values[:: -1 if flipped[0] else 1, :: -1 if flipped[1] else 1]
+
+
+def copied(net, swapped, flipped):
+    """A copy over knots of another length."""
+    axes = (net.v, net.u) if swapped else (net.u, net.v)
+    knots = [
+        KnotVector(7.0 + 0.3 * (k.knots[::-1] * -1 if f else k.knots), 3) for k, f in zip(axes, flipped, strict=True)
+    ]
+    return Net(*knots, moved(net.poles, swapped, flipped) @ TURN + (40.0, -5.0, 3.0))
+
+
+def together(*nets):
+    """A model of several sheets."""
+    surfaces, faces, edges = [], [], []
+    for net in nets:
+        one, first = sheet(net), len(edges)
+        trims = tuple(Trim(trim.edge + first, trim.curve) for trim in one.faces[0].trims)
+        sides = [
+            replace(edge, index=edge.index + first, sides=(replace(edge.sides[0], face=len(faces)),))
+            for edge in one.edges
+        ]
+        surfaces.append(replace(one.surfaces[0], index=len(faces), faces=(len(faces),)))
+        faces.append(replace(one.faces[0], index=len(faces), surface=len(faces), trims=trims))
+        edges += sides
+    return Model("sheets", tuple(surfaces), tuple(faces), tuple(edges), 20.0)
+
+
+@pytest.fixture
+def searches(monkeypatch):
+    """The surfaces for which results are searched."""
+    found, search = [], driver._searched
+
+    def searched(scene, wish, i):
+        found.append(i)
+        return search(scene, wish, i)
+
+    monkeypatch.setattr(driver, "_searched", searched)
+    return found
+
+
+def fair(model):
+    return faired(model, {0, 1}, Filter(5.0), Wishes(), Tolerances()).moved
+
+
+@pytest.mark.parametrize(("swapped", "flipped"), list(product((False, True), product((False, True), repeat=2))))
+def test_copies_get_the_same_result(net, searches, swapped, flipped):
+    found = fair(together(net, copied(net, swapped, flipped)))
+    assert searches == [0] and found[0].amount == found[1].amount > 0
+    expected = moved(found[0].offset, swapped, flipped) @ TURN
+    assert np.abs(found[1].offset - expected).max() < 1e-12
+    for old, new in zip(found[0].changes.values(), found[1].changes.values(), strict=True):
+        assert new.after.bending == pytest.approx(old.after.bending, rel=1e-9)
+
+
+def test_what_differs_a_little_is_no_copy(net, searches):
+    other = copied(net, False, (False, False))
+    other.poles[5, 5, 2] += 1e-3
+    fair(together(net, other))
+    assert searches == [0, 1]
+
+
+def test_what_is_trimmed_otherwise_is_no_copy(net, searches):
+    model = together(net, copied(net, False, (True, False)))
+    face = model.faces[1]
+    curve = face.trims[1].curve
+    cut = segment(*(curve.poles - (0.3 * model.surfaces[1].net.u.period, 0.0)))
+    trims = (face.trims[0], Trim(face.trims[1].edge, cut), *face.trims[2:])
+    fair(replace(model, faces=(model.faces[0], replace(face, trims=trims))))
+    assert searches == [0, 1]
+
+
+def test_a_wish_that_depends_on_the_place_asks_for_each(net, searches):
+    faired(together(net, copied(net, False, (False, False))), {0, 1}, Placed(5.0), Wishes(), Tolerances())
+    assert searches == [0, 1]
+
+
+class Placed(Filter):
+    alike = False
