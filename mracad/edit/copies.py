@@ -189,7 +189,8 @@ class Copies:
         """Whether all edges of a copy are held as those of its original."""
         both = [self.scene.joints.among({each.index}) for each in (original, sheet)]
         moving = [each.moving for each in both]
-        pairs = [pair for faces in zip(original.all_faces, sheet.all_faces, strict=True) for pair in _edges(*faces, copy)]
+        faces = zip(original.all_faces, sheet.all_faces, strict=True)
+        pairs = [pair for old, new in faces for pair in _edges(old, new, copy)]
         return None not in pairs and all(self._held_alike(both, moving, pair) for pair in pairs if pair)
 
     def _held_alike(self, joined: list[Joints], moving: list[frozenset[int]], edges: tuple[int, int]) -> bool:
