@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, fields
 from functools import cache
+from itertools import pairwise
 from types import FunctionType
 from typing import Any, cast
 
@@ -96,8 +97,25 @@ def forms(jet: Array) -> Forms:
     The results are the same, bit for bit, however many points there are.
     """
     _Work.done += jet.shape[2]
+    return forms_one_by_one(jet, jet, 0.0) if _Work.done >= MANY else _by_blocks(jet)
+
+
+def forms_along(parts: Sequence[tuple[Array, Array, float]]) -> list[Forms]:
+    """The forms of displaced surfaces, given as derivatives before, what the whole displacement adds, and its amount.
+
+    The results are the same, bit for bit, as those of :func:`forms` for sums ``before + amount * added``.
+    """
+    sizes = [before.shape[2] for before, *_ in parts]
+    _Work.done += sum(sizes)
     if _Work.done >= MANY:
-        return forms_one_by_one(jet)
+        return [forms_one_by_one(*part) for part in parts]
+    jets = [before + amount * added for before, added, amount in parts]
+    together = _by_blocks(jets[0] if len(jets) == 1 else np.concatenate(jets, axis=2))
+    ends = np.cumsum([0, *sizes]).tolist()
+    return [together.part(slice(begin, end)) for begin, end in pairwise(ends)]
+
+
+def _by_blocks(jet: Array) -> Forms:
     begins = range(0, max(jet.shape[2], 1), _BLOCK)
     return Forms.joined((forms_at_once(jet[:, :, i : i + _BLOCK]) for i in begins), jet.shape[2])
 
@@ -108,15 +126,16 @@ def forms_at_once(jet: Array) -> Forms:
     return Forms(*(np.stack(each) if isinstance(each, tuple) else each for each in every))
 
 
-def forms_one_by_one(jet: Array) -> Forms:
-    """The same as :func:`forms`, by compiled code."""
-    points = jet.shape[2]
+def forms_one_by_one(before: Array, added: Array, amount: float) -> Forms:
+    """The forms for ``before + amount * added``, by compiled code."""
+    points = before.shape[2]
     density, bending, variation, largest = np.empty((4, points))
     regular = np.empty(points, bool)
     normal, shape = np.empty((2, 3, points))
     speeds, slope = np.empty((2, 2, points))
     found = Forms(normal, density, speeds, bending, variation, largest, shape, slope, regular)
-    _compiled()(np.ascontiguousarray(jet), THIN, VOID, tuple(getattr(found, each.name) for each in fields(found)))
+    both = (np.ascontiguousarray(each) for each in (before, added))
+    _compiled()(*both, amount, THIN, VOID, tuple(getattr(found, each.name) for each in fields(found)))
     return found
 
 
@@ -172,14 +191,18 @@ def _figures(thin: Any, void: Any, derivatives: Any) -> Any:
     )  # fmt: skip
 
 
-def _swept(jet: Any, thin: Any, void: Any, found: Any) -> None:
+def _swept(before: Any, added: Any, amount: Any, thin: Any, void: Any, found: Any) -> None:
     """Fill in the figures (those of :class:`Forms`, in order) point by point."""
     normal, density, speeds, bending, variation, largest, shape, slope, regular = found
 
     def at(order: int, p: int) -> Any:
-        return jet[order, 0, p], jet[order, 1, p], jet[order, 2, p]
+        return (
+            before[order, 0, p] + amount * added[order, 0, p],
+            before[order, 1, p] + amount * added[order, 1, p],
+            before[order, 2, p] + amount * added[order, 2, p],
+        )
 
-    for p in range(jet.shape[2]):
+    for p in range(before.shape[2]):
         n, density[p], sides, bending[p], variation[p], largest[p], bent, fall, regular[p] = _figures(
             thin, void, (at(1, p), at(2, p), at(3, p), at(4, p), at(5, p), at(6, p), at(7, p), at(8, p), at(9, p))
         )

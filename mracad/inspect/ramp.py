@@ -16,7 +16,7 @@ import numpy as np
 
 from mracad.bspline.jets import blocks, jets
 from mracad.inspect.creases import Tangents
-from mracad.inspect.curvature import Forms, forms
+from mracad.inspect.curvature import Forms, forms, forms_along
 from mracad.inspect.roughness import Change
 from mracad.inspect.survey import Survey, largest, roughness
 
@@ -55,19 +55,14 @@ class Ramp:
 
     def _forms(self, amounts: Mapping[int, float]) -> dict[int, Forms]:
         """The forms of faces; those with few points are computed together."""
-        few, found = [], {}
+        few, found = {}, {}
         for i, amount in amounts.items():
-            before, slope = self.surveyed[i].jet, self._slopes[i].jet
-            if before is None or slope is None:
+            before, added = self.surveyed[i].jet, self._slopes[i].jet
+            if before is None or added is None:
                 found[i] = _in_blocks(self.surveyed[i], amount * self.offsets[i])
             else:
-                few.append((i, before + amount * slope))
-        if few:
-            together = forms(few[0][1] if len(few) == 1 else np.concatenate([jet for _, jet in few], axis=2))
-            ends = np.cumsum([jet.shape[2] for _, jet in few]).tolist()
-            for (i, _), begin, end in zip(few, [0, *ends], ends, strict=False):
-                found[i] = together.part(slice(begin, end))
-        return found
+                few[i] = before, added, amount
+        return found | dict(zip(few, forms_along(list(few.values())), strict=True)) if few else found
 
 
 @dataclass(frozen=True, eq=False)

@@ -157,7 +157,8 @@ def _seen(surfaces: Sequence[tuple[Net, Quadrature]]) -> Iterator[tuple[Array | 
         form = forms(jet) if jet is not None else Forms.joined((forms(part) for part in parts), count)
         ends = sizes[members].cumsum()
         for begin, end in zip(ends - sizes[members], ends, strict=True):
-            yield None if jet is None else jet[:, :, begin:end], form.part(slice(begin, end))
+            own = None if jet is None else np.ascontiguousarray(jet[:, :, begin:end])
+            yield own, form.part(slice(begin, end))
 
 
 def _spans(rule: Quadrature, knots: tuple[KnotVector, KnotVector]) -> Array:

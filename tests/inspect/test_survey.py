@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
-from mracad.inspect.curvature import forms_at_once, forms_one_by_one
+from mracad.inspect.curvature import forms_along, forms_at_once, forms_one_by_one
 from mracad.inspect.ramp import STEEP
 from mracad.inspect.roughness import Change, Growth, Rougher, Roughness, worse
 from mracad.inspect.survey import POINTS, RIPPLE, surveys
@@ -56,7 +56,7 @@ def test_a_sphere(radius):
     assert found.kink < 1e-5
 
 
-@pytest.mark.parametrize("forms", [forms_at_once, forms_one_by_one])
+@pytest.mark.parametrize("forms", [forms_at_once, lambda jet: forms_one_by_one(jet, jet, 0.0)])
 @pytest.mark.parametrize("size", [0.0, 1e-300, 1e-120, 1e-60])
 def test_what_rounding_leaves_of_a_pole_is_no_curvature(size, forms):
     """S_u as good as nothing at right angles to S_v: powers of it would be no numbers, which nothing compares with."""
@@ -71,10 +71,17 @@ def test_many_points_have_the_same_bits_as_few():
     """What is compiled for many rounds as what is not: no verdict depends on what a process has done before."""
     jet = np.random.default_rng(1).standard_normal((10, 3, 1000))
     jet[1:3, :, 7], jet[2, :, 8], jet[3:, :, 9] = 0.0, 3 * jet[1, :, 8], 0.0
-    few, many = forms_at_once(jet), forms_one_by_one(np.asfortranarray(jet))
-    assert few.regular.sum() == 998
-    for each in fields(few):
-        assert getattr(few, each.name).tobytes() == getattr(many, each.name).tobytes()
+    added = np.random.default_rng(2).standard_normal(jet.shape)
+    added[:, :, 7:10] = 0.0
+    for amount in (0.0, 0.3):
+        few = forms_at_once(jet + amount * added)
+        some = forms_along([(jet[..., :400], added[..., :400], amount), (jet[..., 400:], added[..., 400:], amount)])
+        many = forms_one_by_one(np.asfortranarray(jet), added, amount)
+        assert few.regular.sum() == 998
+        for each in fields(few):
+            assert getattr(few, each.name).tobytes() == getattr(many, each.name).tobytes()
+            parts = np.concatenate([getattr(part, each.name) for part in some], axis=-1)
+            assert getattr(few, each.name).tobytes() == parts.tobytes()
 
 
 def test_a_cylinder():
