@@ -270,25 +270,39 @@ def _tried(
     if wish.fades and trial.pose.share is not None:
         target = trial.pose.share * target
     wished = float(trial.gains(target, target).of(1.0).sum())
-    found, possible = [trial.nothing(least * wished)], trial.most(target) > least * wished
-    for batch in wish.ways(trial.problem, target, trial.width) if possible else ():
+    found = _ways(trial, wish, target, trial.nothing(least * wished))
+    if len(members) > 1:
+        _blend(trial, target, found)
+    return _explained(trial, _confirmed(trial, members, found, target), target)
+
+
+def _ways(trial: Trial, wish: Wish, target: Array, nothing: Verdict) -> list[Verdict]:
+    """Verdicts on the ways to a target, after that on no change, until one is allowed."""
+    found, most = [nothing], trial.most(target)
+    for batch in wish.ways(trial.problem, target, trial.width) if most > nothing.gain else ():
         first = len(found)
         for wanted in batch:
             found.append(trial.judged(trial.pose.faded(wanted) if wish.fades else wanted, target, found))
+            if found[-1].least == 1.0 and NEARER * found[-1].gain >= most:
+                return found
         if max(found, key=rank).least <= ENOUGH:
             for each in found[first:]:
                 found.append(trial.eased(each, target, found))
         if max(found, key=rank).least > ENOUGH:
             break
-    for _ in range(BLENDS if len(found) > 1 and len(members) > 1 else 0):
-        chosen = [(max(found, key=lambda each: each.gains[i]), i) for i in range(len(members))]
+    return found
+
+
+def _blend(trial: Trial, target: Array, found: list[Verdict]) -> None:
+    """Add verdicts on combinations of the displacements that are best for each surface."""
+    for _ in range(BLENDS if len(found) > 1 else 0):
+        chosen = [(max(found, key=lambda each: each.gains[i]), i) for i in range(len(trial.nets))]
         now = max(found, key=rank)
         if sum(each.gains[i] for each, i in chosen) <= NEARER * now.gain:
             break
         found.append(trial.blended(chosen, target, found))
         if max(found, key=rank) is now:
             break
-    return _explained(trial, _confirmed(trial, members, found, target), target)
 
 
 def _explained(trial: Trial, moved: dict[int, Moved], target: Array) -> dict[int, Moved]:

@@ -92,9 +92,10 @@ def ways(problem: Problem, target: Array, width: float) -> Iterable[Iterable[Arr
     if not problem.rimmed:
         yield [target]
         return
-    smooth, faded = stiffness(width / 2), problem.fading(width) * target
-    yield [problem.nearest(target, stiff) for stiff in (0.0, stiffness(width / 4), smooth)]
+    smooth = stiffness(width / 2)
+    yield (problem.nearest(target, stiff) for stiff in (0.0, stiffness(width / 4), smooth))
     yield problem.filtered(stiffness(width)), problem.nearest(target, stiffness(width / 8))
+    faded = problem.fading(width) * target
     yield problem.nearest(faded, smooth), problem.nearest(faded)
     yield [problem.nearest(calm(problem, target, width) * faded)]
 

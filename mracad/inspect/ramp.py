@@ -53,6 +53,10 @@ class Ramp:
             i: _change(self.surveyed[i], self._slopes[i], amounts[i], form) for i, form in self._forms(amounts).items()
         }
 
+    def forget(self) -> None:
+        """Drop derivatives, to compute them again where more amounts are asked for."""
+        self._slopes.clear()
+
     def _forms(self, amounts: Mapping[int, float]) -> dict[int, Forms]:
         """The forms of faces; those with few points are computed together."""
         few, found = {}, {}

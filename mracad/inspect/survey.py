@@ -29,7 +29,7 @@ RIPPLE = 1e-8
 ROUNDING = 16 * float(np.finfo(float).eps)
 """Error of a point of a surface relative to its largest coordinate, taken as a ripple as long as the span there."""
 
-KEPT = 50_000
+KEPT = 100_000
 """Largest number of points whose derivatives are kept, in all: 240 bytes each."""
 
 
@@ -144,7 +144,7 @@ def _seen(surfaces: Sequence[tuple[Net, Quadrature]]) -> Iterator[tuple[Array | 
     """Derivatives, unless they are many, and forms of each surface at the points of its rule; small surfaces are
     processed together."""
     sizes = np.array([int(rule.mask.sum()) for _, rule in surfaces])
-    group = (sizes.cumsum() - sizes) // KEPT
+    group, kept = (sizes.cumsum() - sizes) // KEPT, 0
     for number in np.unique(group):
         members = np.flatnonzero(group == number).tolist()
         parts = chain.from_iterable(
@@ -152,7 +152,8 @@ def _seen(surfaces: Sequence[tuple[Net, Quadrature]]) -> Iterator[tuple[Array | 
             for net, rule in (surfaces[i] for i in members)
         )
         count = int(sizes[members].sum())
-        few = count <= KEPT
+        few = kept + count <= KEPT
+        kept += count if few else 0
         jet = np.concatenate(list(parts), axis=2) if few else None
         form = forms(jet) if jet is not None else Forms.joined((forms(part) for part in parts), count)
         ends = sizes[members].cumsum()
