@@ -149,12 +149,10 @@ class Command(click.Command):
         """Do the work of the command, in a child process where it is guarded."""
         from mracad.job import guard
         from mracad_cli.journal import Ended
-        from mracad_cli.outputs import check_inputs
 
         def work() -> Ended:
             try:
                 with told():
-                    check_inputs(ctx)
                     code = click.Command.invoke(self, ctx)
                     sys.stdout.flush()
             finally:

@@ -128,8 +128,8 @@ def _check_scalars(formats: Collection[Format], scalars: Scalars, hint: str) -> 
         raise UsageError("scalar: no mesh is written", f"{hint.format(able)}, or leave --scalar out")
 
 
-def check_inputs(ctx: click.Context) -> None:
-    """Refuse inputs on this machine that do not exist, before outputs that do; those of a batch fail one by one."""
+def _check_inputs(ctx: click.Context) -> None:
+    """Refuse inputs on this machine that do not exist; those of a batch fail one by one."""
     for param in ctx.command.params:
         given = ctx.params.get(param.name or "")
         for text in (given if isinstance(given, tuple | list) else [given]) if given and param.nargs == 1 else ():
@@ -173,6 +173,7 @@ def check_target(path: Location, overwrite: bool) -> None:
     else:
         _check_folder(path)
     if not overwrite and path.exists():
+        _check_inputs(click.get_current_context())
         raise UsageError(f"{path} exists", "give --overwrite to replace it")
 
 
