@@ -128,6 +128,7 @@ $(VENV)/ready: pyproject.toml constraints.txt
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "mracad needs Python 3.11 or newer: make PYTHON=python3.11")'
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/pip install --quiet --editable '.[cadquery,features,view]'
+	$(BIN)/python -m mracad.warm
 	@touch $@
 
 $(VENV)/dev: $(VENV)/ready

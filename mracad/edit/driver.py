@@ -43,8 +43,8 @@ FIRST = 2
 PRICE = 0.05
 """Share of the wanted change that doubling the control points of a surface must add to be worth it."""
 
-MOST = 9.0
-"""Largest factor by which the control points of a surface alone are multiplied."""
+MOST = 9.0, 2000
+"""Largest factor by which the control points of a surface alone are multiplied, beyond a number that is small."""
 
 CANDIDATES = 3
 """Largest number of displacements that are judged closely after a first look."""
@@ -209,10 +209,8 @@ def groups(surfaces: Iterable[int], joined: Joints) -> list[list[int]]:
 
 def _by_itself(scene: Scene, wish: Wish, i: int, copies: Copies) -> Moved:
     """The best result for a surface alone; that of its original for a copy of one tried before."""
-    moved = copies.result(i)
-    if moved is None:
-        moved = _searched(scene, wish, i)
-        copies.keep(moved)
+    moved = copies.result(i) or _searched(scene, wish, i)
+    copies.keep(moved)
     return moved
 
 
@@ -220,9 +218,10 @@ def _searched(scene: Scene, wish: Wish, i: int) -> Moved:
     """The best result for a surface alone, with more control points beside its rims where they pay."""
     joined, sheet = scene.joints.among({i}), scene.sheets[i]
     plain = _attempt(scene, wish, [i], joined)[i]
-    size = _points(beside_rims(sheet, joined)) / _points(sheet.net) if scene.refine else 1.0
+    count = _points(beside_rims(sheet, joined) if scene.refine else sheet.net)
+    size = count / _points(sheet.net)
     least = plain.share + PRICE * (size - 1.0)
-    if size == 1.0 or size > MOST or least >= 1.0:
+    if size == 1.0 or (size > MOST[0] and count > MOST[1]) or least >= 1.0:
         return plain
     finer = _attempt(scene, wish, [i], joined, {i}, least)[i]
     if finer.share > least:

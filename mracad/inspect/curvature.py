@@ -20,7 +20,7 @@ VOID = 1e-40
 """|S_u × S_v| up to which a surface counts as degenerate too: powers of smaller numbers underflow."""
 
 
-MANY = 7_000_000
+MANY = 4_500_000
 """Number of points above which it pays to import a compiler."""
 
 

@@ -58,7 +58,19 @@ _RIMS = (
     [(), ("--free-edges", "hold"), ("--free-edges", "smooth"), ("--free-edges", "smooth", "--corners", "move")],
 )
 
+_FORMATS = [
+    *(
+        ("--format", name)
+        for name in ("iges", "brep", "binbrep", "3mf", "obj", "gltf", "glb", "vtu", "png", "gif", "mp4")
+    ),
+    ("--format", "step", "--schema", "AP242"),
+    ("--format", "stl", "--chord", "1mm", "--angle", "30", "--ascii"),
+    ("--format", "ply", "--chord", "1mm", "--scalar", "curvature:gauss"),
+    ("--format", "vtp", "--angle", "30", "--scalar", "deviation", "--scalar", "roughness"),
+]
+
 TOGETHER: Mapping[str, Sequence[tuple[str, Sequence[Words]]]] = {
+    "batch": [("format schema chord angle ascii_stl scalar", [(), *_FORMATS])],
     "smooth": [
         (
             "scale across along level limit_by_curvature max_deviation",

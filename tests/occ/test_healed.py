@@ -21,6 +21,7 @@ def here(tmp_path, monkeypatch):
 @pytest.fixture
 def reads(monkeypatch):
     """How often the kernel has read a file."""
+    memo.clear()
     done = []
     monkeypatch.setattr("mracad.occ.step.read_step", lambda *given: done.append(1) or read_step(*given))
     return done
