@@ -68,3 +68,11 @@ def rotation(axis, angle):
     k = np.asarray(axis, float) / np.linalg.norm(axis)
     cross = np.array([[0, -k[2], k[1]], [k[2], 0, -k[0]], [-k[1], k[0], 0]])
     return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+
+
+def noisy():
+    """A curved net of 16 × 14 control points on uneven knots, about 1 mm apart, with noise of 0.02 mm."""
+    u, v = (KnotVector.clamped(np.cumsum([0.0, *(1 + 0.2 * np.sin(np.arange(n)))]), 3) for n in (13, 11))
+    x, y = np.meshgrid(u.greville(), v.greville(), indexing="ij")
+    noise = 0.02 * np.random.default_rng(2).standard_normal(x.shape)
+    return Net(u, v, np.stack([x, y, 0.02 * (x - 6) ** 2 + 0.01 * x * y + noise], axis=-1))

@@ -13,17 +13,14 @@ from mracad.edit.fair import Filter, faired
 from mracad.edit.tolerances import Tolerances
 from mracad.model.brep import Model, Trim
 from mracad.seam.wishes import Wishes
-from tests.edit.models import rotation, segment, sheet
+from tests.edit.models import noisy, rotation, segment, sheet
 
 TURN = rotation((1, 2, 3), 0.7) @ np.diag([1.0, 1.0, -1.0])
 
 
 @pytest.fixture(scope="module")
 def net():
-    u, v = (KnotVector.clamped(np.cumsum([0.0, *(1 + 0.2 * np.sin(np.arange(n)))]), 3) for n in (13, 11))
-    x, y = np.meshgrid(u.greville(), v.greville(), indexing="ij")
-    noise = 0.02 * np.random.default_rng(2).standard_normal(x.shape)
-    return Net(u, v, np.stack([x, y, 0.02 * (x - 6) ** 2 + 0.01 * x * y + noise], axis=-1))
+    return noisy()
 
 
 def moved(values, swapped, flipped):

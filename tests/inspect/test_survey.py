@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
 from mracad.inspect.curvature import forms_along, forms_at_once, forms_one_by_one
-from mracad.inspect.ramp import STEEP
+from mracad.inspect.ramp import STEEP, Ramp
 from mracad.inspect.roughness import Change, Growth, Rougher, Roughness, worse
 from mracad.inspect.survey import POINTS, RIPPLE, surveys
 from tests.inspect.ramps import changes
@@ -313,3 +313,20 @@ def test_singular_points_count_only_where_they_change():
     assert Rougher.SINGULAR not in {each.what for each in worse(away, Growth())}
     scaled = found(moved(before, before.poles * [1.0, 1.0, 1.3]))
     assert Rougher.SINGULAR in {each.what for each in worse(scaled, Growth())}
+
+
+def test_what_is_kept_of_derivatives_changes_nothing_but_rounding(monkeypatch):
+    """Derivatives in memory, forgotten and computed again, or never kept because there are many points."""
+    before, after = cylinder(2.0, 3.0), cylinder(2.1, 3.2)
+    offset = after.poles - before.poles
+    (kept,) = surveys([(before, [face()])])
+    ramp = Ramp([kept], [offset])
+    first = ramp.changes({0: 0.3})[0]
+    ramp.forget()
+    assert not ramp._slopes and ramp.changes({0: 0.3})[0] == first
+    monkeypatch.setattr("mracad.inspect.survey.KEPT", 1)
+    (bare,) = surveys([(before, [face()])])
+    assert kept.jet is not None and bare.jet is None
+    again = Ramp([bare], [offset]).changes({0: 0.3})[0]
+    assert astuple(again.after) == pytest.approx(astuple(first.after), rel=1e-9, abs=1e-9)
+    assert (again.deviation, again.motion, again.turn) == pytest.approx((first.deviation, first.motion, first.turn))

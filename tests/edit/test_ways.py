@@ -1,0 +1,48 @@
+"""How many ways to a target are tried, and with how many control points."""
+
+import pytest
+
+from mracad.edit import driver
+from mracad.edit.fair import Filter, faired
+from mracad.edit.tolerances import Tolerances
+from mracad.seam.wishes import Wishes
+from tests.edit.models import noisy, sheet
+
+
+@pytest.fixture(scope="module")
+def net():
+    return noisy()
+
+
+@pytest.fixture
+def trials(monkeypatch):
+    """The displacements that are judged, by attempt."""
+    found = []
+    begin, judge = driver.Trial.__init__, driver.Trial.judged
+
+    def begun(self, *given, **more):
+        found.append([])
+        begin(self, *given, **more)
+
+    def judged(self, *given):
+        found[-1].append(given[0])
+        return judge(self, *given)
+
+    monkeypatch.setattr(driver.Trial, "__init__", begun)
+    monkeypatch.setattr(driver.Trial, "judged", judged)
+    return found
+
+
+def test_no_other_way_is_tried_after_one_that_is_allowed_whole_and_as_near_as_any(net, trials):
+    found = faired(sheet(net), {0}, Filter(1.0), Wishes(), Tolerances(), refine=False).moved[0]
+    assert found.amount == 1.0
+    assert [len(each) for each in trials] == [1]
+
+
+def test_control_points_are_multiplied_only_so_far(net, trials, monkeypatch):
+    faired(sheet(net), {0}, Filter(2.0), Wishes(), Tolerances())
+    assert len(trials) == 2
+    trials.clear()
+    monkeypatch.setattr(driver, "MOST", (1.0, 0))
+    faired(sheet(net), {0}, Filter(2.0), Wishes(), Tolerances())
+    assert len(trials) == 1
