@@ -99,7 +99,7 @@ _OUT_OF_MEMORY = (
     "failed to map segment", "cannot map zero-fill pages", "Cannot allocate memory", "bad_alloc",
     "error return without exception set", "Unable to create type object",
 )  # fmt: skip
-"""Messages of libraries that ran out of memory: the loader, and compiled modules while they are loaded."""
+"""Messages of libraries that ran out of memory."""
 
 
 def end_with_parent() -> None:
@@ -156,8 +156,9 @@ def _take_buffers() -> None:
 
 
 def _starved(error: BaseException) -> bool:
-    """Whether an error means that memory ran out; libraries that cannot be loaded for it only say so in a message."""
-    return isinstance(error, MemoryError) or any(words in str(error) for words in _OUT_OF_MEMORY)
+    """Whether an error under a limit means that memory ran out: a library that cannot be loaded for it may not say so."""
+    unloaded = isinstance(error, ImportError) and not isinstance(error, ModuleNotFoundError)
+    return unloaded or isinstance(error, MemoryError) or any(words in str(error) for words in _OUT_OF_MEMORY)
 
 
 def _terminated(*_: object) -> None:

@@ -153,6 +153,17 @@ def test_too_much_memory_is_an_error():
     assert guard.run(hungry, int, memory=3 * 10**9) == 10**8
 
 
+def unloadable():
+    raise ImportError("initialization failed")  # all that pybind11 says when a module runs out of memory
+
+
+def test_a_library_that_does_not_load_under_a_limit_has_too_little_memory():
+    with pytest.raises(MracadError, match="memory limit of 3000 MB"):
+        guard.run(unloadable, int, memory=3 * 10**9)
+    with pytest.raises(MracadError, match="internal error: ImportError"):
+        guard.run(unloadable, int)
+
+
 def test_results_and_errors_come_back():
     assert guard.run(lambda: {"a": [1, 2]}, dict, 60) == {"a": [1, 2]}
     for kind in (EditError, FileError):
