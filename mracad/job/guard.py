@@ -156,7 +156,7 @@ def _take_buffers() -> None:
 
 
 def _starved(error: BaseException) -> bool:
-    """Whether an error under a limit means that memory ran out: a library that cannot be loaded for it may not say so."""
+    """Whether an error under a limit means that memory ran out; a library that does not load for it may not say so."""
     unloaded = isinstance(error, ImportError) and not isinstance(error, ModuleNotFoundError)
     return unloaded or isinstance(error, MemoryError) or any(words in str(error) for words in _OUT_OF_MEMORY)
 
