@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from mracad.bspline.surface import Net
-from mracad.edit.copies import Copies
+from mracad.edit.congruent import Congruent
 from mracad.edit.moved import Moved, Result, closely
 from mracad.edit.pose import Scene, beside_rims
 from mracad.edit.target import Sheet, Wish
@@ -60,10 +60,10 @@ def drive(scene: Scene, wish: Wish, progress: Callable[[int, int], None] | None 
     result: dict[int, Moved] = {}
     exact: list[Seam] = []
     loose: list[TrimmedSeam] = []
-    copies = Copies(scene, wish)
+    congruent = Congruent(scene, wish)
     for group in groups(scene.sheets, scene.joints):
         tell(len(result), len(scene.sheets))
-        alone, tried = _alone(scene, wish, group, copies)
+        alone, tried = _alone(scene, wish, group, congruent)
         result |= alone
         able = [i for i in group if i not in alone or alone[i].amount >= LEAST or alone[i].held_back]
         for members in groups(able, scene.joints.among(able)):
@@ -71,7 +71,7 @@ def drive(scene: Scene, wish: Wish, progress: Callable[[int, int], None] | None 
                 exact += [seam for seam in joined.exact if seam.a.surface != seam.b.surface]
                 loose += joined.loose
                 result |= part
-        result |= {i: _by_itself(scene, wish, i, copies) for i in group if i not in result}
+        result |= {i: _by_itself(scene, wish, i, congruent) for i in group if i not in result}
     result = {i: result[i].done() for i in scene.sheets}
     moving = {i for i, moved in result.items() if moved.amount > 0}
     exact += [seam for seam in scene.joints.exact if seam.a.surface == seam.b.surface and seam.a.surface in moving]
@@ -93,7 +93,7 @@ def _dropped(wanted: Joints, used: Joints, result: Mapping[int, Moved]) -> dict[
 
 
 def _alone(
-    scene: Scene, wish: Wish, group: Sequence[int], copies: Copies
+    scene: Scene, wish: Wish, group: Sequence[int], congruent: Congruent
 ) -> tuple[dict[int, Moved], dict[tuple[int, ...], dict[int, Moved]]]:
     """Results for joined surfaces, each edited alone; only for the first few if all succeed together.
 
@@ -110,7 +110,7 @@ def _alone(
             )
             if _through(whole) and not _less(whole, alone):
                 break
-        alone[i] = _by_itself(scene, wish, i, copies)
+        alone[i] = _by_itself(scene, wish, i, congruent)
     return alone, tried
 
 
@@ -207,10 +207,10 @@ def groups(surfaces: Iterable[int], joined: Joints) -> list[list[int]]:
     return list(found.values())
 
 
-def _by_itself(scene: Scene, wish: Wish, i: int, copies: Copies) -> Moved:
-    """The best result for a surface alone; that of its original for a copy of one tried before."""
-    moved = copies.result(i) or _searched(scene, wish, i)
-    copies.keep(moved)
+def _by_itself(scene: Scene, wish: Wish, i: int, congruent: Congruent) -> Moved:
+    """The best result for a surface alone; that of a congruent one if it was tried before."""
+    moved = congruent.result(i) or _searched(scene, wish, i)
+    congruent.keep(moved)
     return moved
 
 

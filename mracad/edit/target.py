@@ -60,7 +60,7 @@ class Wish(Protocol):
     lean : bool
         Whether joined surfaces get more control points only if they cannot do without (default: no).
     alike : bool
-        Whether it asks the same of copies of a surface, wherever they lie (default: no).
+        Whether it asks the same of congruent surfaces, wherever they lie (default: no).
     growth : Growth
         How much rougher it may make a face.
     """

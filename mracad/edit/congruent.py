@@ -1,7 +1,7 @@
-"""Surfaces that are copies of others, moved or mirrored, as in patterns and in symmetric parts.
+"""Surfaces congruent to others, which are the same but moved or mirrored, as in patterns and in symmetric parts.
 
-The problem of a copy alone is that of its original in other coordinates: parameters exchanged, reversed and scaled,
-space turned by an orthogonal map.  So what was found for the original is moved likewise, and only judged.
+The problem of such a surface alone is that of the other in other coordinates: parameters exchanged, reversed and
+scaled, space turned by an orthogonal map.  So what was found for the first is moved likewise, and only judged.
 """
 
 from __future__ import annotations
@@ -26,26 +26,26 @@ from mracad.seam.interface import Joints
 Array = np.ndarray
 
 CLOSE = 1e-5
-"""Largest difference between a copy and its original, relative to their size or to the domain."""
+"""Largest difference between congruent surfaces once one is moved onto the other, relative to size or domain."""
 
 ENOUGH = 0.95
-"""Least share of the amount of the original that the judge must allow."""
+"""Least share of the amount of the first surface that the judge must allow."""
 
 
 @dataclass(frozen=True, eq=False)
-class Copy:
-    """How the parameters and the space of a surface become those of its copy.
+class Congruence:
+    """How the parameters and the space of a surface become those of one congruent to it.
 
     Attributes
     ----------
     nets : (Net, Net)
-        The original and the copy.
+        The first surface and the other.
     swapped : bool
         Whether u and v are exchanged.
     flipped : (bool, bool)
-        Whether u and v of the copy then run the other way.
+        Whether u and v of the other then run the opposite way.
     turn : ndarray (3, 3)
-        An orthogonal matrix: rows times it are those of the copy.
+        An orthogonal matrix: rows times it are those of the other.
     """
 
     nets: tuple[Net, Net]
@@ -54,26 +54,26 @@ class Copy:
     turn: Array
 
     def arranged(self, values: Array) -> Array:
-        """Values at the control points of the original, ``(nu, nv, …)``, in the order of the copy."""
+        """Values at the control points of the first, ``(nu, nv, …)``, in the order of the other."""
         return _arranged(values, self.swapped, self.flipped)
 
     def offset(self, offset: Array) -> Array:
-        """The displacement of the copy, for one of the original."""
+        """The displacement of the other, for one of the first."""
         return np.asarray(self.arranged(offset) @ self.turn)
 
     def parameters(self, axis: int, x: Array) -> Array:
-        """Parameters along an axis of the copy, for those along the axis that it has in the original."""
+        """Parameters along an axis of the other, for those along the axis that it has in the first."""
         theirs, own = _knots(self.nets[0], axis, self.swapped), _knots(self.nets[1], axis, False)
         share = (x - theirs.domain[0]) / theirs.period
         return np.asarray(own.domain[0] + own.period * (1.0 - share if self.flipped[axis] else share))
 
     def places(self, uv: Array) -> Array:
-        """Parameters ``(…, 2)`` of the copy, for those of the original."""
+        """Parameters ``(…, 2)`` of the other, for those of the first."""
         both = uv[..., ::-1] if self.swapped else uv
         return np.stack([self.parameters(axis, both[..., axis]) for axis in (0, 1)], axis=-1)
 
     def finer(self, net: Net, fine: Net) -> Net:
-        """A refinement of the copy ``net`` with the knots that a refinement of the original has more."""
+        """The other, ``net``, with the knots that ``fine``, a refinement of the first, has more."""
         more = []
         for axis in (0, 1):
             base, knots = (_knots(each, axis, self.swapped) for each in (self.nets[0], fine))
@@ -85,10 +85,10 @@ class Copy:
         return net.refined(*more)
 
 
-def copies_of(original: Sheet, sheet: Sheet) -> Iterator[Copy]:
-    """The ways in which a surface is a copy of another: several if it is symmetric itself."""
-    nets = original.net, sheet.net
-    if not (original.stretch.even and sheet.stretch.even and _near(original.wavelength, sheet.wavelength)):
+def congruences(first: Sheet, sheet: Sheet) -> Iterator[Congruence]:
+    """The ways in which a surface is congruent to another: several if it is symmetric itself."""
+    nets = first.net, sheet.net
+    if not (first.stretch.even and sheet.stretch.even and _near(first.wavelength, sheet.wavelength)):
         return
     points = [net.poles.reshape(-1, 3) - net.poles.mean(axis=(0, 1)) for net in nets]
     size = float(np.linalg.norm(points[1], axis=1).max())
@@ -102,18 +102,18 @@ def copies_of(original: Sheet, sheet: Sheet) -> Iterator[Copy]:
         turn = left @ right
         if np.abs(moved @ turn - points[1]).max() > CLOSE * size:
             continue
-        copy = Copy(nets, swapped, (flipped[0], flipped[1]), turn)
-        if _weighted_alike(copy):
-            yield copy
+        found = Congruence(nets, swapped, (flipped[0], flipped[1]), turn)
+        if _weighted_alike(found):
+            yield found
 
 
 def _near(a: float, b: float) -> bool:
     return abs(a - b) <= CLOSE * abs(b)
 
 
-def _same(original: Net, net: Net, axis: int, swapped: bool, flipped: bool) -> bool:
-    """Whether an axis of a net has the knots of the original, but for scale and direction."""
-    theirs, own = _knots(original, axis, swapped), _knots(net, axis, False)
+def _same(first: Net, net: Net, axis: int, swapped: bool, flipped: bool) -> bool:
+    """Whether an axis of a net has the knots of the first, but for scale and direction."""
+    theirs, own = _knots(first, axis, swapped), _knots(net, axis, False)
     if (theirs.degree, theirs.count, theirs.periodic) != (own.degree, own.count, own.periodic):
         return False
     if theirs.periodic and (flipped or swapped):
@@ -122,11 +122,11 @@ def _same(original: Net, net: Net, axis: int, swapped: bool, flipped: bool) -> b
     return bool(np.abs((1.0 - one[::-1] if flipped else one) - other).max() <= CLOSE)
 
 
-def _weighted_alike(copy: Copy) -> bool:
-    one, other = (net.weights for net in copy.nets)
+def _weighted_alike(between: Congruence) -> bool:
+    one, other = (net.weights for net in between.nets)
     if one is None or other is None:
         return one is other
-    return bool(np.allclose(copy.arranged(one), other, rtol=CLOSE))
+    return bool(np.allclose(between.arranged(one), other, rtol=CLOSE))
 
 
 def _knots(net: Net, axis: int, swapped: bool) -> KnotVector:
@@ -138,8 +138,8 @@ def _arranged(values: Array, swapped: bool, flipped: tuple[bool, ...] | list[boo
     return values[:: -1 if flipped[0] else 1, :: -1 if flipped[1] else 1]
 
 
-class Copies:
-    """The surfaces of a scene for which a result was found alone, and those that are their copies.
+class Congruent:
+    """The surfaces of a scene for which a result was found alone, and those congruent to them.
 
     Parameters
     ----------
@@ -161,23 +161,23 @@ class Copies:
             self.found[_kind(moved.sheet)].append(moved.done())
 
     def result(self, i: int) -> Moved | None:
-        """The result for a surface, if it is a copy of one that is known."""
+        """The result for a surface, if it is congruent to one for which it is known."""
         sheet = self.scene.sheets[i]
         if self.able and i not in self.others:
             for known in self.found[_kind(sheet)]:
-                ways = copies_of(known.sheet, sheet)
-                copy = next((way for way in ways if self._joined_alike(known.sheet, sheet, way)), None)
-                moved = self._moved(known, sheet, copy) if copy else None
+                ways = congruences(known.sheet, sheet)
+                between = next((way for way in ways if self._joined_alike(known.sheet, sheet, way)), None)
+                moved = self._moved(known, sheet, between) if between else None
                 if moved is not None:
                     return moved
         return None
 
-    def _moved(self, known: Moved, sheet: Sheet, copy: Copy) -> Moved | None:
-        """The result of the original, moved to its copy; None where the judge allows clearly less of it there."""
-        net = copy.finer(sheet.net, known.net)
-        if net.poles.shape != copy.arranged(known.net.poles).shape:
+    def _moved(self, known: Moved, sheet: Sheet, between: Congruence) -> Moved | None:
+        """The known result, moved to a congruent surface; None where the judge allows clearly less of it there."""
+        net = between.finer(sheet.net, known.net)
+        if net.poles.shape != between.arranged(known.net.poles).shape:
             return None
-        tried = Tried(closely(sheet, net), [net], [copy.offset(known.tried.parts[0])])
+        tried = Tried(closely(sheet, net), [net], [between.offset(known.tried.parts[0])])
         if not known.amount:
             return replace(known, sheet=sheet, tried=tried, changes=tried.watch.still()[0])
         moved = replace(known, sheet=sheet, tried=tried).confirmed(self.scene.tolerances)
@@ -185,12 +185,12 @@ class Copies:
         room = jumps.room({sheet.index: displaced(net, moved.offset)})
         return moved if moved.amount >= ENOUGH * known.amount and not room else None
 
-    def _joined_alike(self, original: Sheet, sheet: Sheet, copy: Copy) -> bool:
-        """Whether all edges of a copy are held as those of its original."""
-        both = [self.scene.joints.among({each.index}) for each in (original, sheet)]
+    def _joined_alike(self, first: Sheet, sheet: Sheet, between: Congruence) -> bool:
+        """Whether all edges of a surface are held as those of the first."""
+        both = [self.scene.joints.among({each.index}) for each in (first, sheet)]
         moving = [each.moving for each in both]
-        faces = zip(original.all_faces, sheet.all_faces, strict=True)
-        pairs = [pair for old, new in faces for pair in _edges(old, new, copy)]
+        faces = zip(first.all_faces, sheet.all_faces, strict=True)
+        pairs = [pair for old, new in faces for pair in _edges(old, new, between)]
         return None not in pairs and all(self._held_alike(both, moving, pair) for pair in pairs if pair)
 
     def _held_alike(self, joined: list[Joints], moving: list[frozenset[int]], edges: tuple[int, int]) -> bool:
@@ -211,17 +211,17 @@ class Copies:
 
 
 def _kind(sheet: Sheet) -> tuple[object, ...]:
-    """What a surface has in common with all its copies, in a form that can be looked up."""
+    """What congruent surfaces have in common, in a form that can be looked up."""
     axes = sorted((each.degree, each.count, each.periodic) for each in (sheet.net.u, sheet.net.v))
     trims = tuple(len(face.trims) for face in sheet.all_faces)
     return (*axes, sheet.net.weights is None, trims, len(sheet.faces))
 
 
-def _edges(original: Face, face: Face, copy: Copy) -> Iterator[tuple[int, int] | None]:
-    """Each edge of a face of the original with that of the copy; None where there is none."""
-    size = np.array([knots.period for knots in (copy.nets[1].u, copy.nets[1].v)])
-    theirs, own = copy.places(_marks(original)), _marks(face)
-    for trim, marks in zip(original.trims, theirs, strict=True):
+def _edges(first: Face, face: Face, between: Congruence) -> Iterator[tuple[int, int] | None]:
+    """Each edge of a face of the first surface with that of the other; None where there is none."""
+    size = np.array([knots.period for knots in (between.nets[1].u, between.nets[1].v)])
+    theirs, own = between.places(_marks(first)), _marks(face)
+    for trim, marks in zip(first.trims, theirs, strict=True):
         off = [np.abs((each - marks) / size).max(axis=(1, 2)) for each in (own, own[:, ::-1])]
         nearest = int(np.minimum(*off).argmin())
         yield (trim.edge, face.trims[nearest].edge) if min(each[nearest] for each in off) <= CLOSE else None

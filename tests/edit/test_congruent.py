@@ -1,4 +1,4 @@
-"""Copies of a surface, moved or mirrored, with parameters that run otherwise, get the same result without a search."""
+"""Congruent surfaces, whose parameters may run otherwise, get the same result without a search."""
 
 from dataclasses import replace
 from itertools import product
@@ -28,8 +28,8 @@ def moved(values, swapped, flipped):
     return values[:: -1 if flipped[0] else 1, :: -1 if flipped[1] else 1]
 
 
-def copied(net, swapped, flipped):
-    """A copy over knots of another length."""
+def alike(net, swapped, flipped):
+    """A congruent surface over knots of another length."""
     axes = (net.v, net.u) if swapped else (net.u, net.v)
     knots = [
         KnotVector(7.0 + 0.3 * (k.knots[::-1] * -1 if f else k.knots), 3) for k, f in zip(axes, flipped, strict=True)
@@ -71,8 +71,8 @@ def fair(model):
 
 
 @pytest.mark.parametrize(("swapped", "flipped"), list(product((False, True), product((False, True), repeat=2))))
-def test_copies_get_the_same_result(net, searches, swapped, flipped):
-    found = fair(together(net, copied(net, swapped, flipped)))
+def test_congruent_surfaces_get_the_same_result(net, searches, swapped, flipped):
+    found = fair(together(net, alike(net, swapped, flipped)))
     assert searches == [0] and found[0].amount == found[1].amount > 0
     expected = moved(found[0].offset, swapped, flipped) @ TURN
     assert np.abs(found[1].offset - expected).max() < 1e-12
@@ -80,15 +80,15 @@ def test_copies_get_the_same_result(net, searches, swapped, flipped):
         assert new.after.bending == pytest.approx(old.after.bending, rel=1e-9)
 
 
-def test_what_differs_a_little_is_no_copy(net, searches):
-    other = copied(net, False, (False, False))
+def test_what_differs_a_little_is_not_congruent(net, searches):
+    other = alike(net, False, (False, False))
     other.poles[5, 5, 2] += 1e-3
     fair(together(net, other))
     assert searches == [0, 1]
 
 
-def test_what_is_trimmed_otherwise_is_no_copy(net, searches):
-    model = together(net, copied(net, False, (True, False)))
+def test_what_is_trimmed_otherwise_is_not_congruent(net, searches):
+    model = together(net, alike(net, False, (True, False)))
     face = model.faces[1]
     curve = face.trims[1].curve
     cut = segment(*(curve.poles - (0.3 * model.surfaces[1].net.u.period, 0.0)))
@@ -98,7 +98,7 @@ def test_what_is_trimmed_otherwise_is_no_copy(net, searches):
 
 
 def test_a_wish_that_depends_on_the_place_asks_for_each(net, searches):
-    faired(together(net, copied(net, False, (False, False))), {0, 1}, Placed(5.0), Wishes(), Tolerances())
+    faired(together(net, alike(net, False, (False, False))), {0, 1}, Placed(5.0), Wishes(), Tolerances())
     assert searches == [0, 1]
 
 
