@@ -25,7 +25,7 @@ from mracad_cli.params import relocated
 
 NAME, PROJECT, TABLE = "mracad.toml", "pyproject.toml", ("tool", "mracad")
 PREFIX = "MRACAD_"
-RESERVED = frozenset({"MRACAD_CORPUS", "MRACAD_CACHE"})
+RESERVED = frozenset({"MRACAD_CORPUS", "MRACAD_CACHE", "MRACAD_WORKERS"})
 """Variables that hold no option."""
 
 GIVEN = frozenset({"set", "help"})

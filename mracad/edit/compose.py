@@ -68,7 +68,7 @@ def compose(
     restored = same and _whole(model, options, scope, pieces)
     wish = Detailed(pieces, refine, restored)
     edit = detailed(model, options, wish, scope, progress, bare)
-    return replace(edit, notes=_notes(edit, wish, len(details.surfaces)))
+    return replace(edit, notes=_notes(model, edit, wish, len(details.surfaces)))
 
 
 def _whole(model: Model, options: Compose, scope: Scope, pieces: Mapping[int, Piece]) -> bool:
@@ -78,9 +78,10 @@ def _whole(model: Model, options: Compose, scope: Scope, pieces: Mapping[int, Pi
     return faces <= scope.chosen and not held and (options.edges, options.keep, options.amount) == PLAIN
 
 
-def _notes(edit: Edit, wish: Detailed, count: int) -> tuple[str, ...]:
+def _notes(model: Model, edit: Edit, wish: Detailed, count: int) -> tuple[str, ...]:
     """How details were placed on the surfaces that changed, and how many have no face."""
-    ways = Counter(wish.way(i) for i in edit.displacement.offsets)
+    changed = edit.displacement.offsets.items()
+    ways = Counter(wish.way(i, offset.over(model.surfaces[i].net)) for i, offset in changed)
     said: dict[Way, str] = {
         "added": "added as they were",
         "carried": "carried by a surface that has changed",

@@ -7,7 +7,7 @@ scaled, space turned by an orthogonal map.  So what was found for the first is m
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from itertools import product
 
@@ -154,23 +154,47 @@ class Congruent:
         mended = {side.surface for seam in joints.mended for side in (seam.a, seam.b)}
         self.others = mended | {slide.trace.surface for slide in joints.slides}
         self.found: dict[tuple[object, ...], list[Moved]] = defaultdict(list)
+        self.first: dict[tuple[object, ...], list[int]] = defaultdict(list)
+        self.known: dict[tuple[int, int], Congruence | None] = {}
+
+    def firsts(self, surfaces: Iterable[int]) -> list[int]:
+        """Those of some surfaces that are congruent to none before them, of these and of earlier calls."""
+        found = []
+        for i in surfaces:
+            like = self.first[_kind(self.scene.sheets[i])]
+            if not self._takes_part(i):
+                found.append(i)
+            elif not any(self._between(k, i) for k in like):
+                like.append(i)
+                found.append(i)
+        return found
 
     def keep(self, moved: Moved) -> None:
         """Remember a result."""
-        if self.able and moved.sheet.index not in self.others:
+        if self._takes_part(moved.sheet.index):
             self.found[_kind(moved.sheet)].append(moved.done())
 
     def result(self, i: int) -> Moved | None:
         """The result for a surface, if it is congruent to one for which it is known."""
         sheet = self.scene.sheets[i]
-        if self.able and i not in self.others:
+        if self._takes_part(i):
             for known in self.found[_kind(sheet)]:
-                ways = congruences(known.sheet, sheet)
-                between = next((way for way in ways if self._joined_alike(known.sheet, sheet, way)), None)
+                between = self._between(known.sheet.index, i)
                 moved = self._moved(known, sheet, between) if between else None
                 if moved is not None:
                     return moved
         return None
+
+    def _takes_part(self, i: int) -> bool:
+        return self.able and i not in self.others
+
+    def _between(self, k: int, i: int) -> Congruence | None:
+        """How a surface is congruent to another with edges held alike, if it is."""
+        if (k, i) not in self.known:
+            first, sheet = self.scene.sheets[k], self.scene.sheets[i]
+            ways = congruences(first, sheet)
+            self.known[k, i] = next((way for way in ways if self._joined_alike(first, sheet, way)), None)
+        return self.known[k, i]
 
     def _moved(self, known: Moved, sheet: Sheet, between: Congruence) -> Moved | None:
         """The known result, moved to a congruent surface; None where the judge allows clearly less of it there."""

@@ -116,9 +116,9 @@ class Detailed(Wish):
         if problem.rimmed:
             yield problem.nearest(target, stiffness(width / 2)), problem.nearest(problem.fading(width) * target)
 
-    def way(self, surface: int) -> Way | None:
-        """How the details were placed on a surface in the end."""
-        return next((each.way for (i, *_), each in reversed(self.laid.items()) if i == surface), None)
+    def way(self, surface: int, net: Net) -> Way | None:
+        """How the details were placed on a surface over the knots of a net."""
+        return self._on(surface, net).way
 
     def _piece(self, faces: Sequence[Face]) -> Source:
         surface = faces[0].surface

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import ctypes
 import math
 import os
 import select
@@ -16,13 +15,13 @@ from typing import Any, TypeVar
 from mracad.errors import CrashError, LimitError, UsageError
 from mracad.job import wire
 from mracad.note import Note, set_note
+from mracad.processes import end_with_parent
 
 Result = TypeVar("Result")
 
 _GRACE = 1.0  # seconds for a child to clean up once its time is over
 _SOON, _TICK = 5.0, 0.5  # seconds for a child that was asked to end, and between looks whether it was
 _ENDING = 10.0  # seconds more for a child that is already moving its outputs into place
-_DEATH_SIGNAL = 1  # PR_SET_PDEATHSIG
 
 
 class TimeLimitError(LimitError):
@@ -100,12 +99,6 @@ _OUT_OF_MEMORY = (
     "error return without exception set", "Unable to create type object",
 )  # fmt: skip
 """Messages of libraries that ran out of memory."""
-
-
-def end_with_parent() -> None:
-    """Have this process killed when the thread that started it ends, where the system can do that."""
-    if sys.platform == "linux":
-        ctypes.CDLL(None).prctl(_DEATH_SIGNAL, signal.SIGKILL)
 
 
 def _child(work: Callable[[], Any], writer: int, memory: int | None) -> None:

@@ -6,9 +6,10 @@ from itertools import product
 import numpy as np
 import pytest
 
+from mracad import processes
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
-from mracad.edit import driver
+from mracad.edit import alone
 from mracad.edit.fair import Filter, faired
 from mracad.edit.tolerances import Tolerances
 from mracad.model.brep import Model, Trim
@@ -56,13 +57,13 @@ def together(*nets):
 @pytest.fixture
 def searches(monkeypatch):
     """The surfaces for which results are searched."""
-    found, search = [], driver._searched
+    found, search = [], alone._searched
 
     def searched(scene, wish, i):
         found.append(i)
         return search(scene, wish, i)
 
-    monkeypatch.setattr(driver, "_searched", searched)
+    monkeypatch.setattr(alone, "_searched", searched)
     return found
 
 
@@ -104,3 +105,22 @@ def test_a_wish_that_depends_on_the_place_asks_for_each(net, searches):
 
 class Placed(Filter):
     alike = False
+
+
+@pytest.mark.parametrize("workers", ["2", "1"])
+def test_other_processes_find_the_same(net, monkeypatch, workers):
+    model = together(net, net.with_poles(1.2 * net.poles), net)
+    one = faired(model, {0, 1, 2}, Filter(5.0), Wishes(), Tolerances())
+    monkeypatch.setattr(processes, "PATIENCE", -1.0)
+    monkeypatch.setattr(processes, "_can_fork", lambda: True)
+    monkeypatch.setenv("MRACAD_WORKERS", workers)
+    started, start = [], processes.Ahead._start
+    monkeypatch.setattr(processes.Ahead, "_start", lambda self, count: started.append(count) or start(self, count))
+    many = faired(model, {0, 1, 2}, Filter(5.0), Wishes(), Tolerances())
+    assert started == [2] * (workers == "2")
+    for i, found in one.moved.items():
+        assert found.amount and many.moved[i].offset.tobytes() == found.offset.tobytes()
+        assert many.moved[i].sheet.index == i and many.moved[i].limits == found.limits
+        assert [each.after for each in many.moved[i].changes.values()] == [
+            each.after for each in found.changes.values()
+        ]

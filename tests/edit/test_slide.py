@@ -14,13 +14,13 @@ from scipy.spatial import KDTree
 
 import mracad as library
 from mracad.bspline.closest import distances
-from mracad.edit import driver
 from mracad.edit.denoise import denoise
 from mracad.edit.fair import Filter, faired
 from mracad.edit.pose import Scene
 from mracad.edit.slid import settled
 from mracad.edit.smooth import smooth
 from mracad.edit.tolerances import Tolerances
+from mracad.edit.trial import Trial
 from mracad.edit.whole import wished
 from mracad.inspect.seams import seams
 from mracad.job.document import run
@@ -239,13 +239,13 @@ def test_edges_of_a_solid_that_was_moved_slide():
 def test_an_edge_stays_where_that_does_more(made, monkeypatch):
     """The judge is made to allow nothing that slides."""
     model = looked(made("block"))
-    real = driver.Trial.judged
+    real = Trial.judged
 
     def strict(trial, delta, target, others=()):
         verdict = real(trial, delta, target, others)
         return trial.nothing() if trial.pose.led is not None else verdict
 
-    monkeypatch.setattr(driver.Trial, "judged", strict)
+    monkeypatch.setattr(Trial, "judged", strict)
     edit = smooth(model, SLIDE)
     assert edit.outcomes[0].status == "edited"
     assert {(each.how, str(each.reason)) for each in edit.edges} == {("frozen", "plane neighbour")}

@@ -2,9 +2,10 @@
 
 import pytest
 
-from mracad.edit import driver
+from mracad.edit import alone
 from mracad.edit.fair import Filter, faired
 from mracad.edit.tolerances import Tolerances
+from mracad.edit.trial import Trial
 from mracad.seam.wishes import Wishes
 from tests.edit.models import noisy, sheet
 
@@ -18,7 +19,7 @@ def net():
 def trials(monkeypatch):
     """The displacements that are judged, by attempt."""
     found = []
-    begin, judge = driver.Trial.__init__, driver.Trial.judged
+    begin, judge = Trial.__init__, Trial.judged
 
     def begun(self, *given, **more):
         found.append([])
@@ -28,8 +29,8 @@ def trials(monkeypatch):
         found[-1].append(given[0])
         return judge(self, *given)
 
-    monkeypatch.setattr(driver.Trial, "__init__", begun)
-    monkeypatch.setattr(driver.Trial, "judged", judged)
+    monkeypatch.setattr(Trial, "__init__", begun)
+    monkeypatch.setattr(Trial, "judged", judged)
     return found
 
 
@@ -43,6 +44,6 @@ def test_control_points_are_multiplied_only_so_far(net, trials, monkeypatch):
     faired(sheet(net), {0}, Filter(2.0), Wishes(), Tolerances())
     assert len(trials) == 2
     trials.clear()
-    monkeypatch.setattr(driver, "MOST", (1.0, 0))
+    monkeypatch.setattr(alone, "MOST", (1.0, 0))
     faired(sheet(net), {0}, Filter(2.0), Wishes(), Tolerances())
     assert len(trials) == 1

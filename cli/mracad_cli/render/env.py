@@ -20,7 +20,7 @@ from mracad.version import __version__
 from mracad_cli.defaults import Default, check, found, option, options_of, taken, value
 from mracad_cli.say import size
 
-THREADS = "OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"
+THREADS = "OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS", "MRACAD_WORKERS"
 
 
 def body(commands: Mapping[str, click.Command]) -> dict[str, Any]:

@@ -24,6 +24,7 @@ FILES = {
 VARIABLES = {
     "MRACAD_OPTION, MRACAD_COMMAND_OPTION": "Defaults that go before those of files, as in MRACAD_SMOOTH_SCALE=5mm.",
     "MRACAD_CACHE": "The folder of the cache of documents that were read, or off.",
+    "MRACAD_WORKERS": "The largest number of processes of an edit, by default one for each processor.",
 }
 
 

@@ -31,8 +31,8 @@ import psutil
 from mracad.errors import CrashError, LimitError, MracadError
 from mracad.job import wire
 from mracad.job.batch.settings import Limits
-from mracad.job.guard import end_with_parent
 from mracad.note import Note, set_note
+from mracad.processes import WORKERS, end_with_parent
 
 TICK = 0.05
 """Seconds between two checks of the workers."""
@@ -170,8 +170,8 @@ class _Worker:
 
     def __init__(self) -> None:
         environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
-        for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
-            environment[name] = "1"  # as in a single command: results must not depend on the number of cores
+        for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", WORKERS):
+            environment[name] = "1"  # the other cores have workers of their own
         with tempfile.TemporaryFile() as page:
             page.truncate(mmap.PAGESIZE)
             self.note = Note(page.fileno())
