@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
+from mracad.seam.eliminate import Eliminated
 from mracad.seam.factor import Definite, nested
 
 Array = np.ndarray
@@ -25,12 +27,15 @@ LEAST = 1e-10
 """Share of the largest diagonal entry that is added to the form, so that functions that barely reach into a face
 stay."""
 
+MANY = 1000
+"""Number of unknowns above which conditions are eliminated if possible."""
+
 
 class Constrained:
     """argmin ½ xᵀ A x − bᵀ x subject to L x = r, and x = 0 outside ``free``.
 
     Conditions take one sparse factorisation of the quasi-definite [[A, Lᵀ], [L, −ε]] and proximal passes, which
-    tolerate dependent rows of L.
+    tolerate dependent rows of L.  Those of many unknowns are eliminated where they tie few of them at a time.
 
     Parameters
     ----------
@@ -63,11 +68,16 @@ class Constrained:
             self.rows = (diags_array(1.0 / self.length) @ rows[self.there]).tocsr()
         else:
             self.there, self.length, self.rows = np.arange(0), np.ones(0), rows
-        self._solve = (
-            nested(block_array([[self.form, self.rows.T], [self.rows, -slack * eye_array(count)]]))
-            if count
-            else Definite(self.form, None if places is None else places[self.free])
-        )
+        many = count and len(self.free) > MANY and slack <= SLACK
+        self._eliminated = Eliminated.of(self.rows) if many else None
+        self._solve: Callable[[Array], Array]
+        if self._eliminated is not None:
+            basis = self._eliminated.basis
+            self._solve = Definite(basis.T @ (self.form @ basis))
+        elif count:
+            self._solve = nested(block_array([[self.form, self.rows.T], [self.rows, -slack * eye_array(count)]]))
+        else:
+            self._solve = Definite(self.form, None if places is None else places[self.free])
 
     def __call__(
         self, right: Array, start: Array | None = None, goal: Array | None = None, exactly: bool = True
@@ -99,6 +109,9 @@ class Constrained:
         if start is not None:
             begun = start[self.free] / self.scale[:, None]
             owed, size = owed - self.rows @ begun, float(np.abs(begun).max(initial=0.0))
+        if self._eliminated is not None:
+            least, basis = self._eliminated.least @ owed, self._eliminated.basis
+            return self._whole(least + basis @ self._solve(basis.T @ (b - self.form @ least)))
         x, y = np.zeros_like(b), np.zeros_like(owed)
         most = MOST if exactly else PASSES
         residual, lacking, missed = b, owed, np.inf
