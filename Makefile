@@ -63,6 +63,7 @@ bench: $(VENV)/dev
 	$(BIN)/python benchmarks/phases.py
 	$(BIN)/python benchmarks/features.py
 	$(BIN)/python benchmarks/seams.py
+	$(BIN)/python benchmarks/workers.py
 
 # 5 000 dimples all over a ball of six patches, to a closed mesh
 bench-fill: $(VENV)/dev
