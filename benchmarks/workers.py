@@ -1,8 +1,8 @@
 """An edit with one process and with more: elapsed time, CPU time of all of them, and that the results are the same.
 
-Usage: python benchmarks/workers.py FILE…
+Usage: python benchmarks/workers.py [FILE…]
 
-``smooth --scale 2%`` in memory, after a first run of everything; up to as many processes as there are processors.
+By default the models of less than 4 MB in the folder MRACAD_CORPUS, else a sample.  ``smooth --scale 2%`` in memory, after a first run of everything; up to as many processes as there are processors.
 """
 
 from __future__ import annotations
@@ -14,6 +14,9 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).parent.parent
+
+LARGE = 4e6
+"""Size of the smallest file that is left out by default, bytes."""
 
 
 def main(paths: list[str]) -> None:
@@ -43,9 +46,15 @@ def _used() -> float:
     return sum(os.times()[:4])
 
 
+def _models() -> list[str]:
+    folder = os.environ.get("MRACAD_CORPUS")
+    files = sorted(Path(folder).glob("*.st*p")) if folder else [ROOT / "samples" / "shell.step"]
+    return [str(file) for file in files if file.stat().st_size < LARGE]
+
+
 def _bytes(edit: Any) -> list[bytes]:
     return [offset.poles.tobytes() for _, offset in sorted(edit.displacement.offsets.items())]
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:] or [str(ROOT / "samples" / "blade.step")])
+    main(sys.argv[1:] or _models())
