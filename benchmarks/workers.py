@@ -2,7 +2,8 @@
 
 Usage: python benchmarks/workers.py [FILE…]
 
-By default the models of less than 4 MB in the folder MRACAD_CORPUS, else a sample.  ``smooth --scale 2%`` in memory, after a first run of everything; up to as many processes as there are processors.
+By default the models of less than 4 MB in the folder MRACAD_CORPUS, else a sample.  ``smooth --scale 2%`` in memory,
+after a first run of everything; up to as many processes as there are processors.
 """
 
 from __future__ import annotations
