@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Protocol
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -14,7 +15,8 @@ from mracad.bspline.vectors import cross
 from mracad.inspect.roughness import Growth
 from mracad.model.brep import Face, Model
 from mracad.model.cells import quadrature
-from mracad.seam.energy import Forms, forms
+from mracad.model.congruence import CLOSE, Congruence, Figure, Figures, congruences
+from mracad.seam.energy import Forms, forms, on_pattern
 from mracad.seam.interface import Joints
 from mracad.seam.ladders import Creases
 from mracad.seam.metric import SMOOTHER, creases, seen, smoothed
@@ -37,6 +39,9 @@ DETAIL = 1e-7, 1e-6
 
 KEPT = 20_000_000
 """Largest number of entries of forms that are kept from one step to the next: 400 MB."""
+
+SAME = 1e-7
+"""Largest difference between congruent surfaces that are prepared once, relative to their size."""
 
 ROUGHEST = 2.0
 """Bending of what a trend leaves of its surface, over that of the surface, above which it does not follow it."""
@@ -126,8 +131,8 @@ class Wish(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class Sheet:
-    """A surface that an edit may move.
+class Asked:
+    """A surface, and what an edit asks of it.
 
     Attributes
     ----------
@@ -137,8 +142,6 @@ class Sheet:
         The original, and the same surface, of degree 3 at least, over knots that can hold the target.
     all_faces, faces : tuple of Face
         All faces on it, and those that may move.
-    metric : Net
-        The surface on which displacements are measured.
     creases : pair of frozenset of float
         Crease lines in u and v.
     wavelength : float
@@ -147,13 +150,6 @@ class Sheet:
         Wavelengths by direction, relative to ``wavelength``.
     reach : (float, float)
         Distance within which a change spreads along u and v, mm.
-    trend, base : Net
-        The surface projected on the splines of a few wavelengths, which is shape, and of more, for the judge: a trend
-        that oscillates around a mark would hide new waves there.
-    detail : float
-        Largest displacement of a control point if nothing were held, mm.
-    form : Forms, optional
-        Mass and bending of displacements of ``net``, if kept.
     """
 
     index: int
@@ -161,21 +157,10 @@ class Sheet:
     net: Net
     all_faces: tuple[Face, ...]
     faces: tuple[Face, ...]
-    metric: Net
     creases: Creases
     wavelength: float
     stretch: Stretch
     reach: tuple[float, float]
-    trend: Net
-    base: Net
-    detail: float = 0.0
-    form: Forms | None = None
-
-    def measured(self, net: Net) -> Forms:
-        """Mass and bending of displacements of the surface over the knots of a net."""
-        if net is self.net and self.form is not None:
-            return self.form
-        return forms(net, self.metric, quadrature(net, self.faces), self.creases, self.stretch)
 
     @property
     def movable(self) -> frozenset[int]:
@@ -187,6 +172,48 @@ class Sheet:
         """Least displacement that counts, mm."""
         return max(DETAIL[0], DETAIL[1] * self.wavelength)
 
+    @cached_property
+    def figure(self) -> Figure:
+        """The surface, to be compared with others."""
+        return Figure(self.net, self.all_faces)
+
+    def congruences(self, first: Asked) -> Iterator[Congruence]:
+        """The ways in which the surface is congruent to another of which the same is asked."""
+        moving = [[face.index in each.movable for face in each.all_faces] for each in (first, self)]
+        near = abs(self.wavelength - first.wavelength) <= CLOSE * self.wavelength
+        if near and self.stretch.even and first.stretch.even and moving[0] == moving[1]:
+            yield from congruences(first.figure, self.figure)
+
+
+@dataclass(frozen=True, eq=False)
+class Sheet(Asked):
+    """A surface that an edit may move, prepared for it.
+
+    Attributes
+    ----------
+    metric : Net
+        The surface on which displacements are measured.
+    trend, base : Net
+        The surface projected on the splines of a few wavelengths, which is shape, and of more, for the judge: a trend
+        that oscillates around a mark would hide new waves there.
+    detail : float
+        Largest displacement of a control point if nothing were held, mm.
+    form : Forms, optional
+        Mass and bending of displacements of ``net``, if kept.
+    """
+
+    metric: Net
+    trend: Net
+    base: Net
+    detail: float = 0.0
+    form: Forms | None = None
+
+    def measured(self, net: Net) -> Forms:
+        """Mass and bending of displacements of the surface over the knots of a net."""
+        if net is self.net and self.form is not None:
+            return self.form
+        return forms(net, self.metric, quadrature(net, self.faces), self.creases, self.stretch)
+
 
 def stiffness(wavelength: float) -> float:
     """ℓ⁴, mm⁴, of a wavelength 2πℓ."""
@@ -195,25 +222,70 @@ def stiffness(wavelength: float) -> float:
 
 def sheets(model: Model, movable: Collection[int], wish: Wish) -> dict[int, Sheet]:
     """The surfaces with faces (``movable``) that an edit may move, by index."""
-    found, kept = {}, 0
+    found: dict[int, Sheet] = {}
+    known: Figures[Sheet] = Figures()
+    kept = 0
     for surface in model.surfaces:
         every = tuple(model.faces[i] for i in surface.faces)
         faces = tuple(face for face in every if face.index in movable)
         if faces:
-            sheet = _sheet(surface.index, surface.net, every, faces, wish)
+            asked = _asked(surface.index, surface.net, every, faces, wish)
+            sheet = (_shared(asked, known) if wish.alike else None) or _sheet(asked, wish)
             kept += sheet.form.mass.nnz if sheet.form else 0
             found[surface.index] = sheet if kept <= KEPT else replace(sheet, form=None)
+            known.keep(sheet.figure, found[surface.index])
     return found
 
 
-def _sheet(index: int, origin: Net, every: tuple[Face, ...], faces: tuple[Face, ...], wish: Wish) -> Sheet:
+def _asked(index: int, origin: Net, every: tuple[Face, ...], faces: tuple[Face, ...], wish: Wish) -> Asked:
     net = wish.space(origin.over(origin.u.elevated(DEGREE), origin.v.elevated(DEGREE)), faces)
-    points = quadrature(net, faces)
     sharp = creases(net, np.ones(net.poles.shape[:2], bool))
     wavelength = wish.wavelength(origin, faces, sharp)
     stretch = wish.stretch(faces)
     if wish.limited:
         stretch = replace(stretch, limit=Limit.of(net, stretch.times(wavelength), sharp))
+    reach = stretch.times(wish.spread * wavelength)
+    return Asked(index, origin, net, every, faces, sharp, wavelength, stretch, reach)
+
+
+def _shared(asked: Asked, known: Figures[Sheet]) -> Sheet | None:
+    """What was prepared for a surface congruent to this one, moved to it."""
+    for first in known.near(asked.figure):
+        for between in asked.congruences(first):
+            if between.off <= SAME and between.edges() is not None:
+                nets = first.metric, first.trend, first.base
+                metric, trend, base = (asked.net.with_poles(between.moved(each.poles)) for each in nets)
+                if not first.trend.poles.any():
+                    trend = asked.net.with_poles(first.trend.poles)
+                form = first.form and _arranged(first.form, between)
+                return _prepared(asked, metric, trend, base, detail=first.detail, form=form)
+    return None
+
+
+def _arranged(form: Forms, between: Congruence) -> Forms:
+    """Forms of a surface in the order of the control points of one congruent to it."""
+    from scipy.sparse import csr_array
+
+    if not (between.swapped or any(between.flipped)):
+        return form
+    shape = between.figures[0].net.poles.shape[:2]
+    order = between.arranged(np.arange(form.mass.shape[0]).reshape(shape)).ravel()
+
+    def arranged(matrix: Any) -> Any:
+        return csr_array(matrix[order][:, order])
+
+    mass = arranged(form.mass)
+    return Forms(mass, on_pattern(arranged(form.bending), mass), arranged(form.creases))
+
+
+def _prepared(asked: Asked, metric: Net, trend: Net, base: Net, **other: Any) -> Sheet:
+    given = {each.name: getattr(asked, each.name) for each in fields(Asked)}
+    return Sheet(**given, metric=metric, trend=trend, base=base, **other)
+
+
+def _sheet(asked: Asked, wish: Wish) -> Sheet:
+    net, sharp, stretch, wavelength = asked.net, asked.creases, asked.stretch, asked.wavelength
+    points = quadrature(net, asked.faces)
     metric = smoothed(net, points, SMOOTHER**4 * stiffness(wavelength), stretch)
     form = forms(net, metric, points, sharp, stretch)
     depends = seen(net, form)
@@ -222,9 +294,8 @@ def _sheet(index: int, origin: Net, every: tuple[Face, ...], faces: tuple[Face, 
     base = at_scale(net, stretch.times(BASE * wavelength), sharp)
     if not _follows(trend, net, metric, form):
         trend = net.with_poles(np.zeros_like(net.poles))
-    reach = stretch.times(wish.spread * wavelength)
-    sheet = Sheet(index, origin, net, every, faces, metric, sharp, wavelength, stretch, reach, trend, base, form=form)
-    alone = Problem({index: Space(net, form, depends, depends, sheet.trend.poles)})
+    sheet = _prepared(asked, metric, trend, base, form=form)
+    alone = Problem({asked.index: Space(net, form, depends, depends, trend.poles)})
     return replace(sheet, detail=wish.detail(alone, sheet))
 
 

@@ -90,7 +90,7 @@ def forms(
     periodic, scale = (net.u.periodic, net.v.periodic), net.weights
     smooth, sharp = _kinks(net, metric, quadrature, creases, stretch)
     area, whole = _sparse(mass, periodic, scale), _sparse(bending, periodic, scale)
-    return Forms(area, whole + smooth if smooth.nnz else _on_pattern(whole, area), sharp)
+    return Forms(area, whole + smooth if smooth.nnz else on_pattern(whole, area), sharp)
 
 
 def masses(net: Net, quadrature: Quadrature) -> Forms:
@@ -293,7 +293,7 @@ def _dot(a: Array, b: Array) -> Array:
     return np.asarray(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
 
 
-def _on_pattern(form: Any, like: Any) -> Any:
+def on_pattern(form: Any, like: Any) -> Any:
     """The matrix, sharing the index arrays of another one if the patterns are equal."""
     from scipy.sparse import csr_array
 

@@ -9,10 +9,12 @@ import pytest
 from mracad import processes
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
-from mracad.edit import alone
+from mracad.edit import alone, target
 from mracad.edit.fair import Filter, faired
+from mracad.edit.target import sheets
 from mracad.edit.tolerances import Tolerances
 from mracad.model.brep import Model, Trim
+from mracad.seam.metric import smoothed
 from mracad.seam.wishes import Wishes
 from tests.edit.models import noisy, rotation, segment, sheet
 
@@ -79,6 +81,27 @@ def test_congruent_surfaces_get_the_same_result(net, searches, swapped, flipped)
     assert np.abs(found[1].offset - expected).max() < 1e-12
     for old, new in zip(found[0].changes.values(), found[1].changes.values(), strict=True):
         assert new.after.bending == pytest.approx(old.after.bending, rel=1e-9)
+
+
+@pytest.mark.parametrize(("swapped", "flipped"), list(product((False, True), product((False, True), repeat=2))))
+def test_congruent_surfaces_are_prepared_once(net, swapped, flipped, monkeypatch):
+    other, done = alike(net, swapped, flipped), []
+    (apart,) = sheets(sheet(other), {0}, Filter(5.0, limited=True)).values()
+    monkeypatch.setattr(target, "smoothed", lambda *given: done.append(0) or smoothed(*given))
+    found = sheets(together(net, other), {0, 1}, Filter(5.0, limited=True))[1]
+    assert done == [0] and found.detail == pytest.approx(apart.detail, rel=1e-9)
+    for name in ("metric", "trend", "base"):
+        assert np.abs(getattr(found, name).poles - getattr(apart, name).poles).max() < 1e-9
+    for name in ("mass", "bending", "creases"):
+        form, own = (getattr(each.form, name).toarray() for each in (found, apart))
+        assert np.abs(form - own).max() <= 1e-9 * np.abs(own).max()
+
+
+def test_what_hardly_differs_is_prepared_for_itself(net):
+    other = alike(net, False, (False, False))
+    other.poles[5, 5, 2] += 1e-5
+    found = sheets(together(net, other), {0, 1}, Filter(5.0))
+    assert found[0].form is not found[1].form and found[0].detail != found[1].detail
 
 
 def test_what_differs_a_little_is_not_congruent(net, searches):
