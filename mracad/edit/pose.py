@@ -203,15 +203,12 @@ def worth(detail: float, width: float) -> float:
 
 def beside_rims(sheet: Sheet, joined: Joints) -> Net:
     """A surface with knot spans of at most a quarter of the wavelength beside its rims."""
-    trims = [(face, trim) for face in sheet.faces for trim in face.trims if trim.edge not in joined.moving]
-    return refined(sheet.net, trims, sheet.stretch.times(sheet.wavelength / 4))
+    held = tuple(trim.curve for face in sheet.faces for trim in face.trims if trim.edge not in joined.moving)
+    return refined(sheet.net, held, sheet.stretch.times(sheet.wavelength / 4))
 
 
 def _beside_seams(net: Net, sheet: Sheet, joined: Joints, longest: float) -> Net:
     """A surface with knot spans of at most a length (mm) beside seams along trim curves."""
     loose = {edge for seam in joined.loose if not seam.since for edge in (seam.edge, seam.twin)}
-    return refined(
-        net,
-        [(face, trim) for face in sheet.faces for trim in face.trims if trim.edge in loose],
-        sheet.stretch.times(longest),
-    )
+    held = tuple(trim.curve for face in sheet.faces for trim in face.trims if trim.edge in loose)
+    return refined(net, held, sheet.stretch.times(longest))

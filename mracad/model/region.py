@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -92,33 +92,54 @@ def _supports(knots: KnotVector) -> tuple[Array, Array]:
 
 @kept(2048)
 def _crossed(u: KnotVector, v: KnotVector, curves: tuple[Curve, ...]) -> tuple[Array, ...]:
-    """For each curve the cells that it may pass through.
+    """For each curve the cells that it may pass through."""
+    boxes, owners = Course(curves).boxes(u, v)
+    return tuple(meeting(u, v, boxes[owners == i]) for i in range(len(curves)))
+
+
+class Course:
+    """Where curves run in a knot grid, which may get finer from one call to the next.
 
     A Bézier piece lies in the hull of its control points (weights are positive); it is halved until its box
     meets at most two cells or is a negligible part of one.
     """
-    found = [part for points, owners in bezier_pieces(curves) for part in _short((u, v), points, owners)]
-    boxes, owners = (np.concatenate(column) for column in zip(*found, strict=True))
-    return tuple(meeting(u, v, boxes[owners == i]) for i in range(len(curves)))
+
+    def __init__(self, curves: Sequence[Curve]) -> None:
+        self._pieces = [(*found, np.zeros(len(found[0]), int)) for found in bezier_pieces(curves)]
+
+    def boxes(self, u: KnotVector, v: KnotVector) -> tuple[Array, Array]:
+        """Boxes ``(q, 2, 2)`` (low, high corner) that cover the curves, and the index of each one's curve."""
+        self._pieces = [_short((u, v), *each) for each in self._pieces]
+        plane = [_box(points) for points, _, _ in self._pieces]
+        return np.concatenate(plane), np.concatenate([owners for _, owners, _ in self._pieces])
 
 
-def _short(grid: tuple[KnotVector, KnotVector], points: Array, owners: Array) -> Iterator[tuple[Array, Array]]:
-    """Boxes ``(q, 2, 2)`` and owners of Bézier pieces, halved as in :func:`_crossed`."""
+def _box(points: Array) -> Array:
+    """Boxes ``(q, 2, 2)`` of homogeneous Bézier pieces."""
+    plane = points[..., :2] / points[..., 2:]
+    return np.stack([plane.min(axis=1), plane.max(axis=1)], axis=1)
+
+
+def _short(
+    grid: tuple[KnotVector, KnotVector], points: Array, owners: Array, depth: Array
+) -> tuple[Array, Array, Array]:
+    """Bézier pieces, their owners and how often they were halved, halved as in :class:`Course`."""
     smallest = np.array([np.diff(knots.breaks).min() for knots in grid]) / 64
-    for depth in range(DEPTH):
-        plane = points[..., :2] / points[..., 2:]
-        low, high = plane.min(axis=1), plane.max(axis=1)
+    found = []
+    while True:
+        low, high = _box(points).swapaxes(0, 1)
         size = high - low
         crossings = np.zeros(len(points), dtype=np.int64)
         for i, knots in enumerate(grid):
             start = _wrapped(knots, low[:, i])[0]
             crossings += np.searchsorted(knots.breaks, start + size[:, i]) - np.searchsorted(knots.breaks, start)
         done = (crossings <= 1) | (size <= smallest).all(axis=1) | (size.min(axis=1) == 0) | (depth == DEPTH - 1)
-        if done.any():
-            yield np.stack([low[done], high[done]], axis=1), owners[done]
+        found.append((points[done], owners[done], depth[done]))
         if done.all():
-            return
-        points, owners = _halved(points[~done]), np.tile(owners[~done], 2)
+            break
+        points, owners, depth = _halved(points[~done]), np.tile(owners[~done], 2), np.tile(depth[~done] + 1, 2)
+    points, owners, depth = (np.concatenate(each) for each in zip(*found, strict=True))
+    return points, owners, depth
 
 
 def _halved(points: Array) -> Array:
@@ -154,6 +175,14 @@ def _cell_ranges(knots: KnotVector, low: Array, high: Array) -> tuple[Array, Arr
     around = np.concatenate([breaks[:-1] + k * (end - start) for k in range(3)])
     last = np.searchsorted(around, high + margin - shift, side="left") - 1
     return first, np.minimum(last, first + cells - 1)
+
+
+def spanned(knots: KnotVector, limits: Array) -> Array:
+    """Spans ``(spans,)`` met by intervals ``(q, 2)``."""
+    first, last = _cell_ranges(knots, limits[:, 0], limits[:, 1])
+    count = knots.spans
+    change = np.bincount(first, minlength=2 * count + 1) - np.bincount(last + 1, minlength=2 * count + 1)
+    return np.asarray((change.cumsum()[:-1] > 0).reshape(2, count).any(axis=0))
 
 
 def meeting(u: KnotVector, v: KnotVector, boxes: Array) -> Array:

@@ -7,7 +7,7 @@ from collections.abc import Set as AbstractSet
 
 import numpy as np
 
-from mracad.bspline.basis import gauss
+from mracad.bspline.basis import legendre
 from mracad.bspline.knots import Array, KnotVector
 from mracad.bspline.surface import Net
 from mracad.errors import UsageError
@@ -139,9 +139,16 @@ def arc_lengths(net: Net, direction: int) -> Array:
     ndarray (spans,)
         ``∫ |S_u| du`` over each span (mm), by four Gauss points a span, averaged over 16 places across.
     """
-    along, across = (net.u, net.v) if direction == 0 else (net.v, net.u)
-    span, offset, weight = gauss(along, _GAUSS_POINTS)
-    places = (along.knots[span][:, None] + offset).ravel()
+    breaks = (net.u, net.v)[direction].breaks
+    return piece_lengths(net, direction, np.stack([breaks[:-1], breaks[1:]], axis=1))
+
+
+def piece_lengths(net: Net, direction: int, pieces: Array) -> Array:
+    """The same as :func:`arc_lengths` on pieces of knot spans, from and to parameters ``(pieces, 2)``."""
+    across = (net.v, net.u)[direction]
+    nodes, weights = legendre(_GAUSS_POINTS)
+    half = 0.5 * (pieces[:, 1] - pieces[:, 0])[:, None]
+    places, weight = (pieces[:, :1] + half * (nodes + 1)).ravel(), half * weights
     low, _ = across.domain
     others = low + across.period * (np.arange(_POSITIONS) + 0.5) / _POSITIONS
     us, vs = (places, others) if direction == 0 else (others, places)

@@ -9,7 +9,7 @@ from mracad.bspline.curve import Curve
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
 from mracad.model.brep import Face, Trim
-from mracad.model.region import face_region, supported
+from mracad.model.region import Course, face_region, spanned, supported
 
 
 def plane(nu=12, nv=9, periodic=False):
@@ -66,6 +66,19 @@ def test_every_cell_that_a_curve_enters_is_crossed(seed, periodic):
     entered = np.zeros_like(cells)
     entered[i, j] = True
     assert cells.sum() <= 1.6 * entered.sum() + 6  # conservative, yet close
+
+
+@pytest.mark.parametrize("periodic", [False, True])
+def test_a_course_followed_into_finer_knots_is_that_through_these_knots(periodic):
+    curves = (circle([0.5, 0.5], 0.45), segment((-0.3 if periodic else 0.02, 0.1), (0.7, 0.93)), *square(0.25, 0.75))
+    course = Course(curves)
+    for halvings in range(5):
+        net = plane(4 << halvings, 3 << halvings, periodic)
+        boxes, owners = course.boxes(net.u, net.v)
+        for i, curve in enumerate(curves):
+            cells = region_cells(net, curve)
+            for axis, knots in enumerate((net.u, net.v)):
+                assert np.array_equal(spanned(knots, boxes[owners == i, :, axis]), cells.any(axis=1 - axis))
 
 
 def test_a_curve_on_a_knot_line_crosses_the_cells_on_both_sides():

@@ -198,14 +198,14 @@ def test_refinement_goes_across_rims_only():
     net = graph(lambda x, y: 0.2 * np.sin(4 * x) * y, 4, 3)
     model = sheet(net)
     own = model.faces[0]
-    fine = refined(net, [(own, own.trims[3])], (0.05, 0.05))  # x = 0
+    fine = refined(net, (own.trims[3].curve,), (0.05, 0.05))  # x = 0
     assert fine.v == net.v and fine.u.count > net.u.count
     assert arc_lengths(fine, 0)[0] <= 0.05 * (1 + 1e-9)
     assert set(net.u.breaks[1:]) <= set(fine.u.breaks) and (fine.u.breaks[1:-1] < 0.25 + 1e-9).sum() > 3
     assert np.array_equal(fine.u.breaks[fine.u.breaks >= 0.25], net.u.breaks[1:])
     uv = np.random.default_rng(0).uniform(0, 1, (200, 2))
     assert np.abs(fine.evaluate(uv) - net.evaluate(uv)).max() < 1e-13
-    assert refined(net, [], (0.05, 0.05)) is net and refined(net, [(own, own.trims[3])], (1.0, 1.0)) is net
+    assert refined(net, (), (0.05, 0.05)) is net and refined(net, (own.trims[3].curve,), (1.0, 1.0)) is net
 
 
 def test_refinement_meets_slanted_rims_in_both_directions_and_is_bounded():
@@ -213,9 +213,9 @@ def test_refinement_meets_slanted_rims_in_both_directions_and_is_bounded():
     curves = [segment((0.1, 0.1), (0.9, 0.2)), segment((0.9, 0.2), (0.5, 0.9)), segment((0.5, 0.9), (0.1, 0.1))]
     model = trimmed(net, curves)
     own = model.faces[0]
-    fine = refined(net, [(own, own.trims[0])], (0.1, 0.1))
+    fine = refined(net, (own.trims[0].curve,), (0.1, 0.1))
     assert fine.u.count > net.u.count and fine.v.count > net.v.count
-    most = refined(net, [(own, trim) for trim in own.trims], (1e-4, 1e-4))
+    most = refined(net, tuple(trim.curve for trim in own.trims), (1e-4, 1e-4))
     assert most.u.count * most.v.count <= MOST_POINTS
 
 
