@@ -135,13 +135,18 @@ class Net:
         uv = np.asarray(uv, dtype=float).reshape(-1, 2)
         su, sv = tangents or self.evaluate(uv, 1, side)[1:]
         lengths = [np.linalg.norm(x, axis=1) for x in (su, sv)]
-        floor = [1e-7 * (self._extent / kv.period) for kv in (self.u, self.v)]
+        floor = self.least_tangents
         normal = cross(su, sv)
         bad = ~(np.linalg.norm(normal, axis=1) > 1e-9 * lengths[0] * lengths[1])
         bad |= (lengths[0] < floor[0]) | (lengths[1] < floor[1])
         if bad.any():
             normal[bad] = self._limits(uv[bad], side)
         return _unit(normal)
+
+    @cached_property
+    def least_tangents(self) -> tuple[float, float]:
+        """Lengths of ``S_u`` and of ``S_v`` below which the surface is degenerate."""
+        return 1e-7 * (self._extent / self.u.period), 1e-7 * (self._extent / self.v.period)
 
     @cached_property
     def _extent(self) -> float:
@@ -191,13 +196,11 @@ class Collocation:
         Control points, u-major.
     in_u, in_v : ndarray (q, derivatives + 1, d + 1)
         Values and derivatives of the functions of each.
-    derivatives : {0, 1, 2}
     """
 
     index: Array
     in_u: Array
     in_v: Array
-    derivatives: int
 
     @classmethod
     def of(cls, u: KnotVector, v: KnotVector, uv: Array, derivatives: int, side: tuple[Side, Side]) -> Collocation:
@@ -206,18 +209,33 @@ class Collocation:
         first_v, in_v = jet(v, uv[:, 1], range(derivatives + 1), side[1])
         row = (first_u[:, None] + np.arange(u.degree + 1)) % u.count
         column = (first_v[:, None] + np.arange(v.degree + 1)) % v.count
-        return cls(row[:, :, None] * v.count + column[:, None, :], in_u, in_v, derivatives)
+        return cls(row[:, :, None] * v.count + column[:, None, :], in_u, in_v)
 
     def evaluate(self, net: Net) -> tuple[Array, ...]:
         """Points and derivatives, ``(q, k)`` each, in the order of :meth:`Net.evaluate`."""
         poles = homogeneous(net.poles, net.weights)
         local = poles.reshape(-1, poles.shape[2])[self.index]
-        q, a, b, k = local.shape
-        partial = np.matmul(self.in_u, local.reshape(q, a, b * k)).reshape(q, self.derivatives + 1, b, k)
-        full = np.matmul(self.in_v[:, None], partial)
-        orders = [order for total in range(self.derivatives + 1) for order in _pairs(total)]
-        stack = tuple(np.ascontiguousarray(full[:, r, s]) for r, s in orders)
-        return stack if net.weights is None else surface_quotient(stack)
+        return evaluated(local, self.in_u, self.in_v, net.weights is not None)
+
+
+def evaluated(local: Array, in_u: Array, in_v: Array, rational: bool) -> tuple[Array, ...]:
+    """Points and derivatives in the order of :meth:`Net.evaluate`, ``(q, k)`` each.
+
+    Parameters
+    ----------
+    local : ndarray (q, du + 1, dv + 1, k)
+        The control points that matter for each, homogeneous if rational.
+    in_u, in_v : ndarray (q, derivatives + 1, d + 1)
+        Values and derivatives of their functions.
+    rational : bool
+    """
+    q, a, b, k = local.shape
+    count = in_u.shape[1]
+    partial = np.matmul(in_u, local.reshape(q, a, b * k)).reshape(q, count, b, k)
+    full = np.matmul(in_v[:, None], partial)
+    orders = [order for total in range(count) for order in _pairs(total)]
+    stack = tuple(np.ascontiguousarray(full[:, r, s]) for r, s in orders)
+    return surface_quotient(stack) if rational else stack
 
 
 def pairs(us: ArrayLike, vs: ArrayLike) -> Array:

@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from mracad.bspline.knots import Side as Limit
-from mracad.bspline.surface import Collocation, Net, curvature
+from mracad.bspline.scattered import scattered
+from mracad.bspline.surface import Net, curvature
 from mracad.bspline.vectors import cross
 from mracad.model.brep import Edge, Face, Model, Side
 from mracad.seam.hold import ISO, local_span
 
 Array = np.ndarray
+
+BLOCK = 50_000
+"""Number of samples that are looked at at once: about a kilobyte each."""
 
 
 def views(model: Model, uses: Sequence[tuple[Edge, Side]]) -> list[Array]:
@@ -25,7 +30,7 @@ def views(model: Model, uses: Sequence[tuple[Edge, Side]]) -> list[Array]:
 class Looks:
     """Faces at the samples of edges, before and after their surfaces move.
 
-    Each face is evaluated once for all its edges.
+    Faces are evaluated at once.
 
     Parameters
     ----------
@@ -52,8 +57,9 @@ class Looks:
         for (number, limits), members in groups.items():
             face = model.faces[number]
             assert face.surface is not None
-            tangents = np.concatenate([uses[i][0].tangents for i, _ in members])
-            self._strips.append(_Strip(face, nets[face.surface], limits, members, tangents))
+            uv = np.concatenate([each for _, each in members])
+            self._strips.append(_Strip(face, face.surface, nets[face.surface], limits, [i for i, _ in members], uv))
+        self._along = [edge.tangents for edge, _ in uses]
 
     def views(self, moved: Mapping[int, Net] | None = None) -> list[Array]:
         """What is seen after some surfaces have moved, given over the same knots, by index.
@@ -64,40 +70,82 @@ class Looks:
             Points (mm), outward normals and normal curvatures across the edge (1/mm) in the part's frame; NaN where
             there is none.
         """
-        found = list(self._still)
-        for strip in self._strips:
-            net = (moved or {}).get(strip.surface)
-            for i, part in zip(strip.members, strip.before if net is None else strip.seen(net), strict=True):
+        found = list(self._before)
+        if moved:
+            now = [replace(each, net=moved[each.surface]) for each in self._strips if each.surface in moved]
+            for i, part in self._seen(now):
                 found[i] = part
         return found
 
-
-class _Strip:
-    """The samples of several edges of one face."""
-
-    def __init__(
-        self, face: Face, net: Net, limits: tuple[Limit, Limit], members: list[tuple[int, Array]], tangents: Array
-    ) -> None:
-        assert face.surface is not None
-        self.face, self.surface, self.net, self.limits = face, face.surface, net, limits
-        self.members, self.tangents = [i for i, _ in members], tangents
-        self.uv = np.concatenate([uv for _, uv in members])
-        self.ends = np.cumsum([len(uv) for _, uv in members])[:-1]
-        self.functions = Collocation.of(net.u, net.v, self.uv, 2, limits)
-
     @cached_property
-    def before(self) -> list[Array]:
-        """What is seen before the surface moves, by edge."""
-        return self.seen(self.net)
+    def _before(self) -> list[Array]:
+        found = list(self._still)
+        for i, part in self._seen(self._strips):
+            found[i] = part
+        return found
 
-    def seen(self, net: Net) -> list[Array]:
-        """What is seen on a net over the same knots, by edge."""
-        face, (point, su, sv, *second) = self.face, self.functions.evaluate(net)
-        jets = face.turned(np.stack([point, su, sv, *second, net.normals(self.uv, self.limits, (su, sv))]))
-        point, *derivatives, normal = jets
-        bends = face.outward * curvature(tuple(derivatives), cross(normal, self.tangents))
-        table = np.column_stack([point + face.frame[:3, 3], face.outward * normal, bends])
-        return np.split(table, self.ends)
+    def _seen(self, strips: Sequence[_Strip]) -> Iterator[tuple[int, Array]]:
+        """What is seen at the samples of strips, by the number of the edge."""
+        ends = np.cumsum([len(strip.uv) for strip in strips], dtype=int)
+        for block in np.split(np.arange(len(strips)), np.flatnonzero(np.diff(ends // BLOCK)) + 1):
+            if len(block):
+                yield from self._at_once([strips[k] for k in block])
+
+    def _at_once(self, strips: Sequence[_Strip]) -> Iterator[tuple[int, Array]]:
+        sizes, members = [len(strip.uv) for strip in strips], [i for strip in strips for i in strip.members]
+        stack = scattered([(strip.net, strip.uv, strip.limits) for strip in strips], 2)
+        frames = np.array([strip.face.frame for strip in strips])
+        outward = np.repeat([float(strip.face.outward) for strip in strips], sizes)
+        vectors: Array = np.stack([*stack, _normals(strips, sizes, stack)])
+        if (frames == frames[0]).all():
+            vectors = vectors @ frames[0, :3, :3].T
+        else:
+            vectors = np.einsum("qij,kqj->kqi", np.repeat(frames[:, :3, :3], sizes, axis=0), vectors)
+        point, *derivatives, normal = vectors
+        along = [self._along[i] for i in members]
+        bends = outward * curvature(tuple(derivatives), cross(normal, np.concatenate(along)))
+        table = np.column_stack([point + np.repeat(frames[:, :3, 3], sizes, axis=0), outward[:, None] * normal, bends])
+        yield from zip(members, np.split(table, np.cumsum([len(each) for each in along])[:-1]), strict=True)
+
+
+@dataclass(frozen=True, eq=False)
+class _Strip:
+    """The samples of several edges of one face.
+
+    Attributes
+    ----------
+    face : Face
+    surface : int
+    net : Net
+    limits : pair of {"right", "left"}
+    members : list of int
+        Numbers of the edges.
+    uv : ndarray (q, 2)
+        Parameters of the samples of all of them.
+    """
+
+    face: Face
+    surface: int
+    net: Net
+    limits: tuple[Limit, Limit]
+    members: list[int]
+    uv: Array
+
+
+def _normals(strips: Sequence[_Strip], sizes: Sequence[int], stack: tuple[Array, ...]) -> Array:
+    """Unit normals of surfaces at samples with known derivatives; NaN where there is none."""
+    su, sv = stack[1:3]
+    normals: Array = cross(su, sv)
+    lengths = [np.linalg.norm(each, axis=1) for each in (su, sv, normals)]
+    floors = np.repeat([strip.net.least_tangents for strip in strips], sizes, axis=0).T
+    with np.errstate(invalid="ignore", divide="ignore"):
+        found = normals / lengths[2][:, None]
+    good = (lengths[2] > 1e-9 * lengths[0] * lengths[1]) & (lengths[0] >= floors[0]) & (lengths[1] >= floors[1])
+    ends = np.cumsum([0, *sizes])
+    for k in np.flatnonzero(np.logical_and.reduceat(good, ends[:-1]) == 0).tolist():
+        own, strip = slice(ends[k], ends[k + 1]), strips[k]
+        found[own] = strip.net.normals(strip.uv, strip.limits, (su[own], sv[own]))
+    return np.asarray(found)
 
 
 def from_inside(face: Face, net: Net, edge: int, uv: Array) -> tuple[Array, tuple[Limit, Limit]]:
