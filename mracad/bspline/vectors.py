@@ -19,17 +19,17 @@ def unit(vectors: Array) -> Array:
 
 
 def between(one: Array, two: Array) -> Array:
-    """Angles between vectors ``(q, 3)``."""
-    return np.asarray(np.arctan2(np.linalg.norm(cross(one, two), axis=1), (one * two).sum(axis=1)))
+    """Angles between vectors ``(…, 3)``."""
+    return np.asarray(np.arctan2(np.linalg.norm(cross(one, two), axis=-1), (one * two).sum(axis=-1)))
 
 
 def components(one: Array, two: Array, vectors: Array) -> Array:
-    """``(x, y)`` of the parts ``x one + y two`` of vectors ``(q, 3)`` in the planes of two directions, ``(q, 2)``."""
+    """``(x, y)`` of the parts ``x one + y two`` of vectors ``(…, 3)`` in the planes of two directions, ``(…, 2)``."""
     e, f, g, p, q = (
-        (x * y).sum(axis=1) for x, y in ((one, one), (one, two), (two, two), (one, vectors), (two, vectors))
+        (x * y).sum(axis=-1) for x, y in ((one, one), (one, two), (two, two), (one, vectors), (two, vectors))
     )
     determinant = np.maximum(e * g - f * f, 1e-300)
-    return np.asarray(np.stack([p * g - q * f, q * e - p * f], axis=1) / determinant[:, None])
+    return np.asarray(np.stack([p * g - q * f, q * e - p * f], axis=-1) / determinant[..., None])
 
 
 def across(vectors: Array, along: Array) -> Array:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from mracad.bspline.knots import Side as Limit
-from mracad.bspline.vectors import between, cross
+from mracad.bspline.scattered import scattered
+from mracad.bspline.vectors import cross
 from mracad.model.brep import Edge, Model, Side
 from mracad.model.sampling import shares
 from mracad.seam.hold import ISO, local_span
@@ -15,7 +17,7 @@ from mracad.seam.sides import inner_side
 
 Array = np.ndarray
 Jet = tuple[Array, ...]
-"""``S, S_n, S_t`` and for order 2 ``S_nn`` along a border, from :func:`jets`."""
+"""``S, S_n, S_t`` and for order 2 ``S_nn`` along borders, ``(borders, q, 3)`` each, from :func:`jets`."""
 
 AFFINE = 1e-7
 """Largest deviation, as a fraction of the seam, from an affine map between the parameters along it."""
@@ -97,28 +99,22 @@ def _snapped(breaks: Array, x: float) -> float:
     return nearest if abs(nearest - x) <= 1e-9 * (breaks[-1] - breaks[0]) else x
 
 
-def jets(model: Model, border: Border, share: Array, order: int) -> tuple[Array, ...]:
-    """``S, S_n, S_t`` and for order 2 ``S_nn`` at fractions of the edge in the part's frame; t is the fraction."""
-    face, net = model.faces[border.face], model.surfaces[border.surface].net
-    values = net.evaluate(border.places(share), order, border.limits("right"))
-    s, su, sv, *second = (face.turned(x) for x in values)
-    pace = border.stop - border.start
-    first = (su, sv * pace) if border.axis == 0 else (sv, su * pace)
-    return (s + face.frame[:3, 3], *first, *second[:: 2 if border.axis == 0 else -2][:1])
+def jets(model: Model, borders: Sequence[Border], share: Array, order: int) -> Jet:
+    """Derivatives at fractions of edges in the part's frame; t is the fraction."""
+    faces = [model.faces[border.face] for border in borders]
+    nets = [model.surfaces[border.surface].net for border in borders]
+    places = [(net, each.places(share), each.limits("right")) for net, each in zip(nets, borders, strict=True)]
+    s, su, sv, *second = (each.reshape(len(borders), len(share), 3) for each in scattered(places, order))
+    turned = np.array([face.frame[:3, :3].T for face in faces])
+    moved = np.array([face.frame[:3, 3] for face in faces])[:, None]
+    pace = np.array([border.stop - border.start for border in borders])[:, None, None]
+    in_u = np.array([border.axis == 0 for border in borders])[:, None, None]
+    across, along = np.where(in_u, su, sv) @ turned, (np.where(in_u, sv, su) * pace) @ turned
+    return (s @ turned + moved, across, along, *(np.where(in_u, second[0], each) @ turned for each in second[2:]))
 
 
-def opening(model: Model, a: Border, b: Border) -> tuple[float, float]:
-    """Largest distance (mm) and angle between the outward normals of two borders at equal fractions."""
-    return opened(model, (a, b), (jets(model, a, SHARES, 1), jets(model, b, SHARES, 1)))
-
-
-def opened(model: Model, borders: tuple[Border, Border], found: tuple[Jet, Jet]) -> tuple[float, float]:
-    normals = [outward(model, border, *jet[1:3]) for border, jet in zip(borders, found, strict=True)]
-    apart = np.linalg.norm(found[0][0] - found[1][0], axis=1)
-    return float(apart.max()), float(between(*normals).max())
-
-
-def outward(model: Model, border: Border, across: Array, along: Array) -> Array:
-    """Outward normals, not of unit length, from the derivatives across and along a border."""
-    turned = model.faces[border.face].reversed != (border.stop < border.start)
-    return (-1 if turned else 1) * cross(*((across, along) if border.axis == 0 else (along, across)))
+def outward(model: Model, borders: Sequence[Border], across: Array, along: Array) -> Array:
+    """Outward normals, not of unit length, from the derivatives across and along borders."""
+    turned = [model.faces[each.face].reversed != (each.stop < each.start) for each in borders]
+    sign = [-1 if turn != (border.axis == 1) else 1 for turn, border in zip(turned, borders, strict=True)]
+    return np.asarray(np.array(sign)[:, None, None] * cross(across, along))

@@ -11,15 +11,16 @@ these are linear conditions on a displacement; the errors of the input (gap, ang
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from mracad.bspline.vectors import between, components
 from mracad.model.brep import Model
-from mracad.seam.border import SHARES, Border, Jet, jets, outward
+from mracad.seam.border import SHARES, Border, jets, outward
 from mracad.seam.cause import Cause, Still
-from mracad.seam.law import NONE, Law, breaks, constant, polynomial
+from mracad.seam.law import NONE, Law, breaks, constant, polynomials
 from mracad.seam.wishes import Wishes
 
 Array = np.ndarray
@@ -90,73 +91,108 @@ class Joint:
         return replace(self, across=across, along=along, shear=self.shear / size, smoother=smoother)
 
 
-def joint_of(
-    model: Model, borders: tuple[Border, Border], found: tuple[Jet, Jet], order: int, wishes: Wishes
-) -> Joint | Cause:
-    """The joint between two borders, of the highest order with a law; the cause if there is none."""
-    (a, b), ((s, sn, st, snn), (t, tn, tt, tnn)) = borders, found
-    length = np.linalg.norm(st, axis=1).mean()
-    slip = np.abs(((s - t) * st).sum(axis=1) / np.maximum(np.linalg.norm(st, axis=1), 1e-12 * length)).max()
-    if slip > SLIP * length:
-        return Cause(Still.UNEVEN)
-    normals = outward(model, a, sn, st), outward(model, b, tn, tt)
-    sizes = [np.linalg.norm(n, axis=1) for n in normals]
-    if min(size.min() / max(size.max(), 1e-300) for size in sizes) < 1e-9:
-        return Cause(Still.DEGENERATE)
+@dataclass(frozen=True, eq=False)
+class Met:
+    """How pairs of borders meet.
+
+    Attributes
+    ----------
+    joints : list of Joint or Cause
+        The joint of the highest order with a law, or the cause if there is none.
+    gaps, angles : list of float
+        Largest distance at equal fractions, mm, and angle between the outward normals.
+    """
+
+    joints: list[Joint | Cause]
+    gaps: list[float]
+    angles: list[float]
+
+
+def met(model: Model, pairs: Sequence[tuple[Border, Border]], orders: Sequence[int], wishes: Wishes) -> Met:
+    """How pairs of borders meet that may keep the given orders."""
+    if not pairs:
+        return Met([], [], [])
+    sides = [[pair[k] for pair in pairs] for k in (0, 1)]
+    (s, sn, st, snn), (t, tn, tt, tnn) = (jets(model, side, SHARES, 2) for side in sides)
+    size = np.linalg.norm(st, axis=2)
+    length = size.mean(axis=1)
+    slip = np.abs(((s - t) * st).sum(axis=2) / np.maximum(size, 1e-12 * length[:, None])).max(axis=1)
+    normals = outward(model, sides[0], sn, st), outward(model, sides[1], tn, tt)
+    sizes = [np.linalg.norm(n, axis=2) for n in normals]
+    least = np.min([each.min(axis=1) / np.maximum(each.max(axis=1), 1e-300) for each in sizes], axis=0)
+    angles = between(*normals).max(axis=1)
     plain = Joint(0, constant(1.0), NONE, close=wishes.close_gaps)
-    if order == 0:
-        return plain
-    joint = _polynomial(sn, st, tn)
-    if joint is None and wishes.pieces:
-        (_, sn, st), (_, tn, _) = (jets(model, each, _EVENLY, 1) for each in borders)
-        joint = _piecewise(sn, st, tn, wishes.pieces)
-    if joint is None:
-        return plain
-    joint = replace(joint, close=plain.close, fit=bool(between(*normals).max() <= wishes.fit))
-    bent = joint if joint.varying else _bent(joint, sn, st, snn, tnn)
-    return bent if order == 2 or bent is joint else replace(joint, smoother=bent)
+    found: list[Joint | Cause] = [plain] * len(pairs)
+    for k in np.flatnonzero(least < 1e-9).tolist():
+        found[k] = Cause(Still.DEGENERATE)
+    for k in np.flatnonzero(slip > SLIP * length).tolist():
+        found[k] = Cause(Still.UNEVEN)
+    smooth = np.array([k for k, order in enumerate(orders) if order and found[k] is plain], int)
+    firm: dict[int, Joint] = {}
+    for k, joint in zip(smooth.tolist(), _polynomials(sn[smooth], st[smooth], tn[smooth]), strict=True):
+        joint = joint or _piecewise(model, pairs[k], wishes.pieces)
+        if joint is not None:
+            firm[k] = replace(joint, close=plain.close, fit=bool(angles[k] <= wishes.fit))
+    even = [k for k, joint in firm.items() if not joint.varying]
+    for k, bent in zip(even, _bent([firm[k] for k in even], *(x[even] for x in (sn, st, snn, tnn))), strict=True):
+        if bent is not None:
+            firm[k] = bent if orders[k] == 2 else replace(firm[k], smoother=bent)
+    found = [firm.get(k, joint) for k, joint in enumerate(found)]
+    gaps = np.linalg.norm(s - t, axis=2).max(axis=1)
+    return Met(found, gaps.tolist(), angles.tolist())
 
 
-def _polynomial(sn: Array, st: Array, tn: Array) -> Joint | None:
-    """The joint of first order whose laws are the simplest polynomials that are exact, or else close."""
-    values = components(sn, st, tn).T
+def _polynomials(sn: Array, st: Array, tn: Array) -> list[Joint | None]:
+    """Joints of first order whose laws are the simplest polynomials that are exact, or else close, where there are."""
+    found: list[Joint | None] = [None] * len(sn)
+    values, left = components(sn, st, tn), np.arange(len(sn))
     for limit in (EXACT, CLOSE):
         for degrees in _SHAPES:
-            across, along = (polynomial(SHARES, x, degree) for x, degree in zip(values, degrees, strict=True))
-            missed = _missed(sn, st, tn, (across.at(SHARES, SHARES), along.at(SHARES, SHARES)))
-            if missed <= limit:
-                return Joint(1, across, along, missed=missed)
-    return None
+            if not len(left):
+                break
+            laws = [polynomials(SHARES, values[left, :, k].T, degree) for k, degree in enumerate(degrees)]
+            at = [np.polynomial.polynomial.polyval(SHARES, law) if len(law) else np.zeros(()) for law in laws]
+            missed = _missed(sn[left], st[left], tn[left], (at[0], at[1]))
+            those = missed <= limit
+            for k in np.flatnonzero(those).tolist():
+                found[left[k]] = Joint(1, Law(laws[0][:, k]), Law(laws[1][:, k]), missed=float(missed[k]))
+            left = left[~those]
+    return found
 
 
-def _piecewise(sn: Array, st: Array, tn: Array, most: int) -> Joint | None:
+def _piecewise(model: Model, pair: tuple[Border, Border], most: int) -> Joint | None:
     """The joint of first order with a constant ratio across it, and a law along it of as few pieces as are close."""
+    if not most:
+        return None
+    (_, sn, st), (_, tn, _) = ([x[0] for x in jets(model, [border], _EVENLY, 1)] for border in pair)
     across, along = components(sn, st, tn).T
     ratio, pieces = constant(float(across.mean())), FEWEST
     while pieces <= most:
         law, knots = Law(along, pieces), breaks(pieces)
-        missed = _missed(sn, st, tn, (ratio.at(_EVENLY, knots), law.at(_EVENLY, knots)))
+        missed = float(_missed(sn, st, tn, (ratio.at(_EVENLY, knots), law.at(_EVENLY, knots))))
         if missed <= FINE:
             return Joint(1, ratio, law, missed=missed)
         pieces *= 2
     return None
 
 
-def _missed(sn: Array, st: Array, tn: Array, laws: tuple[Array, Array]) -> float:
-    """Largest part of T_n within the tangent plane that a S_n + b S_t misses, relative."""
-    across, along = (law - x for law, x in zip(laws, components(sn, st, tn).T, strict=True))
-    off = sn * across[:, None] + st * along[:, None]
-    return float((np.linalg.norm(off, axis=1) / np.linalg.norm(tn, axis=1)).max())
+def _missed(sn: Array, st: Array, tn: Array, laws: tuple[Array, Array]) -> Array:
+    """Largest part of T_n within the tangent planes that a S_n + b S_t misses, relative, of each seam."""
+    x = components(sn, st, tn)
+    off = sn * (laws[0] - x[..., 0])[..., None] + st * (laws[1] - x[..., 1])[..., None]
+    return np.asarray((np.linalg.norm(off, axis=-1) / np.linalg.norm(tn, axis=-1)).max(axis=-1))
 
 
-def _bent(joint: Joint, sn: Array, st: Array, snn: Array, tnn: Array) -> Joint:
-    """The joint with its second derivatives, if they have a law."""
-    bend, shear = components(sn, st, tnn - joint.across.values[0] ** 2 * snn).T
-    scale = np.linalg.norm(tnn, axis=1).max() + 1e-300
-    fitted = [
-        float(x.mean()) if np.abs(x[:, None] * d).max() > EXACT * scale else 0.0 for x, d in ((bend, sn), (shear, st))
-    ]
-    off = sn * (bend - fitted[0])[:, None] + st * (shear - fitted[1])[:, None]
-    if np.linalg.norm(off, axis=1).max() > CLOSE * scale:
-        return joint
-    return replace(joint, order=2, bend=fitted[0], shear=fitted[1])
+def _bent(joints: Sequence[Joint], sn: Array, st: Array, snn: Array, tnn: Array) -> list[Joint | None]:
+    """The joints with their second derivatives, where they have a law."""
+    ratio = np.array([joint.across.values[0] for joint in joints])[:, None, None]
+    laws = components(sn, st, tnn - ratio**2 * snn)
+    scale = np.linalg.norm(tnn, axis=2).max(axis=1) + 1e-300
+    fitted = np.zeros((2, len(joints)))
+    for k, direction in enumerate((sn, st)):
+        counts = np.abs(laws[..., k, None] * direction).max(axis=(1, 2)) > EXACT * scale
+        fitted[k, counts] = laws[counts, :, k].mean(axis=1)
+    off = sum(d * (laws[..., k] - fitted[k, :, None])[..., None] for k, d in enumerate((sn, st)))
+    close = np.linalg.norm(off, axis=2).max(axis=1) <= CLOSE * scale
+    both = zip(joints, close.tolist(), *fitted.tolist(), strict=True)
+    return [replace(joint, order=2, bend=bend, shear=shear) if law else None for joint, law, bend, shear in both]

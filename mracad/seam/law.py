@@ -90,9 +90,11 @@ def constant(value: float) -> Law:
     return Law(np.array([value]))
 
 
-def polynomial(share: Array, values: Array, degree: int) -> Law:
-    """The polynomial nearest to values at fractions; it vanishes for degree −1."""
-    return Law(np.polynomial.polynomial.polyfit(share, values, degree)) if degree >= 0 else NONE
+def polynomials(share: Array, values: Array, degree: int) -> Array:
+    """Coefficients ``(degree + 1, k)`` of the polynomials nearest to values ``(q, k)`` at fractions; none for −1."""
+    if degree < 0:
+        return np.empty((0, values.shape[1]))
+    return np.asarray(np.polynomial.polynomial.polyfit(share, values, degree))
 
 
 def _composed(coefficients: Array, low: float, size: float) -> Array:

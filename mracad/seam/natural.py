@@ -10,10 +10,10 @@ import numpy as np
 from mracad.bspline.vectors import across, between
 from mracad.model.adjacency import apart, coinciding, length, reach, touching
 from mracad.model.brep import Edge, Model, Side
-from mracad.seam.border import SHARES, Border, border, jets, opened
+from mracad.seam.border import Border, border
 from mracad.seam.cause import Cause, Still
 from mracad.seam.hold import CONTINUITY, ISO
-from mracad.seam.joint import Joint, joint_of
+from mracad.seam.joint import Joint, met
 from mracad.seam.sides import views
 from mracad.seam.wishes import Wishes
 
@@ -149,8 +149,8 @@ def seams(model: Model, movable: Collection[int], wishes: Wishes) -> Seams:
     unsewn = [each for each in coinciding(model) if any(side.face in movable for side in each[2])]
     every = [*((edge, edge, sides) for edge, sides in sewn), *unsewn]
     result = Seams(meetings=_meetings(model, wishes, every))
-    for edge in own:
-        _sort(result, edge, _still(edge, wishes) or _seam(result, model, movable, wishes, (edge, edge), edge.sides))
+    pairs = [_still(edge, wishes) or _pair(model, movable, (edge, edge), edge.sides) for edge in own]
+    _sort(result, own, _seams(result, model, wishes, pairs))
     free: dict[int, list[Edge]] = {}
     for edge in (each for each in model.edges if each.free and unsewn):
         free.setdefault(edge.sides[0].face, []).append(edge)
@@ -194,16 +194,17 @@ def _still(edge: Edge, wishes: Wishes) -> Cause | None:
     return Cause(Still.CROWDED) if len(edge.sides) > 2 else None
 
 
-def _sort(result: Seams, edge: Edge, seam: Seam | Cause | tuple[Border, Border]) -> None:
-    """File an edge under its kind."""
-    if isinstance(seam, Seam):
-        result.found.append(seam)
-        for each in (seam.edge, seam.twin):
-            result.frozen.pop(each, None)
-    elif isinstance(seam, Cause):
-        result.frozen[edge.index] = seam
-    else:
-        result.closing[edge.index] = seam
+def _sort(result: Seams, edges: Sequence[Edge], found: Sequence[Seam | Cause | tuple[Border, Border]]) -> None:
+    """File edges under their kind."""
+    for edge, seam in zip(edges, found, strict=True):
+        if isinstance(seam, Seam):
+            result.found.append(seam)
+            for each in (seam.edge, seam.twin):
+                result.frozen.pop(each, None)
+        elif isinstance(seam, Cause):
+            result.frozen[edge.index] = seam
+        else:
+            result.closing[edge.index] = seam
 
 
 def _unsewn(
@@ -226,9 +227,10 @@ def _unsewn(
     if wishes.hold & {edge.index, other.index}:
         result.frozen.update(dict.fromkeys((edge.index, other.index), Cause(Still.HELD)))
         return
-    seam = _seam(result, model, movable, wishes, (edge, other), (sides[0], other.sides[0]))
+    pair = _pair(model, movable, (edge, other), (sides[0], other.sides[0]))
+    (seam,) = _seams(result, model, wishes, [pair])
     if not isinstance(seam, tuple):
-        _sort(result, edge, seam)
+        _sort(result, [edge], [seam])
 
 
 def _twin(model: Model, edge: Edge, free: Sequence[Edge]) -> Edge | None:
@@ -246,15 +248,18 @@ def runs_back(one: Array, other: Array) -> bool:
     return bool(behind < ahead)
 
 
-def _seam(
-    known: Seams,
-    model: Model,
-    movable: Collection[int],
-    wishes: Wishes,
-    edges: tuple[Edge, Edge],
-    sides: Sequence[Side],
-) -> Seam | Cause | tuple[Border, Border]:
-    """The seam, the cause if there is none, or its borders if a periodic space closes it."""
+@dataclass(frozen=True, eq=False)
+class _Pair:
+    """Two edges, which may be the same, and the borders that meet there."""
+
+    edges: tuple[Edge, Edge]
+    borders: tuple[Border, Border]
+
+
+def _pair(
+    model: Model, movable: Collection[int], edges: tuple[Edge, Edge], sides: Sequence[Side]
+) -> _Pair | Cause | tuple[Border, Border]:
+    """The borders of a seam, the cause if there is none, or only its borders if a periodic space closes it."""
     if reason := _fixed(model, movable, sides):
         return reason
     a, b = (border(model, edge, side, use) for use, (edge, side) in enumerate(zip(edges, sides, strict=True)))
@@ -270,15 +275,29 @@ def _seam(
         knots = (net.u, net.v)[a.axis]
         if knots.periodic and abs(abs(a.at - b.at) - knots.period) <= ISO * knots.period:
             return a, b
-    found = jets(model, a, SHARES, 2), jets(model, b, SHARES, 2)
-    order = known.meetings[edges[0].index].order if edges[0].index in known.meetings else 0
-    if wishes.keep not in CONTINUITY:
-        order = min(order, *(_room(model, border) for border in (a, b)))
-    joint = joint_of(model, (a, b), found, order, wishes)
-    if isinstance(joint, Cause):
-        return joint
-    gap, angle = opened(model, (a, b), found)
-    return Seam(edges[0].index, edges[1].index, a, b, joint, gap, angle, joint.order < order)
+    return _Pair(edges, (a, b))
+
+
+def _seams(
+    known: Seams, model: Model, wishes: Wishes, found: Sequence[_Pair | Cause | tuple[Border, Border]]
+) -> list[Seam | Cause | tuple[Border, Border]]:
+    """The same, with seams for pairs of borders that have a joint, and the cause for others."""
+    pairs, orders = [each for each in found if isinstance(each, _Pair)], []
+    for pair in pairs:
+        index = pair.edges[0].index
+        order = known.meetings[index].order if index in known.meetings else 0
+        if wishes.keep not in CONTINUITY:
+            order = min(order, *(_room(model, border) for border in pair.borders))
+        orders.append(order)
+    how = met(model, [pair.borders for pair in pairs], orders, wishes)
+    figures = zip(pairs, orders, how.joints, how.gaps, how.angles, strict=True)
+    ready = iter(
+        joint
+        if isinstance(joint, Cause)
+        else Seam(pair.edges[0].index, pair.edges[1].index, *pair.borders, joint, gap, angle, joint.order < order)
+        for pair, order, joint, gap, angle in figures
+    )
+    return [next(ready) if isinstance(each, _Pair) else each for each in found]
 
 
 def _fixed(model: Model, movable: Collection[int], sides: Sequence[Side]) -> Cause | None:
