@@ -11,6 +11,7 @@ import numpy as np
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 _CACHES: list[Any] = []
+_PLAIN = {bool, int, float, str, bytes, type(None)}
 
 
 def kept(most: int) -> Callable[[Function], Function]:
@@ -65,6 +66,8 @@ def _frozen(value: Any) -> Any:
     """The value, with all arrays in it made read-only, also those within tuples, lists and objects."""
     if isinstance(value, np.ndarray):
         value.setflags(write=False)
-    for part in value if isinstance(value, tuple | list) else getattr(value, "__dict__", {}).values():
-        _frozen(part)
+        return value
+    for part in value if isinstance(value, (tuple, list)) else getattr(value, "__dict__", {}).values():
+        if type(part) not in _PLAIN:
+            _frozen(part)
     return value

@@ -16,6 +16,9 @@ if TYPE_CHECKING:
 LARGE = 200_000
 """Number of values above which compiled sweeps are worth importing their compiler."""
 
+_BLOCK = 1 << 20
+"""Number of values that are gathered at once."""
+
 
 class Rows:
     """A matrix whose rows are each one run of columns.
@@ -77,15 +80,14 @@ class Rows:
             from mracad.bspline import sweeps
 
             return sweeps.apply(self, c, axis % c.ndim)
-        moved = np.moveaxis(c, axis, 0)
+        moved = c.swapaxes(0, axis)
         flat = moved.reshape(self.columns, -1)
-        out = np.zeros((len(self.start), flat.shape[1]))
-        term = np.empty_like(out)
-        for column, value in zip(self.index.T, self.values.T, strict=True):
-            np.take(flat, column, axis=0, out=term, mode="clip")
-            term *= value[:, None]
-            out += term
-        return np.moveaxis(out.reshape(-1, *moved.shape[1:]), 0, axis)
+        out = np.empty((len(self.start), 1, flat.shape[1]))
+        step = max(1, _BLOCK // max(flat.shape[1] * self.values.shape[1], 1))
+        for begin in range(0, len(out), step):
+            part = slice(begin, begin + step)
+            np.matmul(self.values[part, None], flat[self.index[part]], out=out[part])
+        return out.reshape(len(out), *moved.shape[1:]).swapaxes(0, axis)
 
     def apply_transposed(self, c: Array, axis: int = 0) -> Array:
         """The transposed matrix times ``c`` along ``axis``."""

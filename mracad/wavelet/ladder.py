@@ -118,10 +118,7 @@ def ladder_for_scale(
         pass
     beside = ladder.beside()
     copies = np.where(beside < 2 * _RESOLUTION, 1, 3 * beside // (2 * _RESOLUTION))
-    if not ladder.sensible(len(ladder.alive)):
-        return kv
-    thinned = ladder.thinned(copies)
-    return kv if thinned == kv else thinned
+    return ladder.thinned(copies) if ladder.sensible(len(ladder.alive)) else kv
 
 
 @kept(128)
@@ -178,7 +175,8 @@ class _Ladder:
         if not (np.isfinite(lengths).all() and (lengths >= 0).all()):
             raise UsageError("a span has no length")
         self.kv = kv
-        self.kept = np.isin(kv.breaks, list(keep)) if isinstance(keep, AbstractSet) else np.array(keep, dtype=bool)
+        marks = np.isin(kv.breaks, list(keep)) if isinstance(keep, AbstractSet) and keep else keep
+        self.kept = np.array(np.zeros(len(kv.breaks)) if isinstance(marks, AbstractSet) else marks, dtype=bool)
         if self.kept.shape != kv.breaks.shape:
             raise UsageError(f"{self.kept.size} marks of kept knots for {len(kv.breaks)} breaks")
         if kv.periodic:
@@ -212,31 +210,43 @@ class _Ladder:
 
     def drop(self, candidate: Array) -> bool:
         """Remove alternate clusters of each run of candidates; return whether any was removed."""
-        gone = _alternate(candidate & ~self.fixed[self.alive], np.append(0, np.cumsum(self.spans)))
-        if len(self.alive) < 2 or not gone.any() or not self.sensible(int(np.count_nonzero(~gone))):
+        candidate = candidate & ~self.fixed[self.alive]
+        if len(self.alive) < 2 or not candidate.any():
+            return False
+        gone = _alternate(candidate, np.append(0, np.cumsum(self.spans)))
+        if not self.sensible(int(np.count_nonzero(~gone))):
             return False
         self.spans = np.add.reduceat(self.spans, np.flatnonzero(~gone)[:-1])
         self.alive = self.alive[~gone]
         return True
 
     def thinned(self, copies: Array) -> KnotVector:
-        """The knot vector with the remaining clusters, of at most ``copies`` knots each."""
+        """The knot vector with the remaining clusters, of at most ``copies`` knots each; its own if those are all."""
+        own = self.kv.multiplicities
         here = np.zeros(len(self.first), dtype=bool)
         here[self.alive] = True
-        mults = np.where(np.repeat(here, self.last - self.first + 1), self.kv.multiplicities, 0)
+        mults = np.where(np.repeat(here, self.last - self.first + 1), own, 0)
+        first, single = self.first[self.alive], (self.last == self.first)[self.alive]
         crowded = np.add.reduceat(mults, self.first)[self.alive] > copies
+        free = crowded & single & ~self._lasting[first]
+        mults[first[free]] = np.minimum(own[first[free]], copies[free])
+        crowded &= ~single
         for cluster, limit in zip(self.alive[crowded].tolist(), copies[crowded].tolist(), strict=True):
             inside = slice(self.first[cluster], self.last[cluster] + 1)
             mults[inside] = self._cut(inside, limit)
-        return self.kv.with_multiplicities(mults)
+        return self.kv if (mults == own).all() else self.kv.with_multiplicities(mults)
+
+    @property
+    def _lasting(self) -> Array:
+        """Breaks that stay with all their multiplicity."""
+        kept = self.kept.copy()
+        if not self.kv.periodic:
+            kept[[0, -1]] = True
+        return kept
 
     def _cut(self, inside: slice, limit: int) -> Array:
-        mults, kept = self.kv.multiplicities[inside].copy(), self.kept[inside].copy()
+        mults, kept = self.kv.multiplicities[inside].copy(), self._lasting[inside]
         ends = np.arange(inside.start, inside.stop) % self.kv.spans == 0
-        if not self.kv.periodic:
-            kept |= ends
-        if mults.sum() <= limit:
-            return mults
         chief = ends if ends.any() else kept
         if not chief.any():
             middle = np.abs(2 * np.arange(len(mults)) - (len(mults) - 1))

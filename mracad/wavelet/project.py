@@ -21,6 +21,7 @@ from mracad.wavelet.ladder import arc_lengths, ladder_for_scale
 
 _SMALL = 256  # control points up to which the dense operator is as fast, and avoids loading LAPACK's banded solvers
 _TAME = 1e3
+"""Ratio of the largest to the least pivot of the scaled normal equations up to which they lose few digits."""
 _LOW_DEGREE = 5
 
 
@@ -68,7 +69,28 @@ class Projection:
 
     @cached_property
     def _operator(self) -> Array:
-        """The whole ``(m, n)`` matrix, by orthogonal triangularisation of the weighted bases at the Gauss points."""
+        """The whole ``(m, n)`` matrix."""
+        found = self._by_normal_equations() if self._fine.degree <= _LOW_DEGREE else None
+        return self._by_triangles() if found is None else found
+
+    def _by_normal_equations(self) -> Array | None:
+        """The whole matrix, or None if the normal equations ``PᵀGP`` would lose too many digits."""
+        g, p = self._moments
+        right = g.apply(p.toarray())
+        own = slice(self._extra[0], self._extra[0] + self.fine_knots.count)
+        whole, right = p.apply_transposed(right)[self._own, self._own], right[:, self._own]
+        scale = 1.0 / np.sqrt(whole.diagonal())
+        whole *= scale[:, None] * scale
+        try:
+            pivots = np.linalg.cholesky(whole).diagonal() ** 2
+        except np.linalg.LinAlgError:
+            return None
+        if pivots.max() >= _TAME * pivots.min():
+            return None
+        return np.asarray(scale[:, None] * np.linalg.solve(whole, (right * scale)[own].T))
+
+    def _by_triangles(self) -> Array:
+        """The whole matrix, by orthogonal triangularisation of the weighted bases at the Gauss points."""
         span, values, weight = self._coarse_at_fine()
         root = np.sqrt(weight)
         fine_span, offset, _ = gauss(self._fine, self._fine.degree + 1)
@@ -200,6 +222,8 @@ def at_scale(
     poles = net.poles
     scales = scale if isinstance(scale, tuple) else (scale, scale)
     for axis, knots in enumerate((net.u, net.v)):
+        if knots.spans == 1 and not knots.periodic:
+            continue
         lengths = arc_lengths(net, axis) * (1.0 if finer is None else finer[axis])
         coarse = ladder_for_scale(knots, lengths, scales[axis], keep=keep[axis])
         if coarse != knots:
