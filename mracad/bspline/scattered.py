@@ -10,6 +10,7 @@ from mracad.bspline.basis import jet
 from mracad.bspline.curve import homogeneous
 from mracad.bspline.knots import Side
 from mracad.bspline.surface import Net, evaluated
+from mracad.bspline.vectors import cross
 
 Array = np.ndarray
 Place = tuple[Net, Array, tuple[Side, Side]]
@@ -34,6 +35,23 @@ def scattered(places: Sequence[Place], derivatives: int) -> tuple[Array, ...]:
         for whole, part in zip(found, parts, strict=True):
             whole[at] = part
     return tuple(found)
+
+
+def normals(places: Sequence[Place], su: Array, sv: Array) -> Array:
+    """Unit normals, ``(all parameters, 3)``, given ``S_u`` and ``S_v`` there; see
+    :meth:`mracad.bspline.surface.Net.normals`."""
+    sizes = [len(uv) for _, uv, _ in places]
+    normal: Array = cross(su, sv)
+    lengths = [np.linalg.norm(each, axis=1) for each in (su, sv, normal)]
+    floors = np.repeat([net.least_tangents for net, _, _ in places], sizes, axis=0).T
+    good = (lengths[2] > 1e-9 * lengths[0] * lengths[1]) & (lengths[0] >= floors[0]) & (lengths[1] >= floors[1])
+    with np.errstate(invalid="ignore", divide="ignore"):
+        normal /= lengths[2][:, None]
+    ends = np.cumsum([0, *sizes])
+    for k in np.unique(np.searchsorted(ends, np.flatnonzero(~good), side="right") - 1).tolist():
+        own, (net, uv, limits) = slice(ends[k], ends[k + 1]), places[k]
+        normal[own] = net.normals(uv, limits, (su[own], sv[own]))
+    return normal
 
 
 def _alike(places: Sequence[Place], sizes: Sequence[int]) -> Iterator[list[int]]:

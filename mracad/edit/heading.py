@@ -10,7 +10,7 @@ import numpy as np
 from mracad.bspline.vectors import cross
 from mracad.errors import UsageError
 from mracad.model.brep import Face, Model
-from mracad.model.region import face_region
+from mracad.model.region import covered
 from mracad.spec.places import AXES, whole
 
 Array = np.ndarray
@@ -44,7 +44,7 @@ def lead(model: Model, faces: Sequence[Face], along: str | None) -> int | None:
     assert surface is not None
     net = model.surfaces[surface].net
     us, vs = ((knots.breaks[1:] + knots.breaks[:-1]) / 2 for knots in (net.u, net.v))
-    inside = np.logical_or.reduce([face_region(net, face).inside for face in faces])
+    inside = np.logical_or.reduce([covered(net, face) for face in faces])
     points = faces[0].placed(np.asarray(net.grid(us, vs)))
     if along is None:
         return int(_extent(points, inside, 1) > _extent(points, inside, 0))

@@ -17,7 +17,6 @@ from mracad.seam.contact import Contact, Rows
 from mracad.seam.contact import rows as contact_rows
 from mracad.seam.guide import Led, led
 from mracad.seam.interface import Joints, away, contact, mended_ends, rims, twists
-from mracad.seam.metric import seen
 from mracad.seam.solve import Problem, Soft, Space, faded
 from mracad.seam.space import refined
 from mracad.seam.stretch import Limit
@@ -151,7 +150,7 @@ def pose(
     for i, net in nets.items():
         sheet = members[i]
         form = sheet.measured(net)
-        points = seen(net, form)
+        points = sheet.seen(net, form)
         held, more = rims(scene.model, net, sheet.all_faces, movable, joined)
         held &= ~mended_ends(scene.model, net, i, sheet.all_faces, movable, joined, width / 2)
         held |= twists(held)

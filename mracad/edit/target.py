@@ -200,6 +200,8 @@ class Sheet(Asked):
         Largest displacement of a control point if nothing were held, mm.
     form : Forms, optional
         Mass and bending of displacements of ``net``, if kept.
+    depends : ndarray of bool (nu, nv), optional
+        The control points of ``net`` that reach into its faces, if known.
     """
 
     metric: Net
@@ -207,12 +209,17 @@ class Sheet(Asked):
     base: Net
     detail: float = 0.0
     form: Forms | None = None
+    depends: Array | None = None
 
     def measured(self, net: Net) -> Forms:
         """Mass and bending of displacements of the surface over the knots of a net."""
         if net is self.net and self.form is not None:
             return self.form
         return forms(net, self.metric, quadrature(net, self.faces), self.creases, self.stretch)
+
+    def seen(self, net: Net, form: Forms) -> Array:
+        """The control points of a net of the surface that reach into its faces, given its forms, ``(nu, nv)``."""
+        return self.depends if net is self.net and self.depends is not None else seen(net, form)
 
 
 def stiffness(wavelength: float) -> float:
@@ -294,7 +301,7 @@ def _sheet(asked: Asked, wish: Wish) -> Sheet:
     base = at_scale(net, stretch.times(BASE * wavelength), sharp)
     if not _follows(trend, net, metric, form):
         trend = net.with_poles(np.zeros_like(net.poles))
-    sheet = _prepared(asked, metric, trend, base, form=form)
+    sheet = _prepared(asked, metric, trend, base, form=form, depends=depends)
     alone = Problem({asked.index: Space(net, form, depends, depends, trend.poles)})
     return replace(sheet, detail=wish.detail(alone, sheet))
 

@@ -13,6 +13,7 @@ from mracad.bspline.surface import Net
 from mracad.memo import kept
 from mracad.model.brep import Face
 from mracad.model.cells import inside_grid
+from mracad.model.outline import outline
 
 Array = np.ndarray
 
@@ -46,6 +47,13 @@ def face_region(net: Net, face: Face) -> Region:
     crossed = _crossed(net.u, net.v, tuple(trim.curve for trim in face.trims))
     middles = ((kv.breaks[:-1] + kv.breaks[1:]) / 2 for kv in (net.u, net.v))
     return Region(np.logical_or.reduce(crossed) | inside_grid(face, net, *middles), crossed)
+
+
+def covered(net: Net, face: Face) -> Array:
+    """The cells ``(cells_u, cells_v)`` of the knot grid of its surface ``net`` that overlap a face."""
+    if outline(face, net).natural:
+        return np.ones((net.u.spans, net.v.spans), bool)
+    return face_region(net, face).inside
 
 
 def supported(net: Net, cells: Array) -> Array:

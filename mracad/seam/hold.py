@@ -20,7 +20,7 @@ from mracad.bspline.knots import KnotVector, Side
 from mracad.bspline.surface import Net
 from mracad.memo import kept
 from mracad.model.brep import Face
-from mracad.model.region import Region, face_region, supported
+from mracad.model.region import Region, covered, face_region, supported
 
 Array = np.ndarray
 
@@ -61,7 +61,7 @@ class Separation:
 
 def reached(net: Net, faces: Sequence[Face]) -> dict[int, Array]:
     """For each face on a surface, the control points ``(nu, nv)`` that some part of it depends on."""
-    return {face.index: supported(net, face_region(net, face).inside) for face in faces}
+    return {face.index: supported(net, covered(net, face)) for face in faces}
 
 
 def separate(

@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from mracad.bspline.knots import Side as Limit
-from mracad.bspline.scattered import scattered
+from mracad.bspline.scattered import normals, scattered
 from mracad.bspline.surface import Net, curvature
 from mracad.bspline.vectors import cross
 from mracad.model.brep import Edge, Face, Model, Side
@@ -93,10 +93,11 @@ class Looks:
 
     def _at_once(self, strips: Sequence[_Strip]) -> Iterator[tuple[int, Array]]:
         sizes, members = [len(strip.uv) for strip in strips], [i for strip in strips for i in strip.members]
-        stack = scattered([(strip.net, strip.uv, strip.limits) for strip in strips], 2)
+        places = [(strip.net, strip.uv, strip.limits) for strip in strips]
+        stack = scattered(places, 2)
         frames = np.array([strip.face.frame for strip in strips])
         outward = np.repeat([float(strip.face.outward) for strip in strips], sizes)
-        vectors: Array = np.stack([*stack, _normals(strips, sizes, stack)])
+        vectors: Array = np.stack([*stack, normals(places, *stack[1:3])])
         if (frames == frames[0]).all():
             vectors = vectors @ frames[0, :3, :3].T
         else:
@@ -130,22 +131,6 @@ class _Strip:
     limits: tuple[Limit, Limit]
     members: list[int]
     uv: Array
-
-
-def _normals(strips: Sequence[_Strip], sizes: Sequence[int], stack: tuple[Array, ...]) -> Array:
-    """Unit normals of surfaces at samples with known derivatives; NaN where there is none."""
-    su, sv = stack[1:3]
-    normals: Array = cross(su, sv)
-    lengths = [np.linalg.norm(each, axis=1) for each in (su, sv, normals)]
-    floors = np.repeat([strip.net.least_tangents for strip in strips], sizes, axis=0).T
-    with np.errstate(invalid="ignore", divide="ignore"):
-        found = normals / lengths[2][:, None]
-    good = (lengths[2] > 1e-9 * lengths[0] * lengths[1]) & (lengths[0] >= floors[0]) & (lengths[1] >= floors[1])
-    ends = np.cumsum([0, *sizes])
-    for k in np.flatnonzero(np.logical_and.reduceat(good, ends[:-1]) == 0).tolist():
-        own, strip = slice(ends[k], ends[k + 1]), strips[k]
-        found[own] = strip.net.normals(strip.uv, strip.limits, (su[own], sv[own]))
-    return np.asarray(found)
 
 
 def from_inside(face: Face, net: Net, edge: int, uv: Array) -> tuple[Array, tuple[Limit, Limit]]:

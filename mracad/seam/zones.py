@@ -98,13 +98,12 @@ class Zoned:
     @property
     def away(self) -> Array:
         """Distance from the regions at the Greville points, mm, ``(nu, nv)``; infinite where there are none."""
+        if not self.zones or not self._inside.any():
+            return np.full(self.net.poles.shape[:2], np.inf)
         from scipy.spatial import KDTree
 
         points = np.asarray(self.net.grid(self.net.u.greville(), self.net.v.greville()))
-        found = np.full(points.shape[:2], np.inf)
-        if self.zones and self._inside.any():
-            found = np.asarray(KDTree(self._points[self._inside]).query(points)[0])
-        return found
+        return np.asarray(KDTree(self._points[self._inside]).query(points)[0])
 
 
 def _padded(steps: Array, axis: int, side: int) -> Array:

@@ -14,7 +14,7 @@ from mracad.bspline.surface import Net, pairs
 from mracad.bspline.vectors import unit
 from mracad.model.brep import Face, Model
 from mracad.model.outline import FLAT, outline
-from mracad.model.region import face_region
+from mracad.model.region import covered, face_region
 from mracad.wavelet.ladder import arc_lengths
 
 if TYPE_CHECKING:
@@ -276,7 +276,7 @@ class Patch:
 
 def touched(net: Net, faces: Iterable[Face]) -> Array:
     """Knot cells of a net that faces touch, a mask."""
-    return np.asarray(np.logical_or.reduce([face_region(net, face).inside for face in faces]))
+    return np.asarray(np.logical_or.reduce([covered(net, face) for face in faces]))
 
 
 def _many(kv: KnotVector) -> KnotVector:

@@ -13,7 +13,7 @@ from mracad.bspline.closest import distances
 from mracad.inspect.compare.subject import EQUAL, Array, CompareLimits, Match, Point, Subject, layer, paired
 from mracad.inspect.verdict import Finding, Layer
 from mracad.model.brep import Face, Model
-from mracad.model.region import face_region, supported
+from mracad.model.region import covered, supported
 
 _LINES = 40  # largest number of sample lines across a face
 
@@ -166,7 +166,7 @@ def _bound(ref: Model, new: Model, i: int, j: int) -> float | None:
     if old.weights is not None and np.abs(old.weights - fresh.weights).max() > 1e-12 * old.weights.max():
         return None
     placed = [face.placed(net.poles) for net, face in ((old, a), (fresh, b))]
-    seen = supported(old, face_region(old, a).inside) | supported(fresh, face_region(fresh, b).inside)
+    seen = supported(old, covered(old, a)) | supported(fresh, covered(fresh, b))
     return float(np.linalg.norm(placed[1] - placed[0], axis=-1)[seen].max(initial=0.0))
 
 
