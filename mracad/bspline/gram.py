@@ -98,7 +98,7 @@ def _computed(kv: KnotVector, derivative: int, weights: Array) -> Gram:
     quadrature = quadrature * weights[:, None]
     points = quadrature.shape[1]
     values = local_values(kv, np.repeat(span, points), offset.ravel(), derivative).reshape(-1, *quadrature.shape)
-    local = np.einsum("asg,bsg,sg->sab", values, values, quadrature, optimize=True)
+    local = np.matmul((values * quadrature).transpose(1, 0, 2), values.transpose(1, 2, 0))
     return assembled(span - kv.degree, local, kv.count, kv.periodic)
 
 

@@ -168,9 +168,15 @@ class KnotVector:
         return np.searchsorted(self.knots, self.breaks[:-1], "right") - 1
 
     def greville(self) -> Array:
-        """Greville abscissae ``(t_{i+1} + … + t_{i+d}) / d``, ``(count,)``; wrapped into a periodic domain."""
+        """Greville abscissae ``(t_{i+1} + … + t_{i+d}) / d``, ``(count,)``, within a periodic domain; read-only."""
+        return self._greville
+
+    @cached_property
+    def _greville(self) -> Array:
         means = np.lib.stride_tricks.sliding_window_view(self.knots[1:-1], self.degree).mean(axis=1)[: self.count]
-        return self.wrap(means) if self.periodic else means
+        places = self.wrap(means) if self.periodic else means
+        places.setflags(write=False)
+        return places
 
     def wrap(self, x: Array, side: Side = "right") -> Array:
         """Parameters moved by whole periods into the domain; unchanged where the vector is not periodic.

@@ -21,6 +21,7 @@ from mracad.bspline.functions import ORDERS, functions
 from mracad.bspline.jets import jets
 from mracad.bspline.knots import KnotVector, Side
 from mracad.bspline.surface import Net
+from mracad.memo import kept
 from mracad.model.cells import Quadrature
 from mracad.seam.integrals import Order, Sites, integrals, nothing, sites
 from mracad.seam.stretch import EVEN, Stretch, stretched
@@ -151,10 +152,7 @@ def _kinks(
     net: Net, metric: Net, quadrature: Quadrature, creases: Sequence[Collection[float]], stretch: Stretch
 ) -> tuple[Any, Any]:
     """Energies of kinks on knot lines of full multiplicity; those of creases separately."""
-    from scipy.sparse import csr_array
-
-    n = net.u.count * net.v.count
-    found = [csr_array((n, n)), csr_array((n, n))]
+    found = [_nothing(net.u.count * net.v.count)] * 2
     for axis in (0, 1):
         full = (net.u, net.v)[axis].full
         for sharp in (False, True):
@@ -163,6 +161,13 @@ def _kinks(
                 kink = _kink(net, metric, quadrature, axis, np.array(lines))
                 found[sharp] = found[sharp] + stretch.lengths[axis] ** 4 * kink
     return found[0], found[1]
+
+
+@kept(16)
+def _nothing(n: int) -> Any:
+    from scipy.sparse import csr_array
+
+    return csr_array((n, n))
 
 
 def _kink(net: Net, metric: Net, quadrature: Quadrature, axis: int, lines: Array) -> Any:

@@ -9,12 +9,15 @@ products of all functions would take (p + 1)³ (q + 1)³.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from mracad.bspline.basis import jet
 from mracad.bspline.knots import KnotVector
+from mracad.memo import kept
 
 Array = np.ndarray
 
@@ -44,12 +47,47 @@ class Sites:
     at: Array
     weight: Array
     table: Array
+    _products: dict[tuple[Any, ...], Array] = field(default_factory=dict)
+
+    @cached_property
+    def fresh(self) -> Array:
+        """Whether each piece lies in another span than the one before, ``(s,)``."""
+        return np.asarray(np.diff(self.first, prepend=self.first[0] - 1) != 0)
+
+    @cached_property
+    def straight(self) -> bool:
+        """Whether the spans' functions begin one after the other, without wrapping around."""
+        first, n = self.first[self.fresh], self.knots.count
+        return bool((np.diff(first) == 1).all()) and first[-1] + self.knots.degree < n
+
+    def products(self, orders: tuple[Order, ...], mirrored: bool = False) -> Array:
+        """Products of derivatives of functions, ``(s, len(orders) g, (d + 1)²)``; with mirror images where asked."""
+        if (orders, mirrored) not in self._products:
+            tables = []
+            for k, m in orders:
+                product = self.table[:, :, k, :, None] * self.table[:, :, m, None]
+                tables.append(product + product.swapaxes(2, 3) if mirrored and k != m else product)
+            self._products[orders, mirrored] = np.concatenate(tables, axis=1).reshape(len(self.first), -1, self.width)
+        return self._products[orders, mirrored]
+
+    @property
+    def width(self) -> int:
+        """Number of pairs of functions on a span."""
+        return (self.knots.degree + 1) ** 2
 
 
 def sites(knots: KnotVector, at: Array, weight: Array) -> Sites:
     """The Gauss points ``at`` ``(s, g)``, each row inside one span."""
-    first, table = jet(knots, at.ravel(), range(3))
-    return Sites(knots, first.reshape(at.shape)[:, 0], at, weight, table.reshape(*at.shape, 3, knots.degree + 1))
+    return _sites(knots, at.tobytes(), weight.tobytes(), at.shape)
+
+
+@kept(8)
+def _sites(knots: KnotVector, at: bytes, weight: bytes, shape: tuple[int, int]) -> Sites:
+    """Cached, because forms in different metrics are taken at the same points."""
+    places = np.frombuffer(at)
+    first, table = jet(knots, places, range(3))
+    table = table.reshape(*shape, 3, knots.degree + 1)
+    return Sites(knots, first.reshape(shape)[:, 0], places.reshape(shape), np.frombuffer(weight).reshape(shape), table)
 
 
 def integrals(
@@ -83,14 +121,13 @@ def integrals(
     for begin in range(0, su, rows):
         part = slice(begin, begin + rows)
         lines = slice(begin * gu, min(begin + rows, su) * gu)
-        tables, found = [], []
+        orders, found = [], []
         for (i, j), each in pairs.items():
             inner = _inner(v, [(k, m, c[lines]) for k, m, c in each], mirrored=i == j)
-            product = u.table[part, :, i, :, None] * u.table[part, :, j, None]
-            tables += [product] if i == j else [product, product.swapaxes(2, 3)]
+            orders += [(i, j)] if i == j else [(i, j), (j, i)]
             found += [inner] if i == j else [inner, _transposed(inner)]
-        count = len(tables[0])
-        outer = np.concatenate(tables, axis=1).reshape(count, len(found) * gu, -1).swapaxes(1, 2)
+        outer = u.products(tuple(orders))[part].swapaxes(1, 2)
+        count = len(outer)
         along_v = np.concatenate([each.reshape(count, gu, -1) for each in found], axis=1)
         _added(stencil, u, part, np.matmul(outer, along_v).reshape(count, p + 1, p + 1, -1))
     return form
@@ -104,11 +141,7 @@ def nothing(u: KnotVector, v: KnotVector) -> Array:
 def _inner(v: Sites, parts: list[tuple[int, int, Array]], mirrored: bool) -> Array:
     """``Σ ∫ c D^k N_b D^m N_b' dv`` on lines u = const, ``(lines, nv, 2q + 1)``; with its mirror image where asked."""
     (sv, gv), q = v.at.shape, v.knots.degree
-    tables = []
-    for k, m, _ in parts:
-        product = v.table[:, :, k, :, None] * v.table[:, :, m, None]
-        tables.append(product + product.swapaxes(2, 3) if mirrored and k != m else product)
-    table = np.concatenate(tables, axis=1).reshape(sv, len(parts) * gv, -1)
+    table = v.products(tuple((k, m) for k, m, _ in parts), mirrored)
     values = np.concatenate([c.reshape(-1, sv, gv).swapaxes(0, 1) for _, _, c in parts], axis=2)
     cells = np.matmul(values, table).reshape(sv, len(values[0]), q + 1, q + 1)
     found = np.zeros((v.knots.count, 2 * q + 1, cells.shape[1]))
@@ -119,12 +152,13 @@ def _inner(v: Sites, parts: list[tuple[int, int, Array]], mirrored: bool) -> Arr
 def _added(form: Array, along: Sites, part: slice, cells: Array) -> None:
     """Add the parts ``(s, d + 1, d + 1, …)`` that pieces give to pairs of functions to a stencil ``(n, 2d + 1, …)``."""
     n, d = along.knots.count, along.knots.degree
-    first = along.first[part]
-    new = np.flatnonzero(np.diff(first, prepend=first[0] - 1))
-    if len(new) < len(first):  # pieces of one span
+    first, fresh = along.first[part], along.fresh[part]
+    if not fresh[1:].all():  # pieces of one span
+        new = np.append(0, 1 + np.flatnonzero(fresh[1:]))
         first, cells = first[new], np.add.reduceat(cells, new, axis=0)
     for a in range(d + 1):
-        form[(first + a) % n, d - a : 2 * d + 1 - a] += cells[:, a]
+        place = slice(first[0] + a, first[-1] + a + 1) if along.straight else (first + a) % n
+        form[place, d - a : 2 * d + 1 - a] += cells[:, a]
 
 
 def _transposed(stencil: Array) -> Array:

@@ -13,6 +13,7 @@ from mracad.bspline.crease import crease_lines
 from mracad.bspline.gram import gram
 from mracad.bspline.surface import Net
 from mracad.bspline.vectors import cross
+from mracad.memo import kept
 from mracad.model.cells import Quadrature
 from mracad.seam.energy import Forms, forms
 from mracad.seam.solve import Problem, Space
@@ -45,12 +46,18 @@ def _walked(count: int, steps: Array) -> Array:
 
 def seen(net: Net, masses: Forms) -> Array:
     """Mask ``(nu, nv)`` of the control points that reach into the faces over which masses were taken."""
+    whole = _whole(net)
+    mass = masses.mass.diagonal().reshape(whole.shape)
+    return np.asarray((mass > BARELY * whole) & (mass > 0))
+
+
+@kept(16)
+def _whole(net: Net) -> Array:
+    """About the mass of each function over the whole surface, ``(nu, nv)``."""
     us, vs = net.u.greville(), net.v.greville()
     area = np.linalg.norm(cross(net.tangents(us, vs, 0), net.tangents(us, vs, 1)), axis=-1)
     area = np.minimum(area, np.median(area))  # unusually large areas say little about the function
-    whole = np.multiply.outer(*(gram(knots).diagonal() for knots in (net.u, net.v))) * area
-    mass = masses.mass.diagonal().reshape(whole.shape)
-    return np.asarray((mass > BARELY * whole) & (mass > 0))
+    return np.asarray(gram(net.u).diagonal()[:, None] * gram(net.v).diagonal() * area)
 
 
 def creases(net: Net, points: Array) -> tuple[frozenset[float], frozenset[float]]:

@@ -22,6 +22,7 @@ import numpy as np
 
 from mracad.bspline.jets import jets
 from mracad.bspline.surface import Net
+from mracad.memo import kept
 from mracad.wavelet.project import at_scale
 
 Array = np.ndarray
@@ -111,11 +112,7 @@ class Limit:
         found = np.zeros((3, *p.shape))
         left = np.ones(p.shape, bool)
         for length, net in self.looks:
-            every = jets(net, u, v, np.ones((u.size, v.size), bool), net.poles.mean(axis=(0, 1)), 2)
-            xu, xv, *second = every.reshape(6, 3, v.size, u.size)[1:]
-            normal = xu[1] * xv[2] - xu[2] * xv[1], xu[2] * xv[0] - xu[0] * xv[2], xu[0] * xv[1] - xu[1] * xv[0]
-            size = np.maximum(np.sqrt(_dot(normal, normal)), 1e-300)
-            a, b, c = (np.ascontiguousarray((_dot(normal, each) / size).T) for each in second)
+            a, b, c = _bent(net, (u.tobytes(), v.tobytes()), (u.shape, v.shape))
             now = p * p * a, p * (q * a + r * b), q * q * a + 2 * q * r * b + r * r * c
             found = np.where(left, now, found)
             mean, half = _halves(now)
@@ -206,6 +203,18 @@ def stretched(frame: Array, root: Form) -> Array:
         (b * b, _TWO * b * c, c * c),
     )
     return np.stack([sum(x * frame[:, k] for k, x in enumerate(row)) for row in rows], axis=1)
+
+
+@kept(8)
+def _bent(net: Net, places: tuple[bytes, bytes], shapes: tuple[tuple[int, ...], tuple[int, ...]]) -> Form:
+    """The second fundamental form at pairs of parameters; kept, because it is needed in different metrics."""
+    at_u, at_v = (np.frombuffer(at).reshape(shape) for at, shape in zip(places, shapes, strict=True))
+    every = jets(net, at_u, at_v, np.ones((at_u.size, at_v.size), bool), net.poles.mean(axis=(0, 1)), 2)
+    xu, xv, *second = every.reshape(6, 3, at_v.size, at_u.size)[1:]
+    normal = xu[1] * xv[2] - xu[2] * xv[1], xu[2] * xv[0] - xu[0] * xv[2], xu[0] * xv[1] - xu[1] * xv[0]
+    size = np.maximum(np.sqrt(_dot(normal, normal)), 1e-300)
+    a, b, c = (np.ascontiguousarray((_dot(normal, each) / size).T) for each in second)
+    return a, b, c
 
 
 def _halves(form: Form) -> tuple[Array, Array]:

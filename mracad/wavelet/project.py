@@ -52,7 +52,7 @@ class Projection:
             return None
         span, values, weight = self._coarse_at_fine()
         begin = np.flatnonzero(np.diff(span, prepend=-1))
-        local = np.add.reduceat(np.einsum("asg,bsg,sg->sab", values, values, weight, optimize=True), begin)
+        local = np.add.reduceat(np.matmul((values * weight).transpose(1, 0, 2), values.transpose(1, 2, 0)), begin)
         g = assembled(span[begin] - self._coarse.degree, local, self._coarse.count, self._coarse.periodic)
         scale = 1.0 / np.sqrt(g.diagonal()[self._own])
         row, column, value = g.rows.coo()
