@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
+from mracad.seam.bands import Bands, Cholesky
 from mracad.seam.eliminate import Eliminated
 from mracad.seam.factor import Definite, nested
 
@@ -134,6 +135,47 @@ class Constrained:
         out = np.zeros((self.size, x.shape[1]))
         out[self.free] = self.scale[:, None] * x
         return out
+
+
+class Banded:
+    """The same without conditions, for sums of forms whose bands are kept.
+
+    Parameters
+    ----------
+    bands : Bands
+    weights : sequence of float
+        Factors on its matrices, whose sum is A.
+    free : ndarray of bool (n,)
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        A is not positive definite.
+    """
+
+    def __init__(self, bands: Bands, weights: Sequence[float], free: Array) -> None:
+        form = bands.sum(weights)
+        self.free = free[:, None]
+        held = np.flatnonzero(~free[bands.points])
+        form[held] = 0.0
+        row = held[:, None] - np.arange(1, bands.width + 1)
+        form.ravel()[(row * bands.width + held[:, None])[row >= 0]] = 0.0
+        diagonal = form[:, 0]
+        diagonal += LEAST * (diagonal + LEAST * diagonal.max(initial=0.0) + 1e-300)
+        diagonal[held] = 1.0
+        self._solve = Cholesky(bands, form)
+
+    def __call__(
+        self, right: Array, start: Array | None = None, goal: Array | None = None, exactly: bool = True
+    ) -> Array:
+        """x − start, of which b is the right-hand side; see :class:`Constrained`."""
+        found = self._solve(right)
+        found *= self.free
+        return found
+
+    def settled(self, x: Array) -> Array:
+        """The same point: there are no conditions."""
+        return x
 
 
 def lengths(rows: Any) -> Array:

@@ -8,16 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from mracad.seam.bands import BROAD, Bands, Cholesky
 from mracad.seam.fronts import Fronts
 
 Array = np.ndarray
-
-WIDEST = 50.0
-"""Largest bandwidth, over the fourth root of the number of unknowns, for which a band is faster than nested
-dissection."""
-
-BROAD = 400
-"""Smallest bandwidth for which the fronts of a net are faster than a band."""
 
 LOST = 1e-9
 """Relative residual allowed after one refinement; factors that leave more need pivoting."""
@@ -35,39 +29,23 @@ class Definite:
     """
 
     def __init__(self, matrix: Any, places: Array | None = None) -> None:
-        from scipy.linalg.lapack import dpbtrf
-
+        self._solve: Callable[[Array], Array] = np.asarray
         matrix = matrix.tocsr()
-        self._band: Array | None = None
-        self._other: Callable[[Array], Array] = np.asarray
         if not matrix.shape[0]:
             return
-        self._order, width = _ordered(matrix)
-        if width >= BROAD and places is not None:
-            with suppress(np.linalg.LinAlgError):
-                self._other = Fronts(matrix, places)
+        bands = Bands([matrix], places)
+        with suppress(np.linalg.LinAlgError):
+            if bands.width >= BROAD and places is not None:
+                self._solve = Fronts(matrix, places)
                 return
-        if width <= WIDEST * matrix.shape[0] ** 0.25:
-            band, failed = dpbtrf(_band(matrix, self._order, width), lower=1, overwrite_ab=1)
-            self._band = None if failed else band
-        if self._band is None:
-            self._other = nested(matrix)
+            if bands.narrow:
+                self._solve = Cholesky(bands, bands.sum([1.0]))
+                return
+        self._solve = nested(matrix)
 
     def __call__(self, right: Array) -> Array:
         """The solution for a right-hand side ``(n, k)``."""
-        from scipy.linalg.lapack import dpbtrs
-
-        if not right.size:
-            return right
-        if self._band is None:
-            return self._other(right)
-        ordered = right if self._order is None else right[self._order]
-        found = dpbtrs(self._band, np.array(ordered, order="F"), lower=1, overwrite_b=1)[0]
-        if self._order is None:
-            return np.ascontiguousarray(found)
-        whole = np.empty_like(right)
-        whole[self._order] = found
-        return whole
+        return self._solve(right) if right.size else right
 
 
 def nested(matrix: Any) -> Callable[[Array], Array]:
@@ -84,34 +62,3 @@ def nested(matrix: Any) -> Callable[[Array], Array]:
     if not lost <= LOST * np.abs(right).max(initial=0.0):
         factor = splu(matrix, permc_spec="COLAMD", diag_pivot_thresh=1.0)
     return lambda right: np.asarray(factor.solve(right))
-
-
-def _ordered(matrix: Any) -> tuple[Array | None, int]:
-    """The order of unknowns with the narrower band, as given (None) or Cuthill-McKee, and its bandwidth."""
-    from scipy.sparse.csgraph import reverse_cuthill_mckee
-
-    row = np.repeat(np.arange(matrix.shape[0]), np.diff(matrix.indptr))
-    width = int(np.abs(row - matrix.indices).max(initial=0))
-    order = reverse_cuthill_mckee(matrix, symmetric_mode=True)
-    place = _places(order)
-    other = int(np.abs(place[row] - place[matrix.indices]).max(initial=0))
-    return (order, other) if other < width else (None, width)
-
-
-def _places(order: Array) -> Array:
-    place = np.empty(len(order), int)
-    place[order] = np.arange(len(order))
-    return place
-
-
-def _band(matrix: Any, order: Array | None, width: int) -> Array:
-    """The lower half of a matrix in an order as LAPACK stores bands, ``(width + 1, n)``."""
-    n = matrix.shape[0]
-    row, column = np.repeat(np.arange(n), np.diff(matrix.indptr)), matrix.indices
-    if order is not None:
-        place = _places(order)
-        row, column = place[row], place[column]
-    lower = row >= column
-    band = np.zeros((n, width + 1))
-    band[column[lower], (row - column)[lower]] = matrix.data[lower]
-    return band.T

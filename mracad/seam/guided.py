@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from mracad.seam.constrained import MET, SLACK, Constrained
+from mracad.seam.constrained import MET, SLACK, Banded, Constrained
 from mracad.seam.divided import Divided
 
 Array = np.ndarray
@@ -60,11 +60,11 @@ class Guided:
 
     Parameters
     ----------
-    base : Constrained or Divided
+    base : Banded, Constrained or Divided
     guides : Guides
     """
 
-    def __init__(self, base: Constrained | Divided, guides: Guides, response: Array | None = None) -> None:
+    def __init__(self, base: Banded | Constrained | Divided, guides: Guides, response: Array | None = None) -> None:
         from scipy.linalg import cho_factor
 
         self.base, self.guides = base, guides

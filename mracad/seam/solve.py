@@ -17,13 +17,15 @@ so one factorisation serves all.  p is expanded in Chebyshev polynomials (:mod:`
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from mracad.bspline.surface import Net
-from mracad.seam.constrained import Constrained
+from mracad.seam.bands import Bands, Blocks, by_rows, whole
+from mracad.seam.constrained import Banded, Constrained
 from mracad.seam.divided import LEFT, Divided
 from mracad.seam.energy import Forms
 from mracad.seam.gain import applied
@@ -31,7 +33,8 @@ from mracad.seam.guided import Guided, Guides
 from mracad.seam.strips import Division, Layout, joints, strips
 
 Array = np.ndarray
-Solver = Constrained | Divided | Guided
+Alone = Banded | Constrained | Divided
+Solver = Alone | Guided
 
 KEPT = 60_000
 """Largest number of control points for which factors are cached, besides the last one."""
@@ -108,30 +111,6 @@ class Soft:
     between: Any = None
 
 
-class Blocks:
-    """A block-diagonal matrix, with a ``scipy.sparse.csr_array`` per surface."""
-
-    def __init__(self, parts: Sequence[Any]) -> None:
-        self.parts = parts
-
-    def __matmul__(self, x: Array) -> Array:
-        found, end = np.empty_like(x), 0
-        for part in self.parts:
-            begin, end = end, end + part.shape[0]
-            found[begin:end] = part @ x[begin:end]
-        return found
-
-    def diagonal(self) -> Array:
-        """The diagonal, ``(points,)``."""
-        return np.concatenate([part.diagonal() for part in self.parts])
-
-    def tocsr(self) -> Any:
-        """The whole matrix."""
-        from scipy.sparse import block_diag
-
-        return self.parts[0] if len(self.parts) == 1 else block_diag(self.parts, format="csr")
-
-
 class Problem:
     """Surfaces with the conditions that join them.
 
@@ -162,13 +141,13 @@ class Problem:
 
         self.spaces, self.effort, self.guides = spaces, effort, guides
         soft = soft or Soft(None)
-        self.soft, self.between, pull = soft.form, soft.between, soft.pull
+        self.soft, self.between, pull = by_rows(soft.form), by_rows(soft.between), soft.pull
         self.rows = csr_array((0, sum(s.free.size for s in spaces.values()))) if rows is None else rows
         self.goal = goal if goal is not None and goal.any() else None
         self.pull = pull if pull is not None and pull.any() else None
-        self.mass, self.bending, self.creases = (
-            Blocks([getattr(space.forms, name) for space in spaces.values()]) for name in ("mass", "bending", "creases")
-        )
+        more = [each for each in (self.soft, self.between) if each is not None and len(spaces) == 1]
+        self.bands = [_bands(space, more) for space in spaces.values()]
+        self.mass, self.bending, self.creases = (Blocks(self.bands, number) for number in range(3))
         self.free, self.seen = (
             np.concatenate([getattr(space, name).ravel() for space in spaces.values()]) for name in ("free", "seen")
         )
@@ -220,11 +199,13 @@ class Problem:
         """
         kept = np.where((self.free | ~self.seen if beyond else self.free)[:, None], wanted, 0.0)
         held = wanted - kept
-        pull = self.mass @ held
-        if stiffness:
-            pull = pull + stiffness * (self.bending @ held + self.creases @ held)
+        pull = np.zeros_like(held)
+        if held.any():
+            pull = self.mass @ held
+            if stiffness:
+                pull += stiffness * (self.bending @ held + self.creases @ held)
         if self.soft is not None:
-            pull = pull - self.soft @ kept
+            pull -= Blocks(self.bands, 3) @ kept if len(self.spaces) == 1 else self.soft @ kept
         if self.pull is not None:
             pull = pull + self.pull
         if not (pull.any() or self.rows.shape[0] or self.guides):  # nothing is in the way
@@ -273,7 +254,11 @@ class Problem:
             self._solvers[key] = Guided(base, self.guides) if held and self.guides is not None else base
         return self._solvers[key]
 
-    def _factored(self, stiffness: float, free: Array, soft: Any) -> Constrained | Divided:
+    def _factored(self, stiffness: float, free: Array, soft: Any) -> Alone:
+        if not self.rows.shape[0] and len(self.spaces) == 1 and self.bands[0].holds(free):
+            others = [float(each is soft) for each in (self.soft, self.between) if each is not None]
+            with suppress(np.linalg.LinAlgError):
+                return Banded(self.bands[0], [1.0, stiffness, stiffness, *others], free)
         parts = (_sum(space.forms, stiffness) for space in self.spaces.values())
         if len(self.spaces) > 1 and free.sum() > self.effort.direct:
             layout = self._layout(stiffness)
@@ -284,7 +269,7 @@ class Problem:
                 diagonal = diagonals[0] + stiffness * (diagonals[1] + diagonals[2])
                 division = Division(layout, joined, along)
                 return Divided(parts, diagonal, soft, self.rows, free, division, self.effort.left)
-        form = Blocks(list(parts)).tocsr()
+        form = whole(list(parts))
         alone = [np.indices(space.free.shape).reshape(2, -1).T for space in self.spaces.values()]
         places = alone[0] if len(alone) == 1 else None
         return Constrained(form if soft is None else form + soft, self.rows, free, places=places)
@@ -314,9 +299,9 @@ class Problem:
         """δᵀ M t and δᵀ M δ of displacements ``(points, 3)``, by surface."""
         if self._pull is None or self._pull[0] is not target:
             self._pull = target, self.mass @ target
-        ends = np.cumsum([0, *(space.free.size for space in self.spaces.values())])[:-1]
-        both = (delta * each for each in (self._pull[1], self.mass @ delta))
-        linear, square = (np.add.reduceat(each.sum(axis=1), ends) for each in both)
+        ends = np.cumsum([0, *(each.size for each in self.bands)])[:-1]
+        both = (np.einsum("ij,ij->i", delta, each) for each in (self._pull[1], self.mass @ delta))
+        linear, square = (np.add.reduceat(each, ends) for each in both)
         return linear, square
 
     def split(self, values: Array) -> dict[int, Array]:
@@ -329,6 +314,12 @@ def faded(away: Array, width: float) -> Array:
     """0 at no distance (mm), 1 beyond ``width``, smooth in between."""
     share = np.minimum(away / width, 1.0)
     return np.asarray(share**3 * (10 - 15 * share + 6 * share**2))
+
+
+def _bands(space: Space, more: Sequence[Any]) -> Bands:
+    """The forms of a surface, and others over its control points alone."""
+    form, places = space.forms, np.indices(space.free.shape).reshape(2, -1).T
+    return Bands([form.mass, form.bending, form.creases, *more], places)
 
 
 def _sum(forms: Forms, stiffness: float) -> Any:

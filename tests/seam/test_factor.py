@@ -59,4 +59,4 @@ def room(matrix):
 def test_the_band_is_taken_along_the_short_side():
     wide, narrow = (csr_array(laplacian(*shape)) for shape in ((4, 100), (100, 4)))
     Definite(wide)  # what is imported on the way is no part of it
-    assert room(wide) <= 2 * room(narrow) <= 12 * 8 * 400
+    assert room(wide) <= 2 * room(narrow) <= 14 * 8 * 400

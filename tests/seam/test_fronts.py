@@ -36,7 +36,7 @@ def test_wide_nets_are_solved_by_fronts_and_narrow_ones_by_a_band():
     for nu, nv, wide in ((BROAD // 3 + 8, BROAD // 3 + 8, True), (12, 200, False)):
         matrix, places = form(nu, nv, 3)
         solve, plain = Definite(matrix, places), Definite(matrix)
-        assert isinstance(solve._other, Fronts) == wide
+        assert isinstance(solve._solve, Fronts) == wide
         right = np.random.default_rng(3).standard_normal((len(places), 3))
         expected = plain(right)
         np.testing.assert_allclose(solve(right), expected, atol=1e-9 * np.abs(expected).max())
