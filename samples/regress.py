@@ -18,7 +18,7 @@ from mracad.job.look import snapshot
 from mracad.occ.check import check
 from mracad.occ.contents import contents
 from mracad.occ.files import read
-from mracad.occ.measure import mass
+from mracad.occ.sizes import mass
 
 FIGURES = Path(__file__).with_name("figures.json")
 SLACK = 1e-6  # relative; for lengths that are zero, millimetres

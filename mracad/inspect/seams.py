@@ -8,8 +8,9 @@ n × t, the curvature jump is |κ_a − κ_b|; the relative jump is divided by m
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 
@@ -21,6 +22,7 @@ from mracad.seam.sides import views
 
 Array = np.ndarray
 _Pair = tuple[Edge, bool, tuple[Side, Side]]
+_Key = tuple[int, tuple[int, int]]
 
 SMOOTH = 1.0
 """A seam whose largest angle is below this counts as smooth in summaries, degrees."""
@@ -85,9 +87,17 @@ class SeamSummary:
     bend: float
 
 
-def seams(model: Model, every: bool = False) -> list[SeamMeasure]:
-    """Measure all seams of NURBS faces, or with ``every`` all seams, in edge order; coinciding free edges come last."""
-    return _measured(model, _pairs(model, every))
+def seams(
+    model: Model, every: bool = False, known: Mapping[_Key, SeamMeasure] = MappingProxyType({})
+) -> list[SeamMeasure]:
+    """Measure all seams of NURBS faces, or with ``every`` all seams, in edge order; coinciding free edges come last.
+
+    Sewn seams whose :func:`key` is in ``known`` are taken from there.
+    """
+    pairs = _pairs(model, every)
+    kept = [known.get((edge.index, (one.face, two.face))) if sewn else None for edge, sewn, (one, two) in pairs]
+    fresh = iter(_measured(model, [pair for pair, old in zip(pairs, kept, strict=True) if old is None]))
+    return [next(fresh) if old is None else old for old in kept]
 
 
 def remeasured(old: Model, model: Model, before: list[SeamMeasure], moved: Collection[int]) -> list[SeamMeasure]:
@@ -114,7 +124,7 @@ def summary(measures: list[SeamMeasure], smooth: frozenset[tuple[int, tuple[int,
     )
 
 
-def key(measure: SeamMeasure) -> tuple[int, tuple[int, int]]:
+def key(measure: SeamMeasure) -> _Key:
     """The key that identifies a seam before and after an edit."""
     return measure.edge, measure.faces
 

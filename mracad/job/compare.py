@@ -9,12 +9,18 @@ from mracad.errors import UsageError
 from mracad.formats import unheld
 from mracad.inspect.compare import CompareLimits, Subject
 from mracad.inspect.compare import compare as differences
+from mracad.inspect.compare.same import same
 from mracad.job.judge import Judged, Original
 from mracad.spec.quantity import length
 from mracad.spec.steps import Compare
 
 if TYPE_CHECKING:
+    import numpy as np
+
+    from mracad.model.brep import Model
     from mracad.occ.document import Document
+
+    Array = np.ndarray
 
 
 def compare(document: Document, options: Compare, original: Original | None = None) -> Judged:
@@ -35,7 +41,8 @@ def compare(document: Document, options: Compare, original: Original | None = No
         raise UsageError("compare has nothing to compare with", "name a reference")
 
     place = "assembly" in unheld(reference.schema, document.schema)
-    old, new = (_measured(each, place) for each in (reference, document))
+    old, each = _measured(reference, place)
+    new, _ = _measured(document, place, (old.model, each))
     growth, volume, size = options.max_gap_growth, options.max_volume_change, old.model.diagonal
     limits = CompareLimits(
         deviation=length(options.max_deviation, size, "max-deviation"),
@@ -47,12 +54,16 @@ def compare(document: Document, options: Compare, original: Original | None = No
     return Judged(verdict, verdict.failed())
 
 
-def _measured(document: Document, place: bool) -> Subject:
-    """A measured document; with ``place`` all instances at their places in the assembly."""
+def _measured(document: Document, place: bool, ref: tuple[Model, Array] | None = None) -> tuple[Subject, Array]:
+    """A measured document, and the sizes of its faces; with ``place`` all instances at their places in the assembly.
+
+    Faces that are the same as in the model ``ref`` have the same sizes.
+    """
     from mracad.occ.check import check, lone_faces
     from mracad.occ.contents import contents
-    from mracad.occ.measure import KernelGauge, face_masses, mass
+    from mracad.occ.measure import KernelGauge
     from mracad.occ.placed import placed
+    from mracad.occ.sizes import document_sizes, face_masses, mass
     from mracad.occ.view import view
 
     whole = placed(document) if place else None
@@ -61,15 +72,19 @@ def _measured(document: Document, place: bool) -> Subject:
     if whole:
         faces = (replace(face, colour=colour) for face, colour in zip(model.faces, whole.colours, strict=True))
         model = replace(model, faces=tuple(faces))
-    return Subject(
+    alike = same(ref[0], model) if ref else {}
+    each = document_sizes(seen, {face: ref[1][face] for face in alike} if ref else {})
+    subject = Subject(
         model=model,
         schema=document.schema,
         contents=contents(document),
-        mass=mass(document),
-        faces=face_masses(seen),
+        mass=mass(seen, each),
+        faces=face_masses(seen, each),
         validity=check(seen),
         lone_faces=lone_faces(seen),
         gauge=KernelGauge(seen),
         face_numbers=whole.faces if whole else range(len(model.faces)),
         edge_numbers=whole.edges if whole else range(len(model.edges)),
+        same=alike,
     )
+    return subject, each

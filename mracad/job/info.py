@@ -100,8 +100,8 @@ def info(
         Points (mm) whose nearest places on faces to find, and places on faces.
     """
     from mracad.occ.check import check
-    from mracad.occ.measure import face_masses
     from mracad.occ.probe import middles, nearest, on_face
+    from mracad.occ.sizes import face_masses
     from mracad.occ.view import view
 
     tell(progress, "looking at faces")

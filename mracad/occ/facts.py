@@ -24,13 +24,12 @@ from mracad.model.brep import Model
 from mracad.model.facts import Counts, Facts, Line, Validity
 from mracad.occ.check import check
 from mracad.occ.document import Document
-from mracad.occ.measure import mass
 from mracad.occ.settings import quiet
-from mracad.occ.topology import box, edge_uses, inside, matrix, placed
-from mracad.occ.view import pcurve, view
+from mracad.occ.sizes import mass, sizes
+from mracad.occ.topology import box, edge_uses, inside, matrix, pcurve, placed
+from mracad.occ.view import view
 
 Array = np.ndarray
-_EXACT = 1e-6  # relative error of an area
 _PLACES = (0.04, 0.46, 0.91)  # of the range of an edge
 
 
@@ -50,9 +49,11 @@ class KernelProbe:
 
     def area(self, face: int, exact: bool) -> float:
         """Area of a face, mm², exactly or by a fast quadrature that gives the same for the same face."""
+        if exact:
+            return float(sizes([self.document.faces[face]], np.zeros(3))[0, 0])
         surface = GProp_GProps()
         with quiet():
-            BRepGProp.SurfaceProperties_s(self.document.faces[face], surface, *((_EXACT,) if exact else ()))
+            BRepGProp.SurfaceProperties_s(self.document.faces[face], surface)
         return surface.Mass()
 
     def volume(self) -> float:

@@ -1,4 +1,4 @@
-"""Sizes of shapes, points on faces, and exact distances from them."""
+"""Points on faces, and exact distances from them."""
 
 from __future__ import annotations
 
@@ -10,57 +10,24 @@ from OCP.BRep import BRep_Tool
 from OCP.BRepAdaptor import BRepAdaptor_Surface
 from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeVertex
 from OCP.BRepExtrema import BRepExtrema_DistShapeShape
-from OCP.BRepGProp import BRepGProp
 from OCP.BRepTools import BRepTools
 from OCP.BRepTopAdaptor import BRepTopAdaptor_FClass2d
 from OCP.Geom import Geom_Surface
 from OCP.GeomAPI import GeomAPI_ProjectPointOnSurf
 from OCP.gp import gp_Dir, gp_Lin, gp_Pnt, gp_Pnt2d, gp_Vec
-from OCP.GProp import GProp_GProps
 from OCP.IntCurvesFace import IntCurvesFace_ShapeIntersector
 from OCP.ShapeAnalysis import ShapeAnalysis_Surface
-from OCP.TopAbs import TopAbs_FORWARD, TopAbs_IN, TopAbs_REVERSED, TopAbs_SOLID
+from OCP.TopAbs import TopAbs_FORWARD, TopAbs_IN, TopAbs_REVERSED
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS, TopoDS_Shape
 
-from mracad.model.facts import Mass
 from mracad.occ.document import Document, Part
 from mracad.occ.settings import quiet
-from mracad.occ.topology import compound, inside, matrix
+from mracad.occ.topology import compound, matrix
 
 Array = np.ndarray
 Point = tuple[float, float, float]
-_EXACT = 1e-6  # relative error of volumes and areas; the kernel's default has errors of 1 % on NURBS faces
 _LEAST = 9  # least number of sample lines across a face in each direction
-
-
-def mass(document: Document) -> Mass:
-    """Volume, area and centre of all placed shapes."""
-    return mass_of(document.shape)
-
-
-def mass_of(shape: TopoDS_Shape) -> Mass:
-    """Volume, area and centre of a shape."""
-    with quiet():
-        solid = GProp_GProps()
-        surface = GProp_GProps()
-        solids = list(inside(shape, TopAbs_SOLID))
-        if solids:
-            BRepGProp.VolumeProperties_s(compound(solids), solid, _EXACT)
-        BRepGProp.SurfaceProperties_s(shape, surface, _EXACT)
-        centre = (solid if solids else surface).CentreOfMass().Coord()
-        return Mass(solid.Mass() if solids else 0.0, surface.Mass(), centre)
-
-
-def face_masses(document: Document) -> list[Mass]:
-    """Area and centre of every face, in its part's frame, exact enough to tell faces apart."""
-    found = []
-    with quiet():
-        for face in document.faces:
-            surface = GProp_GProps()
-            BRepGProp.SurfaceProperties_s(face, surface)
-            found.append(Mass(0.0, surface.Mass(), surface.CentreOfMass().Coord()))
-    return found
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,7 @@ from OCP.XCAFDoc import XCAFDoc_Area, XCAFDoc_Centroid, XCAFDoc_ShapeTool, XCAFD
 
 from mracad.occ.document import Document
 from mracad.occ.labels import components, label_key, referred
-from mracad.occ.measure import mass_of
+from mracad.occ.sizes import mass_of
 
 _KINDS = (XCAFDoc_Area, XCAFDoc_Volume, XCAFDoc_Centroid)
 

@@ -7,11 +7,13 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 from OCP.Adaptor3d import Adaptor3d_CurveOnSurface
 from OCP.Bnd import Bnd_Box
-from OCP.BRep import BRep_Builder
+from OCP.BRep import BRep_Builder, BRep_Tool
 from OCP.BRepAdaptor import BRepAdaptor_Curve, BRepAdaptor_Curve2d, BRepAdaptor_Surface
 from OCP.BRepBndLib import BRepBndLib
 from OCP.BRepLib import BRepLib_ValidateEdge
+from OCP.Geom2d import Geom2d_Curve
 from OCP.Poly import Poly_Triangulation
+from OCP.ShapeFix import ShapeFix_Edge
 from OCP.TopAbs import TopAbs_EDGE, TopAbs_SOLID
 from OCP.TopExp import TopExp, TopExp_Explorer
 from OCP.TopLoc import TopLoc_Location
@@ -27,6 +29,15 @@ def edge_uses(face: TopoDS_Face) -> Iterator[TopoDS_Edge]:
     while explorer.More():
         yield TopoDS.Edge_s(explorer.Current())
         explorer.Next()
+
+
+def pcurve(edge: TopoDS_Edge, face: TopoDS_Face) -> Geom2d_Curve:
+    """The edge's curve in the parameter plane of a face, made by projection if the file lacks it."""
+    curve = BRep_Tool.CurveOnSurface_s(edge, face, 0.0, 0.0)
+    if curve is None:
+        ShapeFix_Edge().FixAddPCurve(edge, face, False)
+        curve = BRep_Tool.CurveOnSurface_s(edge, face, 0.0, 0.0)
+    return curve
 
 
 def validated(edge: TopoDS_Edge, face: TopoDS_Face, together: bool) -> BRepLib_ValidateEdge:

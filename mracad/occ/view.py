@@ -8,11 +8,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from OCP.BRep import BRep_Tool
 from OCP.Geom import Geom_Surface
-from OCP.Geom2d import Geom2d_Curve
-from OCP.ShapeFix import ShapeFix_Edge
 from OCP.TopAbs import TopAbs_FORWARD, TopAbs_REVERSED
 from OCP.TopLoc import TopLoc_Location
-from OCP.TopoDS import TopoDS, TopoDS_Edge, TopoDS_Face
+from OCP.TopoDS import TopoDS, TopoDS_Face
 
 from mracad.bspline.surface import Net
 from mracad.errors import FileError, UsageError
@@ -23,7 +21,7 @@ from mracad.occ.document import Document
 from mracad.occ.geometry import basis, curves, is_nurbs, nets
 from mracad.occ.samples import NONE, Use, along, beside, parameters
 from mracad.occ.settings import quiet
-from mracad.occ.topology import box, edge_uses, matrix
+from mracad.occ.topology import box, edge_uses, matrix, pcurve
 
 Array = np.ndarray
 
@@ -169,15 +167,6 @@ def _walk(document: Document, chosen: frozenset[int]) -> _Found:
                 curve = replaced.pcurves[position] if replaced else pcurve(edge, face)
                 found.uses.append(Use(index, place, curve, *BRep_Tool.Range_s(edge, face)))
     return found
-
-
-def pcurve(edge: TopoDS_Edge, face: TopoDS_Face) -> Geom2d_Curve:
-    """The edge's curve in the parameter plane of a face, made by projection if the file lacks it."""
-    curve = BRep_Tool.CurveOnSurface_s(edge, face, 0.0, 0.0)
-    if curve is None:
-        ShapeFix_Edge().FixAddPCurve(edge, face, False)
-        curve = BRep_Tool.CurveOnSurface_s(edge, face, 0.0, 0.0)
-    return curve
 
 
 def _trims(found: _Found, edges: Container[int] | None) -> dict[int, tuple[Trim, ...]]:

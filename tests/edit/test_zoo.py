@@ -12,7 +12,7 @@ from mracad.job.document import run
 from mracad.occ.check import check
 from mracad.occ.files import read, write
 from mracad.occ.load import Text
-from mracad.occ.measure import mass
+from mracad.occ.sizes import mass
 from mracad.occ.view import view
 from mracad.spec.steps import Move, Repeat, Smooth
 from tests import zoo

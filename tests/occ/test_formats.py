@@ -13,7 +13,7 @@ from mracad.formats import FORMATS
 from mracad.occ.check import check
 from mracad.occ.files import read, write
 from mracad.occ.load import Text
-from mracad.occ.measure import mass
+from mracad.occ.sizes import mass
 from mracad.occ.view import view
 from tests.mesh.readers import scene
 

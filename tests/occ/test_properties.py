@@ -13,7 +13,7 @@ from mracad.occ.apply import apply
 from mracad.occ.files import read, write
 from mracad.occ.labels import label_key, label_name, labels
 from mracad.occ.load import Text
-from mracad.occ.measure import mass_of
+from mracad.occ.sizes import mass_of
 from mracad.occ.view import view
 from tests.conftest import CORPUS
 

@@ -16,7 +16,7 @@ from mracad.occ.check import check
 from mracad.occ.document import Document
 from mracad.occ.files import read, write
 from mracad.occ.load import Text
-from mracad.occ.measure import mass
+from mracad.occ.sizes import mass
 from mracad.occ.view import view
 from mracad.occ.writable import CutFace
 from tests import zoo

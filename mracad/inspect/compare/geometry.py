@@ -109,9 +109,15 @@ def deviations(ref: Subject, new: Subject, groups: Sequence[Match]) -> Measured:
     edges = _edges(ref.model), _edges(new.model)
     found = []
     for group in groups:
-        there, back, bound = _apart(ref, new, group)
         rims = [_rim(e, faces) for e, faces in zip(edges, (group.ref, group.new), strict=True)]
-        outline = _outline(ref, new, rims[0], rims[1])
+        if group.ref == group.new and len(group.ref) == 1 and group.ref[0] in new.same:
+            face = ref.model.faces[group.ref[0]]
+            off = new.same[face.index]
+            there = back = outline = Spread(off, off, off, _middle(face))
+            bound = off if face.surface is not None else None
+        else:
+            there, back, bound = _apart(ref, new, group)
+            outline = _outline(ref, new, rims[0], rims[1])
         tolerance = max(_loosest(subject, rim) for subject, rim in zip((ref, new), rims, strict=True))
         for i, j in group.pairs():
             numbers = int(ref.face_numbers[i]), int(new.face_numbers[j])

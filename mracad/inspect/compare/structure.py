@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mracad.inspect.compare.subject import Array, CompareLimits, Match, Subject, layer, paired
-from mracad.inspect.seams import SMOOTH, SeamMeasure, summary
+from mracad.inspect.seams import SMOOTH, SeamMeasure, key, summary
 from mracad.inspect.seams import seams as measured
 from mracad.inspect.verdict import Finding, Layer
 from mracad.model.brep import Model
@@ -85,7 +85,9 @@ def seams(
     A seam between ``unchanged`` faces of the new model cannot break: if its angle differs, its curves have moved on the
     faces, within the tolerance, which is noted.
     """
-    before, after = (measured(subject.model, every=True) for subject in (ref, new))
+    before = measured(ref.model, every=True)
+    known = {key(m): m for m in before if m.sewn and all(face in new.same for face in m.faces)}
+    after = measured(new.model, every=True, known=known)
     if not (ref.validity.shells and new.validity.shells):
         before, after = _either_way(before), _either_way(after)
     findings: list[Finding] = []

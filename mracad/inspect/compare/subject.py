@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
@@ -54,6 +54,8 @@ class Subject:
         Exact measurements on the faces of ``model``.
     face_numbers, edge_numbers : sequence of int
         The face and edge of the document for each one of ``model``.
+    same : mapping of int to float
+        The faces that :func:`mracad.inspect.compare.same.same` finds; none in the reference.
     """
 
     model: Model
@@ -66,6 +68,7 @@ class Subject:
     gauge: Gauge
     face_numbers: Sequence[int]
     edge_numbers: Sequence[int]
+    same: Mapping[int, float] = field(default_factory=dict)
 
     def named(self, faces: Iterable[int]) -> tuple[int, ...]:
         """The indices in the document of some faces of ``model``."""
