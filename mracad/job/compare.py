@@ -41,8 +41,8 @@ def compare(document: Document, options: Compare, original: Original | None = No
         raise UsageError("compare has nothing to compare with", "name a reference")
 
     place = "assembly" in unheld(reference.schema, document.schema)
-    old, each = _measured(reference, place)
-    new, _ = _measured(document, place, (old.model, each))
+    old, found = _measured(reference, place)
+    new, _ = _measured(document, place, (old.model, *found))
     growth, volume, size = options.max_gap_growth, options.max_volume_change, old.model.diagonal
     limits = CompareLimits(
         deviation=length(options.max_deviation, size, "max-deviation"),
@@ -54,10 +54,13 @@ def compare(document: Document, options: Compare, original: Original | None = No
     return Judged(verdict, verdict.failed())
 
 
-def _measured(document: Document, place: bool, ref: tuple[Model, Array] | None = None) -> tuple[Subject, Array]:
-    """A measured document, and the sizes of its faces; with ``place`` all instances at their places in the assembly.
+def _measured(
+    document: Document, place: bool, ref: tuple[Model, Array, Array] | None = None
+) -> tuple[Subject, tuple[Array, Array]]:
+    """A measured document, and its :func:`mracad.occ.sizes.document_sizes`; with ``place`` all instances at their
+    places in the assembly.
 
-    Faces that are the same as in the model ``ref`` have the same sizes.
+    Faces that are the same as in the model of ``ref`` have the same sizes.
     """
     from mracad.occ.check import check, lone_faces
     from mracad.occ.contents import contents
@@ -72,14 +75,17 @@ def _measured(document: Document, place: bool, ref: tuple[Model, Array] | None =
     if whole:
         faces = (replace(face, colour=colour) for face, colour in zip(model.faces, whole.colours, strict=True))
         model = replace(model, faces=tuple(faces))
-    alike = same(ref[0], model) if ref else {}
-    each = document_sizes(seen, {face: ref[1][face] for face in alike} if ref else {})
+    if ref:
+        alike = same(ref[0], model)
+        found = document_sizes(seen, {face: ref[1][face] for face in alike}, ref[2])
+    else:
+        alike, found = {}, document_sizes(seen)
     subject = Subject(
         model=model,
         schema=document.schema,
         contents=contents(document),
-        mass=mass(seen, each),
-        faces=face_masses(seen, each),
+        mass=mass(seen, found[0]),
+        faces=face_masses(seen, found[0]),
         validity=check(seen),
         lone_faces=lone_faces(seen),
         gauge=KernelGauge(seen),
@@ -87,4 +93,4 @@ def _measured(document: Document, place: bool, ref: tuple[Model, Array] | None =
         edge_numbers=whole.edges if whole else range(len(model.edges)),
         same=alike,
     )
-    return subject, each
+    return subject, found

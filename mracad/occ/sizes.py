@@ -21,7 +21,7 @@ from mracad.model.facts import Mass
 from mracad.occ.document import Document
 from mracad.occ.geometry import basis, curves, is_nurbs, nets
 from mracad.occ.settings import quiet
-from mracad.occ.topology import box, edge_uses, inside, matrix, pcurve, placed
+from mracad.occ.topology import box, compound, edge_uses, inside, matrix, pcurve, placed
 
 Array = np.ndarray
 
@@ -33,13 +33,13 @@ _NONE: Mapping[int, Array] = MappingProxyType({})
 def sizes(faces: Sequence[TopoDS_Face], about: Array, known: Mapping[int, Array] = _NONE) -> Array:
     """Area, its first moment, volume towards a point and its first moment of faces, ``(f, 8)``, mm.
 
-    The point, ``about`` (3,) or (f, 3), must be the same for all faces of a body.  If it is near, the volume does not
-    depend on how well the faces meet.
+    The point ``about`` must be the same for all faces of a body.  If it is near, the volume hardly depends on how well
+    the faces meet.
 
     NURBS faces are integrated by :func:`mracad.bspline.moments.moments`, for which the kernel takes tens of times as
     long; others by the kernel.  Surfaces count as forward.  Those of ``known`` faces, by place, are taken as they are.
     """
-    found, about = np.zeros((len(faces), 8)), np.broadcast_to(about, (len(faces), 3))
+    found = np.zeros((len(faces), 8))
     for place, size in known.items():
         found[place] = size
     with quiet():
@@ -63,18 +63,22 @@ def sizes(faces: Sequence[TopoDS_Face], about: Array, known: Mapping[int, Array]
             surface, frame = grounds[place]
             if surface in control:
                 net = control[surface]
-                row = moments(net.with_poles(placed(net.poles, frame) - about[place]), rims[place])
-                row[[1, 2, 3, 5, 6, 7]] += np.outer(row[[0, 4]], about[place]).ravel()
+                row = moments(net.with_poles(placed(net.poles, frame) - about), rims[place])
+                row[[1, 2, 3, 5, 6, 7]] += np.outer(row[[0, 4]], about).ravel()
             else:
-                row = _by_kernel(face, about[place])
+                row = _by_kernel(face, about)
             found[place] = row
     return found
 
 
-def document_sizes(document: Document, known: Mapping[int, Array] = _NONE) -> Array:
-    """The :func:`sizes` of all faces of a document, each in its part's frame and about the middle of its part."""
-    middles = [np.tile(box(part.shape).mean(axis=0), (len(part.numbers), 1)) for part in document.parts]
-    return sizes(document.faces, np.concatenate(middles), known)
+def document_sizes(
+    document: Document, known: Mapping[int, Array] = _NONE, about: Array | None = None
+) -> tuple[Array, Array]:
+    """The :func:`sizes` of all faces of a document, each in its part's frame, and the point towards which volumes are
+    measured: ``about``, that of the ``known`` ones, or else the middle of all."""
+    if about is None:
+        about = box(compound(part.shape for part in document.parts)).mean(axis=0)
+    return sizes(document.faces, about, known), about
 
 
 def _ground(face: TopoDS_Face) -> tuple[Geom_Surface, Array]:
@@ -96,8 +100,8 @@ def _by_kernel(face: TopoDS_Face, about: Array) -> Array:
 
 
 def mass(document: Document, each: Array | None = None) -> Mass:
-    """Volume, area and centre of all placed shapes; ``each`` are its :func:`document_sizes`, if known."""
-    each = document_sizes(document) if each is None else each
+    """Volume, area and centre of all placed shapes; ``each`` are the sizes of its faces, if known."""
+    each = document_sizes(document)[0] if each is None else each
     whole, solid = np.zeros((2, 4))
     for part in document.parts:
         own = _summed(part.shape, part.faces, each[part.first :])
@@ -117,7 +121,7 @@ def mass_of(shape: TopoDS_Shape) -> Mass:
 
 def face_masses(document: Document, each: Array | None = None) -> list[Mass]:
     """Area and centre of every face, in its part's frame; ``each`` as for :func:`mass`."""
-    each = document_sizes(document) if each is None else each
+    each = document_sizes(document)[0] if each is None else each
     return [_mass(row[:4], np.zeros(4)) for row in each]
 
 
