@@ -88,14 +88,20 @@ class Curve:
         return isinstance(other, Curve) and self._key == other._key
 
     def bezier(self) -> Array:
-        """Homogeneous Bézier points of the polynomial (or rational) pieces, ``(s, d + 1, k + 1)``."""
+        """Homogeneous Bézier points of the polynomial (or rational) pieces, ``(s, d + 1, k + 1)``, read-only."""
+        return self._bezier
+
+    @cached_property
+    def _bezier(self) -> Array:
         points, d = homogeneous(self.poles, self.weights), self.knots.degree
         if self.knots.spans > 1 or self.knots.multiplicities[0] <= d:
             knots, fine = self.knots.unrolled(), KnotVector(np.repeat(self.knots.breaks, d + 1), d)
             points = refinement(knots, fine).apply(points[np.arange(knots.count) % self.knots.count])
         if self.weights is None:
             points = np.concatenate([points, np.ones((len(points), 1))], axis=1)
-        return points.reshape(self.knots.spans, d + 1, -1)
+        points = points.reshape(self.knots.spans, d + 1, -1)
+        points.setflags(write=False)
+        return points
 
 
 def bezier_pieces(curves: Sequence[Curve]) -> Iterator[tuple[Array, Array]]:
