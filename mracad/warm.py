@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from mracad.bspline.knots import KnotVector
-from mracad.inspect.curvature import forms_one_by_one
+from mracad.inspect.sweep import SWEEP
 from mracad.wavelet.ladder import rungs_by_level
 from mracad.wavelet.transform import decompose, reconstruct
 
@@ -18,9 +18,8 @@ COUNT = 515
 
 
 def warm() -> None:
-    """Run everything that is compiled once."""
-    jet = np.ones((10, 3, 1))
-    forms_one_by_one(jet, jet, 0.0)
+    """Compile everything that is not yet on disk."""
+    SWEEP.prepare()
     rungs = rungs_by_level(KnotVector.clamped(np.arange(COUNT - 2.0), 3))[:3]
     reconstruct(decompose(np.zeros((COUNT, COUNT, 3)), rungs, rungs))
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from math import comb
 
 import numpy as np
@@ -40,35 +41,90 @@ def jets(net: Net, u: Array, v: Array, mask: Array, centre: Array, most: int = 3
     ndarray (10, 3, q)
         By ``ORDERS`` up to the highest order, coordinate and point, v slowest.
     """
-    return np.concatenate(list(blocks(net, u, v, mask, centre, most)), axis=2)
-
-
-def blocks(net: Net, u: Array, v: Array, mask: Array, centre: Array, most: int = 3) -> Iterator[Array]:
-    """The same as :func:`jets`, in blocks of points."""
-    poles = net.poles - centre
-    if net.weights is not None:
-        poles = np.concatenate([poles * net.weights[..., None], net.weights[..., None]], axis=2)
-    k = poles.shape[2]
-    rows, in_u = _local(net.u, u, most)
-    columns, in_v = _local(net.v, v, most)
-    along = np.matmul(in_u.reshape(len(u), -1, in_u.shape[-1]), poles[rows].reshape(*rows.shape, -1))
-    along = along.reshape(u.size, most + 1, net.v.count, k).transpose(1, 3, 2, 0)  # order, coordinate, column, u
-    along, in_v = np.ascontiguousarray(along), np.ascontiguousarray(in_v.transpose(2, 0, 1, 3))
-    orders = [order for order in ORDERS if sum(order) <= most]
-    wide = v.shape[1]
+    sites = Sites.of(net.u, net.v, u, v, mask, most)
+    along, (pieces, wide) = sites.along(net, centre), v.shape
+    columns, in_v = sites.columns[::wide], sites.in_v.reshape(most + 1, pieces, wide, -1)
     step = max(1, _BLOCK // max(wide * u.size, 1))
-    for begin in range(0, max(len(v), 1), step):
+    found = []
+    for begin in range(0, max(pieces, 1), step):
         part = slice(begin, begin + step)
-        found = np.empty((len(orders), k, len(v[part]), wide, u.size))
-        for r in range(most + 1):
-            windows = along[r][:, columns[part]]
-            for s in range(most + 1 - r):
-                np.matmul(in_v[s, part], windows, out=found[orders.index((r, s))])
-        found = found.reshape(len(orders), k, -1)
-        inside = mask[:, begin * wide : (begin + step) * wide].T
+        every = np.empty((len(sites.orders), along.shape[1], len(v[part]), wide, u.size))
+        windows = [each[:, columns[part]] for each in along]
+        for one, (r, s) in zip(every, sites.orders, strict=True):
+            np.matmul(in_v[s, part], windows[r], out=one)
+        found.append(sites.chosen(every, slice(begin * wide, (begin + step) * wide), net))
+    return np.concatenate(found, axis=2)
+
+
+@dataclass(frozen=True, eq=False)
+class Sites:
+    """The functions of two knot vectors at the points of a quadrature, for surfaces over these knots.
+
+    Attributes
+    ----------
+    orders : list of (int, int)
+        Those of ``ORDERS`` up to the highest.
+    rows : ndarray of int (pieces, d + 1)
+        Control points along u of each piece.
+    in_u : ndarray (pieces, points, most + 1, d + 1)
+        The functions of these control points, and their derivatives.
+    columns : ndarray of int (nv, d + 1)
+        Control points along v of each of the parameters v.
+    in_v : ndarray (most + 1, nv, d + 1)
+        The functions of these, and their derivatives.
+    mask : ndarray of bool (nv, nu)
+        Pairs of parameters that are points.
+    """
+
+    orders: Sequence[tuple[int, int]]
+    rows: Array
+    in_u: Array
+    columns: Array
+    in_v: Array
+    mask: Array
+
+    @classmethod
+    def of(cls, ku: KnotVector, kv: KnotVector, u: Array, v: Array, mask: Array, most: int = 3) -> Sites:
+        """Arguments as for :func:`jets`."""
+        rows, in_u = _local(ku, u, most)
+        columns, in_v = _local(kv, v, most)
+        across = np.ascontiguousarray(in_v.reshape(v.size, most + 1, -1).swapaxes(0, 1))
+        orders = [order for order in ORDERS if sum(order) <= most]
+        return cls(orders, rows, in_u, np.repeat(columns, v.shape[1], axis=0), across, np.ascontiguousarray(mask.T))
+
+    def along(self, net: Net, centre: Array, most: int | None = None) -> Array:
+        """Derivatives along u of the curves of control points, up to an order, ``(most + 1, 3, columns, nu)``; of
+        homogeneous coordinates if the surface is rational."""
+        poles, in_u = net.poles - centre, self.in_u if most is None else self.in_u[:, :, : most + 1]
+        if net.weights is not None:
+            poles = np.concatenate([poles * net.weights[..., None], net.weights[..., None]], axis=2)
+        pieces, points, orders, width = in_u.shape
+        local = poles[self.rows].reshape(pieces, width, -1)
+        found = np.matmul(in_u.reshape(pieces, points * orders, width), local)
+        found = found.reshape(pieces * points, orders, *poles.shape[1:])
+        return np.ascontiguousarray(found.transpose(1, 3, 2, 0))
+
+    def blocks(self, net: Net, centre: Array, most: int | None = None) -> Iterator[Array]:
+        """The results of :func:`jets`, up to an order, in blocks of points; products are added up in the order of
+        control points, as compiled code does."""
+        along = self.along(net, centre, most)
+        orders = [order for order in self.orders if sum(order) < len(along)]
+        step = max(1, _BLOCK // max(self.mask.shape[1], 1))
+        for begin in range(0, max(len(self.mask), 1), step):
+            part = slice(begin, begin + step)
+            found = np.zeros((len(orders), along.shape[1], *self.mask[part].shape))
+            for k, columns in enumerate(self.columns[part].T):
+                curves = along[:, :, columns]
+                for one, (r, s) in zip(found, orders, strict=True):
+                    one += self.in_v[s, part, k, None] * curves[r]
+            yield self.chosen(found, part, net)
+
+    def chosen(self, stack: Array, rows: slice, net: Net) -> Array:
+        """Derivatives at points, from those of homogeneous coordinates at all pairs of parameters of some rows."""
+        stack, inside = stack.reshape(*stack.shape[:2], -1), self.mask[rows]
         if not inside.all():
-            found = found[:, :, np.flatnonzero(inside)]
-        yield found if net.weights is None else _quotient(found)
+            stack = stack[:, :, np.flatnonzero(inside)]
+        return stack if net.weights is None else _quotient(stack)
 
 
 def _local(kv: KnotVector, x: Array, most: int) -> tuple[Array, Array]:
@@ -83,12 +139,13 @@ def _local(kv: KnotVector, x: Array, most: int) -> tuple[Array, Array]:
 
 def _quotient(stack: Array) -> Array:
     """Derivatives of ``A / w`` from those of ``(A, w)``, by Leibniz' rule."""
-    top, w = stack[:, :-1].copy(), stack[:, -1]
+    top, w = stack[:, :-1], stack[:, -1]
+    inverse = 1.0 / w[0]
     for place, (a, b) in enumerate(ORDERS[: len(stack)]):
         for i in range(a + 1):
             for j in range(b + 1):
                 if i or j:
                     factor = comb(a, i) * comb(b, j)
                     top[place] -= factor * w[ORDERS.index((i, j))] * top[ORDERS.index((a - i, b - j))]
-        top[place] /= w[0]
+        top[place] *= inverse
     return top

@@ -20,9 +20,6 @@ Array = np.ndarray
 BISECTIONS = 3, 5
 """Bisections by which an amount is found: few among several displacements of one surface, otherwise more."""
 
-LATELY = 200_000
-"""Largest number of points whose derivatives are kept for displacements that have been tried: 240 bytes each."""
-
 SINGULAR = 1e5
 """Curvature over the wavelength above which a face is singular."""
 
@@ -62,18 +59,9 @@ class Watch:
         bases = [base for _, base, *_ in every] if np.isfinite(self.reaches).all() else ()
         return surveys(looked, self.points, SINGULAR / self.width, [reach for *_, reach in every], bases)
 
-    @cached_property
-    def lately(self) -> list[Ramp]:
-        """The displacements whose derivatives are kept, the last one at the end."""
-        return []
-
     def ramp(self, parts: Sequence[Array]) -> Ramp:
-        """The faces along displacements of the surfaces; earlier ones forget their derivatives."""
-        found = Ramp(self.surveys, [parts[place] for place, _ in self.owners])
-        self.lately.append(found)
-        while len(self.lately) > 1 and len(self.lately) * sum(len(survey.regular) for survey in self.surveys) > LATELY:
-            self.lately.pop(0).forget()
-        return found
+        """The faces along displacements of the surfaces."""
+        return Ramp(self.surveys, [parts[place] for place, _ in self.owners])
 
     def still(self) -> list[dict[int, Change]]:
         """The changes of the faces of each surface if nothing moves, by position of the surface."""

@@ -8,13 +8,13 @@ place) are compared with the largest that the place and its eight neighbours had
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from mracad.inspect.creases import Crossing
-from mracad.inspect.curvature import Forms
+from mracad.inspect.tally import Tally
 from mracad.model.cells import Quadrature
 
 Array = np.ndarray
@@ -76,117 +76,89 @@ class Places:
 
     Attributes
     ----------
-    order : ndarray of int (q,)
-        The points of a quadrature, place by place.
-    first, filled : ndarray of int (places,)
-        Position at which each place with points begins among them, and index of the place.
-    shape : (int, int)
-        Places along u and v.
     ends : (ndarray, ndarray)
-        Parameters at which they end.
+        Parameters at which they end, along u and v.
     area : ndarray (nu, nv)
         Area, mm²; zero where a place is too small.
-    base : ndarray (5, q)
-        Shape operator and slope of the base, zero by default.
     before : ndarray (2, nu, nv)
         Means of bending and curvature variation.
     most, around : ndarray (2, nu, nv)
         The largest of each place, its neighbours and the invisible wave: of bending and variation, and beyond the base.
+    crossed : sequence of (ndarray, ndarray)
+        Places of the points where tangents may jump, along u and v, for each :class:`Crossing`.
     """
 
-    order: Array
-    first: Array
-    filled: Array
-    shape: tuple[int, int]
     ends: tuple[Array, Array]
     area: Array
-    base: Array
     before: Array
     most: Array
     around: Array
+    crossed: Sequence[tuple[Array, Array]]
 
     @classmethod
     def of(
-        cls, rule: Quadrature, form: Forms, base: Array | None, areas: Array, wavelengths: tuple[float, float]
+        cls, ends: tuple[Array, Array], tally: Tally, wavelengths: tuple[float, float], crossed: Iterable[Crossing]
     ) -> Places:
-        """Places of the faces of a quadrature rule, with the forms of the surface, shape operator and slope of its base
-        ``(5, q)``, and areas (mm²), at its points; wavelengths (mm) along u and v."""
-        (rows, u), (columns, v) = (_divided(rule, form, axis, wavelengths[axis] / SIDES) for axis in (0, 1))
-        shape = len(u), len(v)
-        cell = rows * shape[1] + columns
-        order = np.argsort(cell, kind="stable")
-        filled, first = np.unique(cell[order], return_index=True)
-        bare, known = np.zeros(shape), np.zeros((5, len(areas))) if base is None else base
-        places = cls(order, first, filled, shape, (u, v), bare, known, bare, bare, bare)
-        (area,) = places._gathered(np.add, areas[None])
+        """Places that end at parameters along u and v, with their figures; wavelengths (mm) along u and v, and points
+        where tangents may jump."""
+        shape = len(ends[0]), len(ends[1])
+        area = tally.sums[1].reshape(shape)
         area = np.where(area > SMALL * area.max(initial=0.0), area, 0.0)
-        before, beyond = places._means(form, areas)
+        before, beyond = _means(tally, shape)
         k = 2 * np.pi / min(wavelengths)
         flat = np.array([SLOPE**2 * k**2 / 2, SLOPE**2 * k**4 / 8])
-        return replace(places, area=area, before=before, most=_around(before, flat), around=_around(beyond, flat))
+        at = [_met(each, ends) for each in crossed]
+        return cls(ends, area, before, _around(before, flat), _around(beyond, flat), at)
 
-    def compared(
-        self, form: Forms, areas: Array, turned: Array, unsettled: Array, opened: Iterable[tuple[Crossing, Array]]
-    ) -> Placed:
+    def compared(self, tally: Tally, turned: Array, unsettled: Array, opened: Iterable[Array]) -> Placed:
         """The changes of the places.
 
         Parameters
         ----------
-        form : Forms
-            The surface after the edit.
-        areas : ndarray (q,)
-            Areas of points, mm²; zero for points that do not count.
-        turned, unsettled : ndarray (q,)
-            Turns of normals (radians), and changes of singular points.
-        opened : iterable of (Crossing, ndarray)
-            Growth of angles across knot lines, radians.
+        tally : Tally
+            Figures after the edit.
+        turned, unsettled : ndarray (places,)
+            Largest turns of normals (radians), and changes of singular points.
+        opened : iterable of ndarray
+            Growth of angles at the points where tangents may jump, radians.
         """
-        counts = self.area > 0
-        means, beyond = self._means(form, areas)
+        shape, counts = self.area.shape, self.area > 0
+        means, beyond = _means(tally, shape)
         spread = np.where(counts, (beyond / self.around - 1).max(axis=0), 0.0)
         fell = self.before - means
         lost = np.where(counts, (fell / self.most).max(axis=0), 0.0)
         rise = np.maximum(-fell * self.area, 0.0)
         rise /= np.maximum(rise.mean(axis=(1, 2), keepdims=True), 1e-300)
-        largest = form.largest * (areas > 0), turned, unsettled
-        peaks, turn, singular = self._gathered(np.maximum, largest)
-        return Placed(spread, lost, rise, peaks, turn, self._opened(opened), singular, self.area, self.ends)
+        grown = np.zeros(shape)
+        for at, each in zip(self.crossed, opened, strict=True):
+            np.fmax.at(grown, at, each)
+        peaks, turn, singular = (each.reshape(shape) for each in (tally.tops[0], turned, unsettled))
+        return Placed(spread, lost, rise, peaks, turn, grown, singular, self.area, self.ends)
 
-    def _opened(self, opened: Iterable[tuple[Crossing, Array]]) -> Array:
-        found = np.zeros(self.shape)
-        for crossing, grew in opened:
-            line, place = np.nonzero(crossing.seen)
-            at = (crossing.at[line, 0], crossing.places[place])[:: 1 - 2 * crossing.axis]
-            np.fmax.at(found, tuple(_strip(ends, each) for ends, each in zip(self.ends, at, strict=True)), grew)
-        return found
 
-    def _gathered(self, how: np.ufunc, values: Iterable[Array]) -> Array:
-        """Several values ``(q,)``, one after another, reduced to one per place by a ufunc, ``(k, nu, nv)``."""
-        found = []
-        for each in values:
-            found.append(np.zeros(self.shape))
-            if len(self.first):
-                found[-1].ravel()[self.filled] = how.reduceat(each[self.order], self.first)
-        return np.array(found)
+def strips(rule: Quadrature, column: Array, speeds: Array, axis: int, side: float) -> tuple[Array, Array]:
+    """The strip across an axis, one side (mm) wide, in which each parameter of a rule along it lies, and where each
+    strip ends; for points with their indices along the axis, and the speeds there, mm."""
+    places, weights = (rule.u, rule.v)[axis].ravel(), (rule.wu, rule.wv)[axis].ravel()
+    points = np.maximum(np.bincount(column, minlength=len(weights)), 1)
+    steps = np.bincount(column, speeds, len(weights)) / points * weights
+    along = np.cumsum(steps) - steps / 2
+    count = int(np.clip(np.ceil(steps.sum() / side), 1, len(weights)))
+    ends = np.interp(np.arange(1, count + 1) / count * steps.sum(), along, places)
+    return _strip(ends, places), ends
 
-    def _squares(self, form: Forms, areas: Array) -> Iterator[Array]:
-        """Areas, and bending and variation times areas, of the surface and beyond the base: one at a time, because
-        points may be many."""
-        yield areas
-        yield form.bending * areas
-        yield form.variation * areas
-        for own, base, times in ((form.shape, self.base[:3], (1, 2, 1)), (form.slope, self.base[3:], (1, 1))):
-            total = np.zeros_like(areas)
-            for one, other, k in zip(own, base, times, strict=True):
-                off = one - other
-                total += k * (off * off)
-            yield total * areas
 
-    def _means(self, form: Forms, areas: Array) -> tuple[Array, Array]:
-        """Means of bending and curvature variation, and of both beyond the base, ``(2, nu, nv)`` each."""
-        sums = self._gathered(np.add, self._squares(form, areas))
-        means = sums[1:] / np.maximum(sums[0], 1e-300)
-        return means[:2], means[2:]
+def _met(crossing: Crossing, ends: tuple[Array, Array]) -> tuple[Array, Array]:
+    """The places of the points of a crossing."""
+    line, place = np.nonzero(crossing.seen)
+    at = (crossing.at[line, 0], crossing.places[place])[:: 1 - 2 * crossing.axis]
+    return _strip(ends[0], at[0]), _strip(ends[1], at[1])
+
+
+def _means(tally: Tally, shape: tuple[int, int]) -> tuple[Array, Array]:
+    """Means of bending and curvature variation, and of both beyond the base, ``(2, nu, nv)`` each."""
+    means = (tally.sums[2:] / np.maximum(tally.sums[1], 1e-300)).reshape(2, 2, *shape)
+    return means[0], means[1]
 
 
 def _around(figures: Array, least: Array) -> Array:
@@ -195,18 +167,6 @@ def _around(figures: Array, least: Array) -> Array:
 
     most = maximum_filter(figures, (1, 3, 3), mode="nearest")
     return np.asarray(np.maximum(most, np.maximum(least, 1e-300)[:, None, None]))
-
-
-def _divided(rule: Quadrature, form: Forms, axis: int, side: float) -> tuple[Array, Array]:
-    """The strip across an axis, one side (mm) wide, in which each point of a rule lies, and where each strip ends."""
-    column = np.nonzero(rule.mask.T)[1 - axis]
-    places, weights = ((rule.u, rule.v)[axis].ravel(), (rule.wu, rule.wv)[axis].ravel())
-    points = np.maximum(np.bincount(column, minlength=len(weights)), 1)
-    steps = np.bincount(column, form.speeds[axis], len(weights)) / points * weights
-    along = np.cumsum(steps) - steps / 2
-    count = int(np.clip(np.ceil(steps.sum() / side), 1, len(weights)))
-    ends = np.interp(np.arange(1, count + 1) / count * steps.sum(), along, places)
-    return _strip(ends, places)[column], ends
 
 
 def _strip(ends: Array, at: Array) -> Array:

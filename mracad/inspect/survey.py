@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from itertools import chain, zip_longest
+from functools import cached_property
+from itertools import zip_longest
 
 import numpy as np
 
-from mracad.bspline.jets import blocks
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
 from mracad.inspect.creases import CLUSTER, Crossing, Tangents, crossings
-from mracad.inspect.curvature import Forms, forms
-from mracad.inspect.places import Places
+from mracad.inspect.curvature import Forms
+from mracad.inspect.places import SIDES, Places, strips
 from mracad.inspect.roughness import Roughness
+from mracad.inspect.tally import Marks, Sight, Tally
 from mracad.model.brep import Face
 from mracad.model.cells import Quadrature, quadrature
 
@@ -28,9 +29,6 @@ RIPPLE = 1e-8
 
 ROUNDING = 16 * float(np.finfo(float).eps)
 """Error of a point of a surface relative to its largest coordinate, taken as a ripple as long as the span there."""
-
-KEPT = 100_000
-"""Largest number of points whose derivatives are kept, in all: 240 bytes each."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,18 +49,12 @@ class Survey:
     net : Net
     faces : tuple of Face
     rule : Quadrature
-    weights : ndarray (q,)
-        Those of its points.
-    jet : ndarray (10, 3, q) or None
-        Derivatives at the points, see :func:`mracad.bspline.jets.jets`; None for many points.
-    normals : ndarray (3, q)
-        In single precision.
-    regular : ndarray of bool (q,)
-        Where the surface is neither degenerate nor singular and knots lie apart: curvature counts only there.
+    sight : Sight
+        Its points.
+    marks : Marks
+        What is known there: curvature counts where the surface is neither degenerate nor singular and knots lie apart.
     sharp : ndarray (q,)
         Curvature at singular points, 1/mm; 0 elsewhere.
-    rounding : ndarray (q,)
-        Curvature that rounding can cause, 1/mm.
     crossed : list of Crossed
     roughness, noise : Roughness
     places : Places or None
@@ -72,21 +64,18 @@ class Survey:
     net: Net
     faces: tuple[Face, ...]
     rule: Quadrature
-    weights: Array
-    jet: Array | None
-    normals: Array
-    regular: Array
+    sight: Sight
+    marks: Marks
     sharp: Array
-    rounding: Array
     crossed: Sequence[Crossed]
     roughness: Roughness
     noise: Roughness
     places: Places | None
 
-    @property
-    def centre(self) -> Array:
-        """Origin of the points, ``(3,)``."""
-        return np.asarray(self.net.poles.mean(axis=(0, 1)))
+    @cached_property
+    def singular(self) -> bool:
+        """Whether there are singular points."""
+        return bool(self.sharp.any())
 
 
 def surveys(
@@ -112,54 +101,52 @@ def surveys(
     bases : sequence of Net
         Smooth copies of the surfaces, against which waves are measured; planes by default.
     """
-    ready = [(net, tuple(faces), quadrature(net, faces, points, FEWEST, ends=True)) for net, faces in surfaces]
-    found = []
-    seen = _seen([(net, rule) for net, _, rule in ready])
-    shapes = _seen([(net, rule) for net, (_, _, rule) in zip(bases, ready, strict=False)])
-    bent = (np.concatenate([form.shape, form.slope]) for _, form in shapes)
-    for (net, faces, rule), reach in zip_longest(ready, reaches):
-        base, (jet, form) = next(bent, None), next(seen)
-        sides = form.speeds * _spans(rule, (net.u, net.v))
-        least = max(CLUSTER[0], CLUSTER[1] * float(np.linalg.norm(np.ptp(net.poles, axis=(0, 1)))))
-        regular = form.regular & (sides.min(axis=0) >= least)
-        sharp = np.where(regular & (form.largest > singular), form.largest, 0.0)
-        regular &= sharp == 0
-        sides = np.maximum(sides, least)
-        weights = rule.weights.T[rule.mask.T]
-        areas = weights * form.density
-        rounding = ROUNDING * float(np.abs(net.poles).max()) * _wavenumber(sides.min(axis=0)) ** 2
-        crossed = _crossed(net, faces, rule)
-        kink = largest(each.angles for each in crossed)
-        found.append(
-            Survey(
-                net, faces, rule, weights, jet, form.normal.astype(np.float32), regular, sharp, rounding, crossed,
-                roughness(areas, form, regular, rounding, kink), _noise(areas * regular, sides, rounding),
-                Places.of(rule, form, base, areas * regular, reach) if reach else None,
-            )
-        )  # fmt: skip
-    return found
+    every = zip_longest(surfaces, reaches, bases)
+    return [_survey(net, tuple(faces), points, singular, reach, base) for (net, faces), reach, base in every]
 
 
-def _seen(surfaces: Sequence[tuple[Net, Quadrature]]) -> Iterator[tuple[Array | None, Forms]]:
-    """Derivatives, unless they are many, and forms of each surface at the points of its rule; small surfaces are
-    processed together."""
-    sizes = np.array([int(rule.mask.sum()) for _, rule in surfaces])
-    group, kept = (sizes.cumsum() - sizes) // KEPT, 0
-    for number in np.unique(group):
-        members = np.flatnonzero(group == number).tolist()
-        parts = chain.from_iterable(
-            blocks(net, rule.u, rule.v, rule.mask, net.poles.mean(axis=(0, 1)))
-            for net, rule in (surfaces[i] for i in members)
-        )
-        count = int(sizes[members].sum())
-        few = kept + count <= KEPT
-        kept += count if few else 0
-        jet = np.concatenate(list(parts), axis=2) if few else None
-        form = forms(jet) if jet is not None else Forms.joined((forms(part) for part in parts), count)
-        ends = sizes[members].cumsum()
-        for begin, end in zip(ends - sizes[members], ends, strict=True):
-            own = None if jet is None else np.ascontiguousarray(jet[:, :, begin:end])
-            yield own, form.part(slice(begin, end))
+def _survey(
+    net: Net,
+    faces: tuple[Face, ...],
+    points: int,
+    singular: float,
+    reach: tuple[float, float] | None,
+    base: Net | None,
+) -> Survey:
+    rule = quadrature(net, faces, points, FEWEST, ends=True)
+    sight = Sight.of(net, rule)
+    form = sight.forms(net)
+    sides = form.speeds * _spans(rule, (net.u, net.v))
+    least = max(CLUSTER[0], CLUSTER[1] * float(np.linalg.norm(np.ptp(net.poles, axis=(0, 1)))))
+    regular = form.regular & (sides.min(axis=0) >= least)
+    sharp = np.where(regular & (form.largest > singular), form.largest, 0.0)
+    regular &= sharp == 0
+    sides = np.maximum(sides, least)
+    rounding = ROUNDING * float(np.abs(net.poles).max()) * _wavenumber(sides.min(axis=0)) ** 2
+    across, ends = _divided(rule, form, reach)
+    bent = np.zeros((5, len(sharp))) if base is None else np.ascontiguousarray(Sight.of(base, rule).forms(base).bent)
+    marks = Marks(
+        regular.astype(np.uint8), rounding.astype(np.float32), bent, form.normal.astype(np.float32), across,
+        len(ends[0]) * len(ends[1]),
+    )  # fmt: skip
+    areas = sight.pairs(*sight.weights, np.multiply) * form.density * regular
+    tally, crossed = sight.tally(net, marks), _crossed(net, faces, rule)
+    return Survey(
+        net, faces, rule, sight, marks, sharp, crossed,
+        roughness(tally, largest(each.angles for each in crossed)), _noise(areas, sides, rounding),
+        Places.of(ends, tally, reach, [each.crossing for each in crossed]) if reach else None,
+    )  # fmt: skip
+
+
+def _divided(
+    rule: Quadrature, form: Forms, reach: tuple[float, float] | None
+) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
+    """Numbers along u and v whose sum is the place of each pair of parameters of a rule, and where places end; one
+    place if there are no reaches."""
+    lines = np.nonzero(rule.mask.T)[::-1]
+    both = [strips(rule, lines[k], form.speeds[k], k, (reach[k] if reach else np.inf) / SIDES) for k in (0, 1)]
+    (u, u_ends), (v, v_ends) = both
+    return (u * len(v_ends), v), (u_ends, v_ends)
 
 
 def _spans(rule: Quadrature, knots: tuple[KnotVector, KnotVector]) -> Array:
@@ -184,16 +171,10 @@ def largest(angles: Iterable[Array]) -> float:
     return max((float(np.nanmax(each, initial=0.0)) for each in angles), default=0.0)
 
 
-def roughness(areas: Array, form: Forms, counts: Array, rounding: Array, kink: float) -> Roughness:
-    """The figures of faces from the areas of points, their forms, and which of them count."""
-    counted = areas * counts
-    return Roughness(
-        float(areas.sum()),
-        float(counted @ form.bending),
-        float(counted @ form.variation),
-        float(((form.largest - rounding) * counts).max(initial=0.0)),
-        float(np.degrees(kink)),
-    )
+def roughness(tally: Tally, kink: float) -> Roughness:
+    """The figures of faces from those of their places."""
+    area, _, bending, variation, *_ = tally.sums.sum(axis=1).tolist()
+    return Roughness(area, bending, variation, float(tally.tops[1].max(initial=0.0)), float(np.degrees(kink)))
 
 
 def _noise(areas: Array, sides: Array, rounding: Array) -> Roughness:

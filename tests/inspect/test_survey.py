@@ -1,6 +1,6 @@
 """Roughness by closed forms, its invariances, and what counts as worse."""
 
-from dataclasses import astuple, fields
+from dataclasses import astuple
 
 import numpy as np
 import pytest
@@ -10,8 +10,9 @@ from scipy.spatial.transform import Rotation
 
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
-from mracad.inspect.curvature import forms_along, forms_at_once, forms_one_by_one
-from mracad.inspect.ramp import STEEP, Ramp
+from mracad.inspect import tally
+from mracad.inspect.curvature import forms
+from mracad.inspect.ramp import STEEP
 from mracad.inspect.roughness import Change, Growth, Rougher, Roughness, worse
 from mracad.inspect.survey import POINTS, RIPPLE, surveys
 from tests.inspect.ramps import changes
@@ -56,32 +57,35 @@ def test_a_sphere(radius):
     assert found.kink < 1e-5
 
 
-@pytest.mark.parametrize("forms", [forms_at_once, lambda jet: forms_one_by_one(jet, jet, 0.0)])
 @pytest.mark.parametrize("size", [0.0, 1e-300, 1e-120, 1e-60])
-def test_what_rounding_leaves_of_a_pole_is_no_curvature(size, forms):
+def test_what_rounding_leaves_of_a_pole_is_no_curvature(size):
     """S_u as good as nothing at right angles to S_v: powers of it would be no numbers, which nothing compares with."""
     jet = np.random.default_rng(0).standard_normal((10, 3, 1))
     jet[1, :, 0], jet[2, :, 0] = (size, 0, 0), (0, 1, 0)
-    found = forms(jet)
-    assert not found.regular.any()
-    assert (found.bending, found.variation, found.largest) == (0, 0, 0)
+    found = forms([jet])
+    assert not found.regular.any() and not found.bent.any() and not found.largest.any()
 
 
-def test_many_points_have_the_same_bits_as_few():
+@pytest.mark.parametrize(("degree", "rational"), [(2, False), (3, True), (5, True)])
+def test_many_points_have_the_same_figures_as_few(degree, rational, monkeypatch):
     """What is compiled for many rounds as what is not: no verdict depends on what a process has done before."""
-    jet = np.random.default_rng(1).standard_normal((10, 3, 1000))
-    jet[1:3, :, 7], jet[2, :, 8], jet[3:, :, 9] = 0.0, 3 * jet[1, :, 8], 0.0
-    added = np.random.default_rng(2).standard_normal(jet.shape)
-    added[:, :, 7:10] = 0.0
-    for amount in (0.0, 0.3):
-        few = forms_at_once(jet + amount * added)
-        some = forms_along([(jet[..., :400], added[..., :400], amount), (jet[..., 400:], added[..., 400:], amount)])
-        many = forms_one_by_one(np.asfortranarray(jet), added, amount)
-        assert few.regular.sum() == 998
-        for each in fields(few):
-            assert getattr(few, each.name).tobytes() == getattr(many, each.name).tobytes()
-            parts = np.concatenate([getattr(part, each.name) for part in some], axis=-1)
-            assert getattr(few, each.name).tobytes() == parts.tobytes()
+    random = np.random.default_rng(1)
+    u, v = (KnotVector.clamped(np.arange(spans + 1.0), degree) for spans in (9, 7))
+    poles = random.standard_normal((u.count, v.count, 3))
+    poles[1] = poles[2] = poles[1, 0]
+    before = Net(u, v, poles, random.uniform(0.5, 1.5, poles.shape[:2]) if rational else None)
+    holed = face([*rectangle(1.0, 0.0, 9.0, 7.0), circle((4.5, 3.5), 1.7)])
+    found = []
+    for most in (1 << 60, 0):
+        monkeypatch.setattr(tally, "FEW", most)
+        monkeypatch.setattr(tally, "MANY", most)
+        (seen,) = surveys([(before, [holed])], singular=3.0, reaches=[(2.0, 2.0)])
+        now = moved(before, poles * [1.0, 1.0, 1.2])
+        told = seen.sight.tally(now, seen.marks)
+        found.append([seen.marks.counts, seen.marks.normals, seen.sharp, told.sums, told.tops])
+    assert 0 < found[0][0].sum() < len(found[0][0]) and len(seen.sight.runs) > len(seen.rule.v.ravel())
+    for one, other in zip(*found, strict=True):
+        np.testing.assert_array_equal(one, other)
 
 
 def test_a_cylinder():
@@ -313,20 +317,3 @@ def test_singular_points_count_only_where_they_change():
     assert Rougher.SINGULAR not in {each.what for each in worse(away, Growth())}
     scaled = found(moved(before, before.poles * [1.0, 1.0, 1.3]))
     assert Rougher.SINGULAR in {each.what for each in worse(scaled, Growth())}
-
-
-def test_what_is_kept_of_derivatives_changes_nothing_but_rounding(monkeypatch):
-    """Derivatives in memory, forgotten and computed again, or never kept because there are many points."""
-    before, after = cylinder(2.0, 3.0), cylinder(2.1, 3.2)
-    offset = after.poles - before.poles
-    (kept,) = surveys([(before, [face()])])
-    ramp = Ramp([kept], [offset])
-    first = ramp.changes({0: 0.3})[0]
-    ramp.forget()
-    assert not ramp._slopes and ramp.changes({0: 0.3})[0] == first
-    monkeypatch.setattr("mracad.inspect.survey.KEPT", 1)
-    (bare,) = surveys([(before, [face()])])
-    assert kept.jet is not None and bare.jet is None
-    again = Ramp([bare], [offset]).changes({0: 0.3})[0]
-    assert astuple(again.after) == pytest.approx(astuple(first.after), rel=1e-9, abs=1e-9)
-    assert (again.deviation, again.motion, again.turn) == pytest.approx((first.deviation, first.motion, first.turn))

@@ -1,0 +1,161 @@
+"""Functions on flat arrays as machine code, which is kept on disk: to load it takes a tenth of the compiler's start.
+
+It is kept beside the bytecode of the function's module, or in the cache of the user where that cannot be written, for
+one kind of processor, and used until the modules of its parts or the compiler change.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import hashlib
+from collections.abc import Callable, Sequence
+from functools import cached_property, partial
+from importlib.util import cache_from_source
+from pathlib import Path
+from types import FunctionType
+from typing import Any
+
+from mracad import cache
+from mracad.errors import MracadError
+from mracad.output import put
+
+_NUMBERS = {"float64": ctypes.c_double, "int64": ctypes.c_int64}
+
+Function = Any
+_engines: list[Any] = []  # machine code lives as long as they do
+
+
+class Compiled:
+    """A function whose arguments are groups of numbers and pointers to flat arrays, and that returns nothing.
+
+    Parameters
+    ----------
+    function : callable
+        It must neither allocate nor raise.
+    arguments : sequence of sequence of str
+        Types of the members of each argument, a tuple, or of its only one: ``float64``, ``int64``, or ``float64*`` for
+        a pointer.  It is called with all members one after another, and with pointers as integers.
+    helpers, inlined : sequence of callable
+        Functions that it calls; those of the latter become part of their callers.
+    """
+
+    def __init__(
+        self,
+        function: Function,
+        arguments: Sequence[Sequence[str]],
+        helpers: Sequence[Function] = (),
+        inlined: Sequence[Function] = (),
+    ) -> None:
+        self._function, self._arguments, self._helpers, self._inlined = function, arguments, helpers, inlined
+        self._loaded: Callable[..., None] | None = None
+
+    @property
+    def ready(self) -> bool:
+        """Whether it can be had without a compiler."""
+        return self._loaded is not None or self._found is not None
+
+    def prepare(self) -> Callable[..., None]:
+        """The function as it is called; it is compiled if need be."""
+        if self._loaded is None:
+            self._loaded = self._load(self._found or self._made())
+        return self._loaded
+
+    def __call__(self, *arguments: float) -> None:
+        """Call it."""
+        self.prepare()(*arguments)
+
+    @cached_property
+    def _key(self) -> bytes:
+        from llvmlite import __version__, binding
+
+        parts = (self._function, *self._helpers, *self._inlined)
+        sources = b"".join(Path(each).read_bytes() for each in sorted({part.__code__.co_filename for part in parts}))
+        processor = binding.get_host_cpu_name() + binding.get_host_cpu_features().flatten()
+        return hashlib.sha256(sources + "|".join([__version__, processor, repr(self._arguments)]).encode()).digest()
+
+    @cached_property
+    def _name(self) -> str:
+        return f"{Path(self._function.__code__.co_filename).stem}.{self._function.__name__}-{self._key.hex()[:16]}.o"
+
+    @property
+    def _beside(self) -> Path:
+        return Path(cache_from_source(self._function.__code__.co_filename)).with_name(self._name)
+
+    @cached_property
+    def _found(self) -> bytes | None:
+        """The machine code on disk, if it is whole."""
+        for place in (self._beside, cache.find(self._name)):
+            with contextlib.suppress(OSError):
+                data = place.read_bytes() if place else b""
+                if data.startswith(self._key) and cache.sealed(data[: -cache.SEAL]) == data:
+                    return data[len(self._key) : -cache.SEAL]
+        return None
+
+    def _made(self) -> bytes:
+        """The machine code, which is stored."""
+        code = self._compiled()
+        try:
+            self._beside.parent.mkdir(parents=True, exist_ok=True)
+            put(cache.sealed(self._key + code), self._beside)
+        except (OSError, MracadError):
+            cache.keep(self._name, cache.sealed(self._key + code))
+        return code
+
+    def _compiled(self) -> bytes:
+        from llvmlite import binding
+        from numba import njit, types
+
+        def kind(name: str) -> Any:
+            return types.CPointer(getattr(types, name[:-1])) if name.endswith("*") else getattr(types, name)
+
+        each = [[kind(name) for name in group] for group in self._arguments]
+        signature = types.void(*(group[0] if len(group) == 1 else types.Tuple(group) for group in each))
+        made = njit(signature, error_model="numpy")(self._linked(njit))
+        (wanted,) = (found.fndesc.llvm_func_name for found in made.overloads.values())
+        machine = _machine(binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten())
+        module = binding.parse_assembly(made.inspect_llvm(made.signatures[0]))
+        for part in [*module.functions, *module.global_variables]:
+            if not part.is_declaration:
+                part.linkage = "external" if part.name == wanted else "internal"
+        module.get_function(wanted).name = _NAME
+        passes = binding.create_new_module_pass_manager()
+        passes.add_global_dead_code_eliminate_pass()
+        passes.run(module, binding.create_pass_builder(machine, binding.create_pipeline_tuning_options()))
+        return bytes(machine.emit_object(module))
+
+    def _linked(self, compiler: Callable[..., Any]) -> Function:
+        """The function, with helpers that are compiled when it is."""
+        names: dict[str, Any] = {}
+        for functions, inline in ((self._inlined, "always"), (self._helpers, "never")):
+            for each in functions:
+                own = FunctionType(each.__code__, each.__globals__ | names, each.__name__)
+                names[each.__name__] = compiler(error_model="numpy", inline=inline)(own)
+        for each in self._helpers:
+            names[each.__name__].py_func.__globals__.update(names)
+        return FunctionType(self._function.__code__, self._function.__globals__ | names, self._function.__name__)
+
+    def _load(self, code: bytes) -> Callable[..., None]:
+        from llvmlite import binding
+
+        engine = binding.create_mcjit_compiler(binding.parse_assembly(""), _machine())
+        engine.add_object_file(binding.ObjectFileRef.from_data(code))
+        engine.finalize_object()
+        _engines.append(engine)
+        names = [name for group in self._arguments for name in group]
+        kinds: Any = [ctypes.c_void_p if name.endswith("*") else _NUMBERS[name] for name in names]
+        native = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p, *kinds)
+        unused = (ctypes.c_int64 * 2)()  # for a result and an exception, of which there are none
+        return partial(native(engine.get_function_address(_NAME)), unused, unused)
+
+
+_NAME = "function"
+
+
+def _machine(processor: str = "", features: str = "") -> Any:
+    from llvmlite import binding
+
+    binding.initialize_native_target()
+    binding.initialize_native_asmprinter()
+    target = binding.Target.from_default_triple()
+    return target.create_target_machine(cpu=processor, features=features, opt=3, reloc="pic", codemodel="small")

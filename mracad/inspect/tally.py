@@ -1,0 +1,175 @@
+"""Curvature figures of surfaces at the points of faces, summed up place by place.
+
+Few points are processed by array operations, many by compiled code, with the same bits: both add up point by point.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from mracad.bspline.jets import Sites
+from mracad.bspline.surface import Net
+from mracad.inspect.curvature import ROWS, Forms, figures, forms
+from mracad.inspect.sweep import SCRATCH, SUMS, SWEEP, TOPS, told
+from mracad.model.cells import Quadrature
+
+Array = np.ndarray
+
+FEW, MANY = 30_000, 3_000_000
+"""Numbers of points above which it pays to load compiled code, and to compile it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Tally:
+    """Figures of places.
+
+    Attributes
+    ----------
+    sums : ndarray (6, places)
+        Area; area of the points that count; and over these the integrals of bending κ₁² + κ₂², of variation |∇H|²,
+        and of both without the base.
+    tops : ndarray (3, places)
+        Largest curvature of the points that count, the same less rounding, and distance between normals before and
+        after, as a chord.
+    """
+
+    sums: Array
+    tops: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Marks:
+    """What is known of points before an edit.
+
+    Attributes
+    ----------
+    counts : ndarray of uint8 (q,)
+        1 where curvature counts.
+    rounding : ndarray of float32 (q,)
+        Curvature that rounding can cause, 1/mm.
+    base : ndarray (5, q)
+        :attr:`Forms.bent` of the base.
+    normals : ndarray of float32 (3, q)
+    strips : (ndarray of int64 (nu,), ndarray of int64 (nv,))
+        Numbers whose sum is the place of each pair of parameters.
+    places : int
+        Number of places.
+    """
+
+    counts: Array
+    rounding: Array
+    base: Array
+    normals: Array
+    strips: tuple[Array, Array]
+    places: int
+
+    @cached_property
+    def pointers(self) -> tuple[int, ...]:
+        """Where the arrays are in memory."""
+        return tuple(map(_pointer, (self.counts, self.rounding, self.base, self.normals, *self.strips)))
+
+
+@dataclass(frozen=True, eq=False)
+class Sight:
+    """The points of a rule on surfaces over two knot vectors.
+
+    Attributes
+    ----------
+    sites : Sites
+    runs : ndarray of int64 (k, 3)
+        Row, first column and length of points that lie side by side in a row.
+    weights : (ndarray (nu,), ndarray (nv,))
+        Those of the rule along u and v.
+    centre : ndarray (3,)
+        Origin of the points.
+    """
+
+    sites: Sites
+    runs: Array
+    weights: tuple[Array, Array]
+    centre: Array
+
+    @classmethod
+    def of(cls, net: Net, rule: Quadrature) -> Sight:
+        """Those on a net."""
+        sites = Sites.of(net.u, net.v, rule.u, rule.v, rule.mask)
+        edges = np.diff(sites.mask, axis=1, prepend=False, append=False)
+        row, column = np.nonzero(edges)
+        runs = np.stack([row[::2], column[::2], column[1::2] - column[::2]], axis=1)
+        weights = np.ascontiguousarray(rule.wu.ravel()), np.ascontiguousarray(rule.wv.ravel())
+        return cls(sites, np.ascontiguousarray(runs), weights, np.asarray(net.poles.mean(axis=(0, 1))))
+
+    @cached_property
+    def points(self) -> int:
+        """Number of points."""
+        return int(self.runs[:, 2].sum())
+
+    def pairs(self, along_u: Array, along_v: Array, how: np.ufunc) -> Array:
+        """A function of numbers along u and along v at the points, ``(q,)``."""
+        return np.asarray(how(along_u, along_v[:, None])[self.sites.mask])
+
+    def forms(self, net: Net) -> Forms:
+        """The forms of a surface over the same knots."""
+        if not _compiled(self.points):
+            return forms(self.sites.blocks(net, self.centre))
+        found = np.empty((ROWS, self.points))
+        self._sweep(net, None, found, found, found)
+        return Forms(found)
+
+    def tally(self, net: Net, marks: Marks) -> Tally:
+        """The figures of the places of a surface over the same knots."""
+        found = Tally(np.zeros((SUMS, marks.places)), np.zeros((TOPS, marks.places)))
+        if _compiled(self.points):
+            self._sweep(net, marks, found.sums, found.tops, found.sums)
+            return found
+        weights, places = self.pairs(*self.weights, np.multiply), self.pairs(*marks.strips, np.add)
+        end = 0
+        for block in self.sites.blocks(net, self.centre):
+            begin, end = end, end + block.shape[2]
+            part = slice(begin, end)
+            seen = weights[part], 1.0 * marks.counts[part], marks.rounding[part]
+            rows = figures(block[1], block[2], block[3:6], block[6:])
+            added = told(seen, marks.base[:, part], marks.normals[:, part], rows)
+            for total, each in zip(found.sums, added[:SUMS], strict=True):
+                np.add.at(total, places[part], each)
+            for top, each in zip(found.tops, added[SUMS:], strict=True):
+                np.maximum.at(top, places[part], each.astype(float))
+        return found
+
+    def _sweep(self, net: Net, marks: Marks | None, sums: Array, tops: Array, rows: Array) -> None:
+        along, scratch = self.sites.along(net, self.centre), np.zeros(SCRATCH)
+        SWEEP(
+            _pointer(along), *along.shape, *self._pointers, len(self.runs),
+            marks is not None, self.points, *(marks.pointers if marks else (0,) * 6),
+            sums.shape[1], _pointer(sums), _pointer(tops), _pointer(rows), _pointer(scratch),
+        )  # fmt: skip
+
+    @cached_property
+    def _pointers(self) -> tuple[int, ...]:
+        return (*self._taps[0].shape, *map(_pointer, (*self._taps, *self.weights, self.runs)))
+
+    @cached_property
+    def _taps(self) -> tuple[Array, Array]:
+        """Control points along v of each row, a multiple of four, and their functions."""
+        columns, in_v = self.sites.columns.astype(np.int32), self.sites.in_v
+        spare = -columns.shape[1] % 4
+        return np.pad(columns, [(0, 0), (0, spare)]), np.pad(in_v, [(0, 0), (0, 0), (0, spare)])
+
+
+def _pointer(array: Array) -> int:
+    return int(array.__array_interface__["data"][0])
+
+
+class _Work:
+    """Number of points processed so far in this process."""
+
+    done = 0
+
+
+def _compiled(points: int) -> bool:
+    """Whether so many more points are a case for compiled code."""
+    _Work.done += points
+    return _Work.done >= MANY or (_Work.done >= FEW and SWEEP.ready)
