@@ -104,8 +104,8 @@ class Net:
             ``S``; or ``(S, Su, Sv)`` for ``derivatives=1``.
         """
         poles = homogeneous(self.poles, self.weights)
-        in_u = _collocation(self.u, us, derivatives, side[0])
-        in_v = _collocation(self.v, vs, derivatives, side[1])
+        in_u = collocation(self.u, us, derivatives, side[0])
+        in_v = collocation(self.v, vs, derivatives, side[1])
         along_u = [rows.apply(poles, 0) for rows in in_u]
         stack = tuple(in_v[s].apply(along_u[r], 1) for total in range(derivatives + 1) for r, s in _pairs(total))
         if self.weights is not None:
@@ -116,8 +116,8 @@ class Net:
         """Only ``S_u`` (axis 0) or only ``S_v`` (axis 1) on the tensor product of two lists of parameters."""
         if self.weights is not None:
             return self.grid(us, vs, 1)[1 + axis]
-        in_u = _collocation(self.u, us, 1 - axis, "right")[-1]
-        in_v = _collocation(self.v, vs, axis, "right")[-1]
+        in_u = collocation(self.u, us, 1 - axis, "right")[-1]
+        in_v = collocation(self.v, vs, axis, "right")[-1]
         return in_v.apply(in_u.apply(self.poles, 0), 1)
 
     def normals(
@@ -275,7 +275,7 @@ def _pairs(total: int) -> list[tuple[int, int]]:
     return [(total - b, b) for b in range(total + 1)]
 
 
-def _collocation(kv: KnotVector, x: Array, derivatives: int, side: Side) -> list[Rows]:
+def collocation(kv: KnotVector, x: Array, derivatives: int, side: Side) -> list[Rows]:
     """Collocation matrices of the derivatives up to the given one."""
     first, values = jet(kv, x, range(derivatives + 1), side)
     return [Rows(first, np.ascontiguousarray(part), kv.count, kv.periodic) for part in values.swapaxes(0, 1)]

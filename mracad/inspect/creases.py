@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
+from mracad.bspline.curve import homogeneous
 from mracad.bspline.knots import KnotVector, Side
-from mracad.bspline.surface import Net
+from mracad.bspline.rows import Rows
+from mracad.bspline.surface import Net, collocation, surface_quotient
 from mracad.model.brep import Face
 from mracad.model.cells import inside_grid
 from mracad.wavelet.ladder import arc_lengths
@@ -60,6 +63,7 @@ class Crossing:
 
     Attributes
     ----------
+    knots : (KnotVector, KnotVector)
     axis : {0, 1}
         0 for lines u = const.
     at : ndarray (k, 2)
@@ -69,35 +73,47 @@ class Crossing:
     seen : ndarray of bool (k, q)
     """
 
+    knots: tuple[KnotVector, KnotVector]
     axis: int
     at: Array
     places: Array
     seen: Array
 
     def tangents(self, net: Net) -> Tangents:
-        """S_u and S_v of a surface on either side of these knot lines, ``(n, 3)`` each."""
-        found = []
-        for us, vs, sides in self._sides():
-            su, sv = (np.swapaxes(part, 0, self.axis)[self.seen] for part in net.grid(us, vs, 1, sides)[1:])
-            found.append((su, sv))
+        """S_u and S_v of a surface over these knots on either side of the lines, ``(n, 3)`` each."""
+        poles, found = np.swapaxes(homogeneous(net.poles, net.weights), 0, self.axis), []
+        along, *across = self._rows
+        for value, slope in across:
+            here, beside = value.apply(poles, 0), slope.apply(poles, 0)
+            stack: tuple[Array, ...] = (along[0].apply(here, 1), along[0].apply(beside, 1), along[1].apply(here, 1))
+            if net.weights is not None:
+                stack = surface_quotient(stack)
+            first, second = (part[self.seen] for part in stack[1:])
+            found.append((first, second) if self.axis == 0 else (second, first))
         return found
 
     def angles(self, net: Net, tangents: Tangents) -> Array:
         """Angles between the normals on either side of these knot lines of a surface with the given tangents; radians,
         NaN where it is degenerate."""
-        normals = []
-        for (us, vs, sides), both in zip(self._sides(), tangents, strict=True):
-            uv = np.stack(np.meshgrid(us, vs, indexing="ij"), axis=-1)
-            normals.append(net.normals(np.swapaxes(uv, 0, self.axis)[self.seen], sides, both))
-        return np.asarray(2 * np.arcsin(np.minimum(np.linalg.norm(normals[1] - normals[0], axis=1) / 2, 1.0)))
+        one, other = (net.normals(*side, both) for side, both in zip(self._sides, tangents, strict=True))
+        return np.asarray(2 * np.arcsin(np.minimum(np.linalg.norm(other - one, axis=1) / 2, 1.0)))
 
-    def _sides(self) -> Iterator[tuple[Array, Array, tuple[Side, Side]]]:
-        """Parameters u and v of the places, and the limits to take there, left and right of the lines."""
-        for side, limit in enumerate(LIMITS):
-            if self.axis == 0:
-                yield self.at[:, side], self.places, (limit, LIMITS[1])
-            else:
-                yield self.places, self.at[:, side], (LIMITS[1], limit)
+    @cached_property
+    def _rows(self) -> list[list[Rows]]:
+        """Functions and their first derivatives: along the lines, and across them on their left and right."""
+        kv, other = self.knots[:: 1 - 2 * self.axis]
+        sides = (collocation(kv, self.at[:, k], 1, limit) for k, limit in enumerate(LIMITS))
+        return [collocation(other, self.places, 1, LIMITS[1]), *sides]
+
+    @cached_property
+    def _sides(self) -> list[tuple[Array, tuple[Side, Side]]]:
+        """Parameters of the points, ``(n, 2)``, and the limits to take there, left and right of the lines."""
+        line, place = np.nonzero(self.seen)
+        found: list[tuple[Array, tuple[Side, Side]]] = []
+        for k, limit in enumerate(LIMITS):
+            at = [self.at[line, k], self.places[place]][:: 1 - 2 * self.axis]
+            found.append((np.stack(at, axis=1), (LIMITS[1], limit) if self.axis else (limit, LIMITS[1])))
+        return found
 
 
 def crossings(net: Net, faces: Sequence[Face], axis: int, places: Array) -> Crossing | None:
@@ -109,7 +125,7 @@ def crossings(net: Net, faces: Sequence[Face], axis: int, places: Array) -> Cros
     seen = np.zeros((len(at), len(places)), dtype=bool)
     for face in faces:
         seen |= np.logical_and(*(_present(face, net, axis, _aside(kv, at, side), places) for side in (0, 1)))
-    return Crossing(axis, at, places, seen) if seen.any() else None
+    return Crossing((net.u, net.v), axis, at, places, seen) if seen.any() else None
 
 
 def _aside(kv: KnotVector, at: Array, side: int) -> Array:

@@ -9,7 +9,7 @@ import numpy as np
 
 from mracad.bspline.surface import Net
 from mracad.inspect.creases import Tangents
-from mracad.inspect.curvature import Forms, dot
+from mracad.inspect.curvature import Forms
 from mracad.inspect.roughness import Change
 from mracad.inspect.survey import Survey, largest, roughness
 from mracad.inspect.tally import Tally
@@ -69,13 +69,9 @@ class _Slope:
 
     @classmethod
     def of(cls, survey: Survey, offset: Array) -> _Slope:
-        net, end = survey.net.with_poles(offset), 0
-        deviation = motion = 0.0
-        for (moved,) in survey.sight.sites.blocks(net, np.zeros(3), 0):
-            begin, end = end, end + moved.shape[1]
-            deviation = max(deviation, float(np.abs(dot(moved, survey.marks.normals[:, begin:end])).max(initial=0.0)))
-            motion = max(motion, float(np.sqrt(dot(moved, moved).max(initial=0.0))))
-        return cls(offset, deviation, motion, [each.crossing.tangents(net) for each in survey.crossed])
+        net = survey.net.with_poles(offset)
+        tangents = [each.crossing.tangents(net) for each in survey.crossed]
+        return cls(offset, *survey.sight.moved(net, survey.marks), tangents)
 
 
 def _change(survey: Survey, slope: _Slope, amount: float) -> Change:

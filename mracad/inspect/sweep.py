@@ -47,7 +47,8 @@ def told(seen: Any, base: Any, old: Any, rows: Any) -> Any:
 
 
 def _sweep_points(lines: Any, sites: Any, marks: Any, found: Any, w: Any) -> None:
-    """The figures of points, run by run, ``_WIDE`` at a time: added up if they are marked, or all of them.
+    """The figures of points, run by run, ``_WIDE`` at a time: added up if they are marked, or all of them; or how they
+    move, if there are no derivatives.
 
     Parameters
     ----------
@@ -78,9 +79,12 @@ def _sweep_points(lines: Any, sites: Any, marks: Any, found: Any, w: Any) -> Non
         fill, column, left = fill + n, column + n, left - n
         if fill == _WIDE or (run == count and left == 0):
             if lines[2] > 3:
-                _divide(w)
-            _figure(w)
-            _tell(marks, found, at, fill, w)
+                _divide(lines[1], w)
+            if lines[1] > 1:
+                _figure(w)
+                _tell(marks, found, at, fill, w)
+            else:
+                _move(marks, found, at, fill, w)
             at, fill = at + fill, 0
 
 
@@ -117,9 +121,9 @@ def _add_four(along: Any, lines: Any, taps: Any, part: Any, w: Any) -> None:
             w[to + i] = total + tc * along[c + i] + td * along[d + i]
 
 
-def _divide(w: Any) -> None:
+def _divide(orders: Any, w: Any) -> None:
     """Derivatives of A / w from those of A and w, as in :mod:`mracad.bspline.jets`."""
-    for total in range(4):
+    for total in range(orders):
         for b in range(total + 1):
             to = total * (total + 1) // 2 + b
             for i in range(total - b + 1):
@@ -216,6 +220,16 @@ def _mark(marks: Any, at: Any, fill: Any, w: Any) -> None:
         )  # fmt: skip
 
 
+def _move(marks: Any, found: Any, at: Any, fill: Any, w: Any) -> None:
+    """The largest part of vectors, instead of points, along normals, and the square of the largest vector."""
+    points, normals, tops = marks[1], marks[5], found[2]
+    for p in range(fill):
+        x, y, z = w[p], w[_WIDE + p], w[2 * _WIDE + p]
+        at_x, at_y, at_z = at + p, points + at + p, 2 * points + at + p
+        tops[0] = max(tops[0], abs(x * normals[at_x] + y * normals[at_y] + z * normals[at_z]))
+        tops[1] = max(tops[1], x * x + y * y + z * z)
+
+
 _REAL, _WHOLE = "float64*", "int64"
 SWEEP = Compiled(
     _sweep_points,
@@ -226,6 +240,6 @@ SWEEP = Compiled(
         (_WHOLE, _REAL, _REAL, _REAL),
         (_REAL,),
     ),
-    (_spread, _add_four, _divide, _take, _figure, _tell, _mark),
+    (_spread, _add_four, _divide, _take, _figure, _tell, _mark, _move),
     (dot, figures, told),
 )

@@ -10,9 +10,9 @@ from functools import cached_property
 
 import numpy as np
 
-from mracad.bspline.jets import Sites
+from mracad.bspline.jets import ORDERS, Sites
 from mracad.bspline.surface import Net
-from mracad.inspect.curvature import ROWS, Forms, figures, forms
+from mracad.inspect.curvature import ROWS, Forms, dot, figures, forms
 from mracad.inspect.sweep import SCRATCH, SUMS, SWEEP, TOPS, told
 from mracad.model.cells import Quadrature
 
@@ -116,14 +116,14 @@ class Sight:
         if not _compiled(self.points):
             return forms(self.sites.blocks(net, self.centre))
         found = np.empty((ROWS, self.points))
-        self._sweep(net, None, found, found, found)
+        self._sweep(self.sites.along(net, self.centre), None, found, found, found)
         return Forms(found)
 
     def tally(self, net: Net, marks: Marks) -> Tally:
         """The figures of the places of a surface over the same knots."""
         found = Tally(np.zeros((SUMS, marks.places)), np.zeros((TOPS, marks.places)))
         if _compiled(self.points):
-            self._sweep(net, marks, found.sums, found.tops, found.sums)
+            self._sweep(self.sites.along(net, self.centre), marks, found.sums, found.tops, found.sums)
             return found
         weights, places = self.pairs(*self.weights, np.multiply), self.pairs(*marks.strips, np.add)
         end = 0
@@ -139,12 +139,25 @@ class Sight:
                 np.maximum.at(top, places[part], each.astype(float))
         return found
 
-    def _sweep(self, net: Net, marks: Marks | None, sums: Array, tops: Array, rows: Array) -> None:
-        along, scratch = self.sites.along(net, self.centre), np.zeros(SCRATCH)
+    def moved(self, net: Net, marks: Marks) -> tuple[float, float]:
+        """The largest motion along normals, and in any direction, where a surface moves by the points of another."""
+        most = np.zeros(2)
+        if _compiled(self.points // len(ORDERS)):
+            self._sweep(self.sites.along(net, np.zeros(3), 0), marks, most, most, most)
+        else:
+            end = 0
+            for (part,) in self.sites.blocks(net, np.zeros(3), 0):
+                begin, end = end, end + part.shape[1]
+                along, square = np.abs(dot(part, marks.normals[:, begin:end])), dot(part, part)
+                most = np.maximum(most, [along.max(initial=0.0), square.max(initial=0.0)])
+        return float(most[0]), float(np.sqrt(most[1]))
+
+    def _sweep(self, along: Array, marks: Marks | None, sums: Array, tops: Array, rows: Array) -> None:
+        scratch = np.zeros(SCRATCH)
         SWEEP(
             _pointer(along), *along.shape, *self._pointers, len(self.runs),
             marks is not None, self.points, *(marks.pointers if marks else (0,) * 6),
-            sums.shape[1], _pointer(sums), _pointer(tops), _pointer(rows), _pointer(scratch),
+            sums.shape[-1], _pointer(sums), _pointer(tops), _pointer(rows), _pointer(scratch),
         )  # fmt: skip
 
     @cached_property
