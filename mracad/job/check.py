@@ -167,10 +167,10 @@ def _layered(
         brep,
         layers.shells(model, validity, known | layers.turned(looks(document))),
         layers.seams(model, measures, allowed.seams),
-        limited("self-intersection", lambda: _crossed(mesh, measures, model.diagonal), allowed, slow),
+        limited("self-intersection", lambda: _crossed(document, mesh, measures, model.diagonal), allowed, slow),
         layers.tolerances(model, validity, allowed.tolerance),
         limited("walls", lambda: _walls(document, allowed.wall), allowed),
-        limited("mesh", lambda: layers.mesh(mesh(None), open_faces), allowed, slow),
+        limited("mesh", lambda: layers.mesh(mesh(), open_faces), allowed, slow),
     ]
     return Verdict(name, tuple(found), _valid(found, validity.solids))
 
@@ -256,24 +256,25 @@ def _load(faces: int, stated: int, unseen: str, unloaded: Callable[[], list[str]
     return Layer("load", "fail" if lost else "pass", text, lost, {"faces": faces, "stated": stated})
 
 
-def _crossed(meshed: Callable[[float | None], Triangles], measures: list[SeamMeasure], diagonal: float) -> Layer:
+def _crossed(
+    document: Document, meshed: Callable[[], Triangles], measures: list[SeamMeasure], diagonal: float
+) -> Layer:
     """Faces that cross, on a mesh and again on a finer one: crossings on the coarser one alone are its own error."""
+    from mracad.occ.triangles import some_triangles
+
     touching = {frozenset(m.faces) for m in measures if not m.sewn}
 
-    def crossing(chord: float | None, among: Collection[int] = ()) -> dict[tuple[int, int], tuple[float, float, float]]:
-        mesh = meshed(chord)
-        chosen = np.isin(mesh.faces, list(among)) if among else slice(None)
-        numbers = mesh.faces[chosen]
-        pairs, places = crossings(mesh.points, mesh.corners[chosen], mesh.parts[chosen])
+    def crossing(mesh: Triangles) -> dict[tuple[int, int], tuple[float, float, float]]:
+        pairs, places = crossings(mesh.points, mesh.corners, mesh.parts)
         found: dict[tuple[int, int], tuple[float, float, float]] = {}
-        for (a, b), (x, y, z) in zip(np.sort(numbers[pairs], axis=1).tolist(), places.tolist(), strict=True):
+        for (a, b), (x, y, z) in zip(np.sort(mesh.faces[pairs], axis=1).tolist(), places.tolist(), strict=True):
             if frozenset((a, b)) not in touching:
                 found.setdefault((a, b), (x, y, z))
         return found
 
-    first = crossing(None)
+    first = crossing(meshed())
     if first:
-        again = crossing(1e-4 * diagonal, {face for pair in first for face in pair})
+        again = crossing(some_triangles(document, {face for pair in first for face in pair}, 1e-4 * diagonal))
         first = {faces: where for faces, where in first.items() if faces in again}
     findings = [Finding("crossing", faces, where=where) for faces, where in sorted(first.items())]
     text = f"{len(findings)} crossings" if findings else "none found"

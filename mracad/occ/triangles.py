@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Container, Sequence
+
 import numpy as np
 from OCP.BRep import BRep_Tool
 from OCP.BRepMesh import BRepMesh_IncrementalMesh
@@ -50,28 +52,49 @@ def triangles(document: Document, chord: float | None = None, angle: float | Non
     if angle is not None and not SMALLEST[1] <= angle <= 180:
         raise UsageError(f"angle: {angle:g} is not between {SMALLEST[1]:g} and 180 degrees", "give --angle 12")
     with quiet():
-        whole = compound(part.shape for part in document.parts)
         bounds = box(document.shape)
-        settings = IMeshTools_Parameters()
         size = float(np.linalg.norm(bounds[1] - bounds[0]))
         if chord is not None and not chord >= SMALLEST[0] * size:
             least = f"give at least {SMALLEST[0] * size:.3g} mm, a millionth of the model's diagonal"
             raise UsageError(f"chord: {chord:g} mm is too small", least)
-        settings.Deflection = chord or _CHORD * size
-        settings.Angle = float(np.radians(angle or _ANGLE))
-        best: Triangles | None = None
-        for algorithm in _ALGORITHMS[:: -1 if _cells(document) > _MANY else 1]:
-            settings.MeshAlgo = algorithm
-            BRepTools.Clean_s(whole)
-            BRepMesh_IncrementalMesh(whole, settings)
-            found = _collected(document)
-            if best is None or _folds(found) < _folds(best):
-                best = found
-            if not _folds(best):
-                break
-        BRepTools.Clean_s(whole)
+    best: Triangles | None = None
+    fewest = 0
+    for algorithm in _ALGORITHMS[:: -1 if _cells(document) > _MANY else 1]:
+        found = _meshed(document, range(len(document.faces)), chord or _CHORD * size, angle or _ANGLE, algorithm)
+        folds = _folds(found)
+        if best is None or folds < fewest:
+            best, fewest = found, folds
+        if not folds:
+            break
     assert best is not None
     return best
+
+
+def some_triangles(document: Document, faces: Collection[int], chord: float) -> Triangles:
+    """Mesh some faces, each well: the whole may be folded over itself where they meet.
+
+    Parameters
+    ----------
+    document : Document
+    faces : collection of int
+    chord : float
+        As for :func:`triangles`.
+    """
+    return _meshed(document, sorted(faces), chord, _ANGLE, _ALGORITHMS[-1])
+
+
+def _meshed(document: Document, faces: Sequence[int], chord: float, angle: float, algorithm: object) -> Triangles:
+    """A mesh of some faces by one of the kernel's algorithms."""
+    settings = IMeshTools_Parameters()
+    settings.Deflection, settings.Angle, settings.MeshAlgo = chord, float(np.radians(angle)), algorithm
+    every = len(faces) == len(document.faces)
+    with quiet():
+        whole = compound(part.shape for part in document.parts) if every else compound(document.faces[i] for i in faces)
+        BRepTools.Clean_s(whole)
+        BRepMesh_IncrementalMesh(whole, settings)
+        found = _collected(document, frozenset(faces))
+        BRepTools.Clean_s(whole)
+    return found
 
 
 def _cells(document: Document) -> int:
@@ -84,11 +107,12 @@ def _folds(mesh: Triangles) -> int:
     """Number of triangle sides that occur more than once in one direction: the kernel's default sometimes folds a mesh
     over itself."""
     sides = mesh.sides
-    return len(sides) - len(np.unique(sides[:, 0] * len(mesh.points) + sides[:, 1]))
+    keys = np.sort(sides[:, 0] * len(mesh.points) + sides[:, 1])
+    return int((keys[1:] == keys[:-1]).sum())
 
 
-def _collected(document: Document) -> Triangles:
-    """The triangles that the kernel keeps with the faces."""
+def _collected(document: Document, chosen: Container[int]) -> Triangles:
+    """The triangles that the kernel keeps with the chosen faces."""
     points: list[Array] = []
     uv: list[Array] = []
     corners: list[Array] = []
@@ -99,7 +123,7 @@ def _collected(document: Document) -> Triangles:
     for number, part in enumerate(document.parts):
         first = count
         own: list[Array] = []
-        for index in part.numbers:
+        for index in filter(chosen.__contains__, part.numbers):
             face, location = document.faces[index], TopLoc_Location()
             mesh = BRep_Tool.Triangulation_s(face, location)
             if mesh is None:
