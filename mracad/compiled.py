@@ -16,7 +16,7 @@ from pathlib import Path
 from types import FunctionType
 from typing import Any
 
-from mracad import cache
+from mracad import cache, note
 from mracad.errors import MracadError
 from mracad.output import put
 
@@ -94,6 +94,7 @@ class Compiled:
 
     def _made(self) -> bytes:
         """The machine code, which is stored."""
+        note.doing(note.COMPILING)
         code = self._compiled()
         try:
             self._beside.parent.mkdir(parents=True, exist_ok=True)

@@ -7,6 +7,9 @@ from collections.abc import Callable
 
 Watcher = Callable[[str, str], object]
 
+COMPILING = "compiling the code for large models"
+"""The stage of a first run that has to compile."""
+
 
 class Note:
     """A short text from a child to its parent, which survives the child.

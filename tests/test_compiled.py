@@ -5,6 +5,7 @@ import sys
 import numpy as np
 import pytest
 
+from mracad import note
 from mracad.compiled import Compiled
 
 
@@ -68,3 +69,38 @@ def test_it_is_in_the_users_cache_where_it_cannot_be_beside_its_module(folder, m
     made().prepare()
     monkeypatch.setattr(Compiled, "_compiled", None)
     assert made().ready and len(list((tmp_path / "kept").iterdir())) == 1
+
+
+@pytest.fixture
+def stages():
+    """The stages that are told meanwhile."""
+    found = []
+
+    def watcher(stage, subject):
+        found.append(stage)
+
+    note.watch(watcher)
+    yield found
+    note.unwatch(watcher)
+
+
+def test_compiling_is_told_and_loading_is_not(folder, monkeypatch, tmp_path, stages):
+    (file,) = folder.rglob("*.o")
+    code = file.read_bytes()[32:-32]
+    monkeypatch.setattr(Compiled, "_compiled", lambda self: code)
+    monkeypatch.setattr(sys, "pycache_prefix", str(folder))
+    made().prepare()
+    assert stages == []
+    monkeypatch.setattr(sys, "pycache_prefix", str(tmp_path))
+    made().prepare()
+    assert stages == [note.COMPILING]
+
+
+def test_what_numba_compiles_is_told(stages):
+    from numba import njit
+
+    from mracad.bspline import sweeps
+
+    assert sweeps.njit is njit
+    njit("int64(int64)")(lambda x: x)
+    assert stages and set(stages) == {note.COMPILING}

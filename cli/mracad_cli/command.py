@@ -149,10 +149,11 @@ class Command(click.Command):
         """Do the work of the command, in a child process where it is guarded."""
         from mracad.job import guard
         from mracad_cli.journal import Ended
+        from mracad_cli.progress import compiling
 
         def work() -> Ended:
             try:
-                with told():
+                with told(), compiling():
                     code = click.Command.invoke(self, ctx)
                     sys.stdout.flush()
             finally:

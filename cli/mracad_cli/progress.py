@@ -1,9 +1,12 @@
-"""Progress on a terminal for anything that takes over a second; silent elsewhere."""
+"""Progress on a terminal for anything that takes over a second, silent elsewhere; and why a first run takes longer."""
 
 from __future__ import annotations
 
+import mmap
 import sys
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from types import TracebackType
 from typing import Any
 
@@ -61,3 +64,20 @@ class Progress:
             self._task = self._bar.add_task(stage, total=total, rate="")
         rate = f"{done / max(time.monotonic() - self._start, 1e-3):.1f}/s, left"
         self._bar.update(self._task, description=stage, completed=done, total=total, rate=rate)
+
+
+@contextmanager
+def compiling() -> Iterator[None]:
+    """Say once, whichever process of the command begins, that code is being compiled; nothing if quiet."""
+    said = mmap.mmap(-1, 1)
+
+    def say(stage: str, _: str) -> None:
+        if stage == note.COMPILING and not voice.quiet and not said[0]:
+            said[0] = 1
+            print(f"mracad: {note.COMPILING}, once; later runs find it on disk", file=sys.stderr, flush=True)
+
+    note.watch(say)
+    try:
+        yield
+    finally:
+        note.unwatch(say)

@@ -13,9 +13,24 @@ from typing import Any
 
 import numpy as np
 from numba import njit, types
+from numba.core import event
 
+from mracad import note
 from mracad.bspline.knots import Array
 from mracad.bspline.rows import Rows
+
+
+class _Compiling(event.Listener):  # type: ignore[misc]
+    """Notes that the compiler works, which it does only where its cache on disk has nothing."""
+
+    def on_start(self, event: event.Event) -> None:
+        note.doing(note.COMPILING)
+
+    def on_end(self, event: event.Event) -> None:
+        pass
+
+
+event.register("numba:compile", _Compiling())
 
 _WIDE, _NARROW = 256, 48
 _UNROLL = 6
