@@ -71,27 +71,49 @@ def _tried(
     if wish.fades and trial.pose.share is not None:
         target = trial.pose.share * target
     wished = float(trial.gains(target, target).of(1.0).sum())
-    found = _ways(trial, wish, target, trial.nothing(least * wished))
+    found, left = _ways(trial, wish, target, trial.nothing(least * wished))
+    moved = _best(trial, members, found, target)
+    if left and not through(moved):
+        _judge(trial, left, found)
+        moved = _best(trial, members, found, target)
+    return _explained(trial, moved, target)
+
+
+def _best(trial: Trial, members: Mapping[int, Sheet], found: list[Verdict], target: Array) -> dict[int, Moved]:
+    """The best result after verdicts, to which those on combinations are added."""
     if len(members) > 1:
         _blend(trial, target, found)
-    return _explained(trial, _confirmed(trial, members, found, target), target)
+    return _confirmed(trial, members, found, target)
 
 
-def _ways(trial: Trial, wish: Wish, target: Array, nothing: Verdict) -> list[Verdict]:
-    """Verdicts on the ways to a target, after that on no change, until one is allowed."""
-    found, most = [nothing], trial.most(target)
+def _ways(trial: Trial, wish: Wish, target: Array, nothing: Verdict) -> tuple[list[Verdict], list[Verdict]]:
+    """Verdicts on the ways to a target, after that on no change, until one is allowed.
+
+    If one is allowed in full for several surfaces, those before it are returned apart, without amounts.
+    """
+    found, most, several = [nothing], trial.most(target), len(trial.nets) > 1
     for batch in wish.ways(trial.problem, target, trial.width) if most > nothing.gain else ():
         first = len(found)
+        left: list[Verdict] = []
         for wanted in batch:
-            found.append(trial.judged(trial.pose.faded(wanted) if wish.fades else wanted, target, found))
-            if found[-1].least == 1.0 and NEARER * found[-1].gain >= most:
-                return found
+            delta = trial.pose.faded(wanted) if wish.fades else wanted
+            verdict = trial.judged(delta, target, found, wholly=several)
+            (left if several else found).append(verdict)
+            if verdict.least == 1.0 and NEARER * verdict.gain >= most:
+                return ([*found, verdict], left[:-1]) if several else (found, [])
+        _judge(trial, left, found)
         if max(found, key=rank).least <= ENOUGH:
             for each in found[first:]:
                 found.append(trial.eased(each, target, found))
         if max(found, key=rank).least > ENOUGH:
             break
-    return found
+    return found, []
+
+
+def _judge(trial: Trial, left: Sequence[Verdict], found: list[Verdict]) -> None:
+    """Add verdicts with amounts."""
+    for each in left:
+        found.append(trial.shared(each, found))
 
 
 def _blend(trial: Trial, target: Array, found: list[Verdict]) -> None:

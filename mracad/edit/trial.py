@@ -145,15 +145,23 @@ class Trial:
         none = np.zeros(len(self.nets))
         return Verdict(still, none.tolist(), self.watch.still(), [()] * len(none), Gains(none, none), least)
 
-    def judged(self, delta: Array, target: Array, others: Sequence[Verdict] = ()) -> Verdict:
-        """The share of a displacement allowed for each surface; 0 where it could not do better than ``others``."""
+    def judged(self, delta: Array, target: Array, others: Sequence[Verdict] = (), *, wholly: bool = False) -> Verdict:
+        """The share of a displacement allowed for each surface; 0 where it could not do better than ``others``, or with
+        ``wholly`` where not all of it is allowed."""
         bound = self.tolerances.deviation
         if np.isfinite(bound) and np.linalg.norm(delta, axis=1).max(initial=0.0) > bound:
             every = zip(self.nets, self._split(delta), self.stretches, strict=True)
             within = [bounded(net, part, bound, s.times(self.width)).reshape(-1, 3) for net, part, s in every]
             delta = self.problem.nearest(np.concatenate(within))
         tried, nearer = Tried(self.watch, self.nets, self._split(delta)), self.gains(delta, target)
+        if wholly:
+            return self._verdict(tried, nearer, np.zeros(len(self.nets)), 0)
         return self._verdict(tried, nearer, self._floor(nearer, others), BISECTIONS[len(self.nets) > 1])
+
+    def shared(self, verdict: Verdict, others: Sequence[Verdict]) -> Verdict:
+        """The verdict on the displacement of one that knows only what is allowed in full."""
+        floor = self._floor(verdict.nearer, others)
+        return self._verdict(verdict.tried, verdict.nearer, floor, BISECTIONS[len(self.nets) > 1])
 
     def settled(self, verdict: Verdict) -> Verdict:
         """The same verdict, with amounts found in more steps."""

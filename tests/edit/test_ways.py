@@ -4,9 +4,13 @@ import pytest
 
 from mracad.edit import alone
 from mracad.edit.fair import Filter, faired
+from mracad.edit.smooth import smooth
 from mracad.edit.tolerances import Tolerances
 from mracad.edit.trial import Trial
+from mracad.occ.view import view
 from mracad.seam.wishes import Wishes
+from mracad.spec.steps import Smooth
+from tests.edit import panels
 from tests.edit.models import noisy, sheet
 
 
@@ -25,9 +29,9 @@ def trials(monkeypatch):
         found.append([])
         begin(self, *given, **more)
 
-    def judged(self, *given):
+    def judged(self, *given, **more):
         found[-1].append(given[0])
-        return judge(self, *given)
+        return judge(self, *given, **more)
 
     monkeypatch.setattr(Trial, "__init__", begun)
     monkeypatch.setattr(Trial, "judged", judged)
@@ -47,3 +51,15 @@ def test_control_points_are_multiplied_only_so_far(net, trials, monkeypatch):
     monkeypatch.setattr(alone, "MOST", (1.0, 0))
     faired(sheet(net), {0}, Filter(2.0), Wishes(), Tolerances())
     assert len(trials) == 1
+
+
+def test_amounts_of_joined_surfaces_are_only_found_where_no_way_is_allowed_whole(monkeypatch):
+    model = view(panels.document(panels.cut(panels.whole(12, 0.2, patches=(2, 2))[1], (2, 2))))
+    looked, shared, judge, share = [], [], Trial.judged, Trial.shared
+    monkeypatch.setattr(Trial, "shared", lambda *given: shared.append(given) or share(*given))
+    monkeypatch.setattr(
+        Trial, "judged", lambda *given, **more: looked.append(more.get("wholly")) or judge(*given, **more)
+    )
+    moved = smooth(model, Smooth(scale="58.3mm"))
+    assert [each.amount for each in moved.outcomes] == [1.0] * 4
+    assert looked.count(True) == 2 and not shared
