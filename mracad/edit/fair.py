@@ -25,7 +25,7 @@ from mracad.edit.moved import Result
 from mracad.edit.pose import Scene
 from mracad.edit.target import Sheet, Wish, eased, sheets, stiffness
 from mracad.edit.tolerances import GROWTH, Tolerances
-from mracad.inspect.curvature import forms
+from mracad.inspect.curvature import FORMS, Forms, shapes
 from mracad.inspect.roughness import Growth
 from mracad.model.brep import Face, Model
 from mracad.seam.interface import Joints, joints
@@ -110,7 +110,7 @@ def calm(problem: Problem, target: Array, width: float) -> Array:
         net = space.net.with_poles(space.net.poles + part)
         us, vs = (knots.greville()[:, None] for knots in (net.u, net.v))
         jet = jets(net, us, vs, np.ones(net.poles.shape[:2], bool), np.zeros(3))
-        bent = forms([jet]).largest.reshape(len(vs), len(us)).T * width / (2 * np.pi)
+        bent = Forms(shapes([jet], FORMS)).largest.reshape(len(vs), len(us)).T * width / (2 * np.pi)
         share = np.clip((SHARP[1] - bent) / (SHARP[1] - SHARP[0]), 0.0, 1.0)
         found.append(eased(net, share, (width, width)).ravel())
     return np.concatenate(found)[:, None]

@@ -16,8 +16,9 @@ THIN = 1e-6
 VOID = 1e-40
 """|S_u × S_v| up to which a surface counts as degenerate too: powers of smaller numbers underflow."""
 
-ROWS = 13
-"""Numbers per point in :class:`Forms`."""
+FORMS, BENT = slice(0, 8), slice(8, 13)
+"""What :func:`figures` returns: the rows of :class:`Forms`; and in the frame of S_u / |S_u| and the tangent normal to it,
+components 11, 12 and 22 of the shape operator, and the gradient of the mean curvature."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,8 +27,7 @@ class Forms:
 
     Attributes
     ----------
-    rows : ndarray (13, q)
-        What :func:`figures` returns.
+    rows : ndarray (8, q)
     """
 
     rows: Array
@@ -53,20 +53,15 @@ class Forms:
         return np.asarray(self.rows[6])
 
     @property
-    def bent(self) -> Array:
-        """Components 11, 12 and 22 of the shape operator in the frame of S_u / |S_u| and the tangent normal to it, and
-        the gradient of the mean curvature in that frame, ``(5, q)``."""
-        return np.asarray(self.rows[7:12])
-
-    @property
     def regular(self) -> Array:
         """Where the surface is not degenerate, ``(q,)`` of bool."""
-        return np.asarray(self.rows[12] > 0)
+        return np.asarray(self.rows[7] > 0)
 
 
-def forms(jets: Iterable[Array]) -> Forms:
-    """The forms of a surface with derivatives in blocks of points, see :func:`mracad.bspline.jets.jets`."""
-    return Forms(np.concatenate([np.stack(figures(jet[1], jet[2], jet[3:6], jet[6:])) for jet in jets], axis=1))
+def shapes(jets: Iterable[Array], rows: slice) -> Array:
+    """Some of the :func:`figures` of a surface with derivatives in blocks of points, see
+    :func:`mracad.bspline.jets.jets`."""
+    return np.concatenate([np.stack(figures(jet[1], jet[2], jet[3:6], jet[6:])[rows]) for jet in jets], axis=1)
 
 
 def dot(a: Any, b: Any) -> Any:
@@ -75,7 +70,7 @@ def dot(a: Any, b: Any) -> Any:
 
 
 def figures(su: Any, sv: Any, second: Any, third: Any) -> Any:
-    """The rows of :class:`Forms`, from derivatives of each order whose coordinates are numbers or arrays.
+    """Figures from derivatives of each order, whose coordinates are numbers or arrays.
 
     Notes
     -----
@@ -114,6 +109,6 @@ def figures(su: Any, sv: Any, second: Any, third: Any) -> Any:
     last = across * across * long * (g - 2.0 * skew * f + skew * skew * e)
     half, mean = 0.5 * (first - last), 0.5 * (first + last)
     return (
-        n[0], n[1], n[2], size * share, speed[0], speed[1], np.abs(mean) + np.sqrt(half * half + twist * twist),
-        first, twist, last, share * hu / root, across * root * (hv - skew * hu), share,
+        n[0], n[1], n[2], size * share, speed[0], speed[1], np.abs(mean) + np.sqrt(half * half + twist * twist), share,
+        first, twist, last, share * hu / root, across * root * (hv - skew * hu),
     )  # fmt: skip

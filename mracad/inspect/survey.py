@@ -124,7 +124,7 @@ def _survey(
     sides = np.maximum(sides, least)
     rounding = ROUNDING * float(np.abs(net.poles).max()) * _wavenumber(sides.min(axis=0)) ** 2
     across, ends = _divided(rule, form, reach)
-    bent = np.zeros((5, len(sharp))) if base is None else np.ascontiguousarray(Sight.of(base, rule).forms(base).bent)
+    bent = np.zeros((5, len(sharp))) if base is None else Sight.of(base, rule).bent(base)
     marks = Marks(
         regular.astype(np.uint8), rounding.astype(np.float32), bent, form.normal.astype(np.float32), across,
         len(ends[0]) * len(ends[1]),

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from mracad.compiled import Compiled
-from mracad.inspect.curvature import ROWS, dot, figures
+from mracad.inspect.curvature import dot, figures
 
 SUMS, TOPS = 6, 3
 """Numbers per place that are added up, and of which the largest counts."""
@@ -28,7 +28,7 @@ def told(seen: Any, base: Any, old: Any, rows: Any) -> Any:
     """What a point with a weight, marks and the rows of its forms adds to the sums of its place, and its figures of
     which the largest counts."""
     weight, counts, rounding = seen
-    nx, ny, nz, density, _, _, largest, a, b, c, hu, hv, share = rows
+    nx, ny, nz, density, _, _, largest, share, a, b, c, hu, hv = rows
     area = weight * density
     counted = area * counts
     da, db, dc, du, dv = a - base[0], b - base[1], c - base[2], hu - base[3], hv - base[4]
@@ -59,7 +59,7 @@ def _sweep_points(lines: Any, sites: Any, marks: Any, found: Any, w: Any) -> Non
     marks : tuple
         Whether there are marks; the number of points; and the arrays of :class:`Marks`.
     found : tuple
-        Number of places, their sums and tops; or the rows of :class:`Forms`.
+        Number of places, their sums and tops; first figure that is stored, the one after the last, and all of them.
     w : pointer
         Scratch memory.
     """
@@ -177,7 +177,7 @@ def _figure(w: Any) -> None:
 
 def _tell(marks: Any, found: Any, at: Any, fill: Any, w: Any) -> None:
     """Add up, or store, the figures of the points from ``at`` on."""
-    points, (places, sums, tops, every) = marks[1], found
+    points, (places, sums, tops, first, last, every) = marks[1], found
     if marks[0]:
         _mark(marks, at, fill, w)
         for p in range(fill):
@@ -187,9 +187,9 @@ def _tell(marks: Any, found: Any, at: Any, fill: Any, w: Any) -> None:
             for r in range(TOPS):
                 tops[r * places + place] = max(tops[r * places + place], w[(_TOLD + SUMS + r) * _WIDE + p])
     else:
-        for r in range(ROWS):
+        for r in range(first, last):
             for i in range(fill):
-                every[r * points + at + i] = w[(_FORMS + r) * _WIDE + i]
+                every[(r - first) * points + at + i] = w[(_FORMS + r) * _WIDE + i]
 
 
 def _mark(marks: Any, at: Any, fill: Any, w: Any) -> None:
@@ -237,7 +237,7 @@ SWEEP = Compiled(
         (_REAL, _WHOLE, _WHOLE, _WHOLE, _WHOLE),
         (_WHOLE, _WHOLE, "int32*", _REAL, _REAL, _REAL, "int64*", _WHOLE),
         (_WHOLE, _WHOLE, "uint8*", "float32*", _REAL, "float32*", "int64*", "int64*"),
-        (_WHOLE, _REAL, _REAL, _REAL),
+        (_WHOLE, _REAL, _REAL, _WHOLE, _WHOLE, _REAL),
         (_REAL,),
     ),
     (_spread, _add_four, _divide, _take, _figure, _tell, _mark, _move),

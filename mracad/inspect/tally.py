@@ -12,7 +12,7 @@ import numpy as np
 
 from mracad.bspline.jets import ORDERS, Sites
 from mracad.bspline.surface import Net
-from mracad.inspect.curvature import ROWS, Forms, dot, figures, forms
+from mracad.inspect.curvature import BENT, FORMS, Forms, dot, figures, shapes
 from mracad.inspect.sweep import SCRATCH, SUMS, SWEEP, TOPS, told
 from mracad.model.cells import Quadrature
 
@@ -51,7 +51,7 @@ class Marks:
     rounding : ndarray of float32 (q,)
         Curvature that rounding can cause, 1/mm.
     base : ndarray (5, q)
-        :attr:`Forms.bent` of the base.
+        :meth:`Sight.bent` of the base.
     normals : ndarray of float32 (3, q)
     strips : (ndarray of int64 (nu,), ndarray of int64 (nv,))
         Numbers whose sum is the place of each pair of parameters.
@@ -113,17 +113,25 @@ class Sight:
 
     def forms(self, net: Net) -> Forms:
         """The forms of a surface over the same knots."""
+        return Forms(self._figures(net, FORMS))
+
+    def bent(self, net: Net) -> Array:
+        """Shape operator and gradient of the mean curvature of a surface over the same knots, ``(5, q)``."""
+        return self._figures(net, BENT)
+
+    def _figures(self, net: Net, rows: slice) -> Array:
         if not _compiled(self.points):
-            return forms(self.sites.blocks(net, self.centre))
-        found = np.empty((ROWS, self.points))
-        self._sweep(self.sites.along(net, self.centre), None, found, found, found)
-        return Forms(found)
+            return shapes(self.sites.blocks(net, self.centre), rows)
+        found = np.empty((rows.stop - rows.start, self.points))
+        self._sweep(self.sites.along(net, self.centre), None, (found, found), (rows, found))
+        return found
 
     def tally(self, net: Net, marks: Marks) -> Tally:
         """The figures of the places of a surface over the same knots."""
         found = Tally(np.zeros((SUMS, marks.places)), np.zeros((TOPS, marks.places)))
         if _compiled(self.points):
-            self._sweep(self.sites.along(net, self.centre), marks, found.sums, found.tops, found.sums)
+            both = found.sums, found.tops
+            self._sweep(self.sites.along(net, self.centre), marks, both, (slice(0, 0), found.sums))
             return found
         weights, places = self.pairs(*self.weights, np.multiply), self.pairs(*marks.strips, np.add)
         end = 0
@@ -143,7 +151,7 @@ class Sight:
         """The largest motion along normals, and in any direction, where a surface moves by the points of another."""
         most = np.zeros(2)
         if _compiled(self.points // len(ORDERS)):
-            self._sweep(self.sites.along(net, np.zeros(3), 0), marks, most, most, most)
+            self._sweep(self.sites.along(net, np.zeros(3), 0), marks, (most, most), (slice(0, 0), most))
         else:
             end = 0
             for (part,) in self.sites.blocks(net, np.zeros(3), 0):
@@ -152,12 +160,14 @@ class Sight:
                 most = np.maximum(most, [along.max(initial=0.0), square.max(initial=0.0)])
         return float(most[0]), float(np.sqrt(most[1]))
 
-    def _sweep(self, along: Array, marks: Marks | None, sums: Array, tops: Array, rows: Array) -> None:
-        scratch = np.zeros(SCRATCH)
+    def _sweep(
+        self, along: Array, marks: Marks | None, added: tuple[Array, Array], stored: tuple[slice, Array]
+    ) -> None:
+        scratch, (sums, tops), (rows, found) = np.zeros(SCRATCH), added, stored
         SWEEP(
             _pointer(along), *along.shape, *self._pointers, len(self.runs),
             marks is not None, self.points, *(marks.pointers if marks else (0,) * 6),
-            sums.shape[-1], _pointer(sums), _pointer(tops), _pointer(rows), _pointer(scratch),
+            sums.shape[-1], _pointer(sums), _pointer(tops), rows.start, rows.stop, _pointer(found), _pointer(scratch),
         )  # fmt: skip
 
     @cached_property

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
 from mracad.inspect import tally
-from mracad.inspect.curvature import forms
+from mracad.inspect.curvature import BENT, FORMS, Forms, shapes
 from mracad.inspect.ramp import STEEP
 from mracad.inspect.roughness import Change, Growth, Rougher, Roughness, worse
 from mracad.inspect.survey import POINTS, RIPPLE, surveys
@@ -62,8 +62,8 @@ def test_what_rounding_leaves_of_a_pole_is_no_curvature(size):
     """S_u as good as nothing at right angles to S_v: powers of it would be no numbers, which nothing compares with."""
     jet = np.random.default_rng(0).standard_normal((10, 3, 1))
     jet[1, :, 0], jet[2, :, 0] = (size, 0, 0), (0, 1, 0)
-    found = forms([jet])
-    assert not found.regular.any() and not found.bent.any() and not found.largest.any()
+    found = Forms(shapes([jet], FORMS))
+    assert not found.regular.any() and not found.largest.any() and not shapes([jet], BENT).any()
 
 
 @pytest.mark.parametrize(("degree", "rational"), [(2, False), (3, True), (5, True)])
