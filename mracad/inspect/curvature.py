@@ -17,8 +17,8 @@ VOID = 1e-40
 """|S_u × S_v| up to which a surface counts as degenerate too: powers of smaller numbers underflow."""
 
 FORMS, BENT = slice(0, 8), slice(8, 13)
-"""What :func:`figures` returns: the rows of :class:`Forms`; and in the frame of S_u / |S_u| and the tangent normal to it,
-components 11, 12 and 22 of the shape operator, and the gradient of the mean curvature."""
+"""What :func:`figures` returns: the rows of :class:`Forms`; and in the frame of S_u / |S_u| and the tangent normal to
+it, components 11, 12 and 22 of the shape operator, and the gradient of the mean curvature."""
 
 
 @dataclass(frozen=True, eq=False)
