@@ -143,11 +143,6 @@ def whole(parts: Sequence[Any]) -> Any:
     return parts[0] if len(parts) == 1 else block_diag(parts, format="csr")
 
 
-def by_rows(matrix: Any) -> Any:
-    """A symmetric matrix or None, as ``scipy.sparse.csr_array`` if it is by columns."""
-    return matrix.T if matrix is not None and matrix.format == "csc" else matrix
-
-
 class Cholesky:
     """The factor of a symmetric positive definite matrix.
 

@@ -101,8 +101,7 @@ class Rows:
 
     def form(self, limits: Array) -> Any:
         """``Cᵀ W C``, ``(points, points)``, W the widths over the squared limits ``(conditions,)``."""
-        scaled = self.matrix.multiply((np.sqrt(self.width) / limits)[:, None]).tocsr()
-        return scaled.T @ scaled
+        return _squared(self.matrix, np.sqrt(self.width) / limits)
 
     def pull(self, wanted: Array, limits: Array) -> Array:
         """``Cᵀ W wanted``, ``(points, 3)``: the pull of the contacts towards values ``(conditions, 3)``."""
@@ -153,6 +152,34 @@ def rows(nets: Mapping[int, Net], contacts: Sequence[Contact]) -> Rows:
         (np.concatenate(values), (np.concatenate(places), np.concatenate(columns))), shape=(count, total)
     )
     return Rows(matrix, np.concatenate(orders), np.concatenate(widths), np.concatenate(owners))
+
+
+def _squared(matrix: Any, factors: Array) -> Any:
+    """The square Aᵀ A of a matrix times factors ``(rows,)``, ``scipy.sparse.csr_array``.
+
+    Rows with the same columns, as of the places in one span, are multiplied at once.
+    """
+    from scipy.sparse import csr_array
+
+    n, lengths = matrix.shape[1], np.diff(matrix.indptr)
+    total = csr_array((n, n))
+    for length in np.unique(lengths[lengths > 0]).tolist():
+        those = np.flatnonzero(lengths == length)
+        at = matrix.indptr[those, None] + np.arange(length)
+        columns = matrix.indices[at]
+        marks = columns @ np.random.default_rng(0).integers(1 << 62, size=length)
+        _, first, group = np.unique(marks, return_index=True, return_inverse=True)
+        order = np.argsort(group, kind="stable")
+        values, columns = matrix.data[at[order]] * factors[those[order], None], columns[first]
+        blocks = np.empty((len(first), length, length))
+        for block, rows in zip(blocks, np.split(values, np.cumsum(np.bincount(group))[:-1]), strict=True):
+            np.matmul(rows.T, rows, out=block)
+        entries = blocks.ravel(), np.repeat(columns, length, axis=0).ravel(), np.arange(columns.size + 1) * length
+        every = csr_array(entries, shape=(columns.size, n))
+        ends = np.append(0, np.cumsum(np.bincount(columns.ravel(), minlength=n)))
+        where = np.ones(columns.size), np.argsort(columns, axis=None, kind="stable"), ends
+        total = total + csr_array(where, shape=every.shape[::-1]) @ every
+    return total
 
 
 def _asked(contact: Contact) -> list[tuple[int, bool]]:

@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 
 from mracad.bspline.surface import Net
-from mracad.seam.bands import Bands, Blocks, by_rows, whole
+from mracad.seam.bands import Bands, Blocks, whole
 from mracad.seam.constrained import Banded, Constrained
 from mracad.seam.divided import LEFT, Divided
 from mracad.seam.energy import Forms
@@ -141,10 +141,10 @@ class Problem:
 
         self.spaces, self.effort, self.guides = spaces, effort, guides
         soft = soft or Soft(None)
-        self.soft, self.between, pull = by_rows(soft.form), by_rows(soft.between), soft.pull
+        self.soft, self.between = (None if each is None else each.tocsr() for each in (soft.form, soft.between))
         self.rows = csr_array((0, sum(s.free.size for s in spaces.values()))) if rows is None else rows
         self.goal = goal if goal is not None and goal.any() else None
-        self.pull = pull if pull is not None and pull.any() else None
+        self.pull = soft.pull if soft.pull is not None and soft.pull.any() else None
         more = [each for each in (self.soft, self.between) if each is not None and len(spaces) == 1]
         self.bands = [_bands(space, more) for space in spaces.values()]
         self.mass, self.bending, self.creases = (Blocks(self.bands, number) for number in range(3))

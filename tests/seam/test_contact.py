@@ -169,6 +169,18 @@ def test_weights_are_inverse_squares_and_pull_where_wanted():
     assert np.abs(pull - form @ delta).max() < 1e-9 * np.abs(pull).max()
 
 
+def test_the_form_is_the_square_of_conditions_with_different_numbers_of_control_points():
+    contacts = [
+        contact_of(),
+        Contact(Trace(0, 0, segment((0.1, 0.9), (0.8, 0))), Trace(1, 1, segment((0, 0), (1, 1))), 1),
+    ]
+    found = rows({0: plane(3), 1: plane(5)}, contacts)
+    assert len(set(np.diff(found.matrix.indptr).tolist())) == 2
+    limits = np.random.default_rng(0).uniform(0.1, 1.0, len(found.order))
+    dense = found.matrix.toarray() * (np.sqrt(found.width) / limits)[:, None]
+    assert np.abs(found.form(limits).toarray() - dense.T @ dense).max() < 1e-12 * (dense**2).sum(axis=0).max()
+
+
 def test_contacts_may_lack_what_they_lacked_and_a_little_more():
     net = plane(3)
     found = rows({0: net}, [contact_of()])
