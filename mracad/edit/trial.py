@@ -14,7 +14,7 @@ from mracad.edit.jumps import Jumps
 from mracad.edit.pose import Scene, pose
 from mracad.edit.target import Sheet, eased, stiffness
 from mracad.edit.tolerances import Tolerances
-from mracad.edit.watch import BISECTIONS, Tried, Watch, amounts, displaced
+from mracad.edit.watch import PART, STEPS, Tried, Watch, amounts, displaced
 from mracad.inspect.places import Placed
 from mracad.inspect.roughness import Change, Worse, better, places, worse
 from mracad.seam.interface import Joints
@@ -156,18 +156,18 @@ class Trial:
         tried, nearer = Tried(self.watch, self.nets, self._split(delta)), self.gains(delta, target)
         if wholly:
             return self._verdict(tried, nearer, np.zeros(len(self.nets)), 0)
-        return self._verdict(tried, nearer, self._floor(nearer, others), BISECTIONS[len(self.nets) > 1])
+        return self._verdict(tried, nearer, self._floor(nearer, others), STEPS[len(self.nets) > 1])
 
     def shared(self, verdict: Verdict, others: Sequence[Verdict]) -> Verdict:
         """The verdict on the displacement of one that knows only what is allowed in full."""
         floor = self._floor(verdict.nearer, others)
-        return self._verdict(verdict.tried, verdict.nearer, floor, BISECTIONS[len(self.nets) > 1])
+        return self._verdict(verdict.tried, verdict.nearer, floor, STEPS[len(self.nets) > 1])
 
     def settled(self, verdict: Verdict) -> Verdict:
         """The same verdict, with amounts found in more steps."""
         if not verdict.least or verdict.least == 1.0:
             return verdict
-        return self._verdict(verdict.tried, verdict.nearer, np.zeros(len(self.nets)), BISECTIONS[1])
+        return self._verdict(verdict.tried, verdict.nearer, np.zeros(len(self.nets)), STEPS[1])
 
     def left(self, verdict: Verdict, shares: Sequence[float]) -> Verdict:
         """The same verdict with other amounts."""
@@ -226,9 +226,11 @@ class Trial:
     def _shares(self, tried: Tried) -> Array:
         """The largest of :data:`SHARES` of a displacement that makes no place rougher, smoothed, ``(points, 1)``."""
         found: dict[tuple[int, int], tuple[Placed, Array]] = {}
+        for amount in (PART, 1.0):
+            tried.changes(dict.fromkeys(range(len(self.nets)), amount))
         for amount in SHARES:
-            for i, faces in tried.changes(dict.fromkeys(range(len(self.nets)), amount)).items():
-                for face, change in faces.items():
+            for i in range(len(self.nets)):
+                for face, change in tried.about(i, amount).items():
                     assert change.placed is not None
                     _, share = found.get((i, face), (None, np.zeros(change.placed.area.shape)))
                     share = np.where(places(change, self.tolerances.growth), share, amount)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -11,14 +13,17 @@ import numpy as np
 from mracad.bspline.surface import Net
 from mracad.edit.tolerances import Tolerances
 from mracad.inspect.ramp import Ramp
-from mracad.inspect.roughness import Change, Worse, worse
+from mracad.inspect.roughness import Change, Worse, between, worse
 from mracad.inspect.survey import POINTS, Survey, surveys
 from mracad.model.brep import Face
 
 Array = np.ndarray
 
-BISECTIONS = 3, 5
-"""Bisections by which an amount is found: few among several displacements of one surface, otherwise more."""
+STEPS = 8, 32
+"""Steps in which an amount is found: few among several displacements of one surface, otherwise more."""
+
+PART, MEASURED = 0.25, 4
+"""The part of a displacement that is measured where the whole is too much; how many amounts are measured at most."""
 
 SINGULAR = 1e5
 """Curvature over the wavelength above which a face is singular."""
@@ -59,6 +64,11 @@ class Watch:
         bases = [base for _, base, *_ in every] if np.isfinite(self.reaches).all() else ()
         return surveys(looked, self.points, SINGULAR / self.width, [reach for *_, reach in every], bases)
 
+    @cached_property
+    def at_rest(self) -> dict[int, Mapping[int, Change]]:
+        """The changes of the faces of each surface after none of a displacement, with those of places, once known."""
+        return {}
+
     def ramp(self, parts: Sequence[Array]) -> Ramp:
         """The faces along displacements of the surfaces."""
         return Ramp(self.surveys, [parts[place] for place, _ in self.owners])
@@ -86,7 +96,7 @@ class Tried:
     watch: Watch
     nets: Sequence[Net]
     parts: Sequence[Array]
-    _seen: dict[tuple[int, float], Mapping[int, Change]] = field(default_factory=dict)
+    _seen: dict[int, dict[float, Mapping[int, Change]]] = field(default_factory=lambda: defaultdict(dict))
 
     @cached_property
     def ramp(self) -> Ramp:
@@ -95,20 +105,37 @@ class Tried:
 
     def changes(self, amounts: Mapping[int, float]) -> dict[int, Mapping[int, Change]]:
         """The changes of the faces of each surface after the given amount of its displacement."""
-        new = {i for i, amount in amounts.items() if (i, amount) not in self._seen}
+        new = {i for i, amount in amounts.items() if amount not in self._seen[i]}
         those = [k for k, (place, _) in enumerate(self.watch.owners) if place in new]
         found: dict[int, dict[int, Change]] = {i: {} for i in new}
         for k, change in self.ramp.changes({k: amounts[self.watch.owners[k][0]] for k in those}).items():
             place, face = self.watch.owners[k]
             found[place][face] = change
-        self._seen.update({(i, amounts[i]): faces for i, faces in found.items()})
-        return {i: self._seen[i, amount] for i, amount in amounts.items()}
+        for i, faces in found.items():
+            self._seen[i][amounts[i]] = faces
+        return {i: self._seen[i][amount] for i, amount in amounts.items()}
+
+    def measured(self, i: int) -> list[float]:
+        """The amounts of the displacement of a surface that have been evaluated, increasing."""
+        return sorted(self._seen[i])
+
+    def about(self, i: int, amount: float) -> Mapping[int, Change]:
+        """About the changes of the faces of a surface after an amount of its displacement, from those that are
+        known."""
+        seen = self._seen[i]
+        if amount in seen:
+            return seen[amount]
+        seen[0.0] = self.watch.at_rest.get(i) or self.changes({i: 0.0})[i]
+        self.watch.at_rest[i] = seen[0.0]
+        return {face: between({at: faces[face] for at, faces in seen.items()}, amount) for face in seen[0.0]}
 
 
 def amounts(
-    tried: Tried, floor: Array, ceiling: Array, tolerances: Tolerances, steps: int = BISECTIONS[1]
+    tried: Tried, floor: Array, ceiling: Array, tolerances: Tolerances, steps: int = STEPS[1]
 ) -> tuple[list[float], list[Mapping[int, Change]], list[tuple[Worse, ...]]]:
-    """For each surface the largest amount of its displacement that makes no face rougher, by bisection.
+    """For each surface the largest amount of its displacement that makes no face rougher.
+
+    Where the ceiling is too much, a part of it is measured, and then only what will probably be the largest.
 
     Parameters
     ----------
@@ -117,22 +144,54 @@ def amounts(
         Amounts below which nothing is done, and that must not be exceeded.
     tolerances : Tolerances
     steps : int
-        Bisections.
+        The amount is found in steps of this part of the ceiling.
     """
-    low, high = np.zeros(len(floor)), np.where(floor < ceiling, ceiling, 0.0)
-    best: list[Mapping[int, Change]] = [*tried.watch.still()]
-    why: list[tuple[Worse, ...]] = [()] * len(floor)
-    for step in range(steps + 1):
-        test = high if not step else np.where(low < floor, floor, (low + high) / 2)
-        now = {i: float(test[i]) for i in np.flatnonzero(low < high).tolist()}
-        for i, faces in tried.changes(now).items():
-            wrong = tuple(w for each in faces.values() for w in worse(each, tolerances.growth))
-            far = any(each.deviation > tolerances.deviation * (1 + 1e-9) for each in faces.values())
+    search = _Search(tried, np.where(floor < ceiling, np.inf, 0.0), tolerances)
+    for i, most in enumerate(ceiling):
+        for amount in tried.measured(i):
+            if amount <= most:
+                search.measure(np.where(np.arange(len(floor)) == i, amount, 0.0))
+    search.measure(ceiling)
+    search.measure(np.maximum(floor, PART * ceiling))
+    for _ in range(MEASURED - 2):
+        choices = (most * np.arange(steps) / steps for most in ceiling)
+        search.measure(np.array([search.likely(i, each[each > floor[i]]) for i, each in enumerate(choices)]))
+    return search.low.tolist(), search.best, search.why
+
+
+class _Search:
+    """The largest amounts that were allowed so far, ``low``, and the least that were not, ``high``."""
+
+    def __init__(self, tried: Tried, high: Array, tolerances: Tolerances) -> None:
+        self._tried = tried
+        self._tolerances = tolerances
+        self.low, self.high = np.zeros(len(high)), high
+        self.best: list[Mapping[int, Change]] = [*tried.watch.still()]
+        self.why: list[tuple[Worse, ...]] = [()] * len(high)
+
+    def measure(self, amounts: Array) -> None:
+        """Measure an amount of the displacement of each surface, where it may be the largest allowed."""
+        those = np.flatnonzero((self.low < amounts) & (amounts < self.high)).tolist()
+        for i, faces in self._tried.changes({i: float(amounts[i]) for i in those}).items():
+            wrong, far = _wrong(faces, self._tolerances)
             if wrong or far:
-                high[i], why[i] = (now[i] if now[i] > floor[i] else 0.0), why[i] or wrong
+                self.high[i], self.why[i] = amounts[i], self.why[i] or wrong
             else:
-                low[i], best[i] = now[i], faces
-    return low.tolist(), best, why
+                self.low[i], self.best[i] = amounts[i], faces
+
+    def likely(self, i: int, choices: Array) -> float:
+        """The largest of some increasing amounts of the displacement of a surface that will probably be allowed, if it
+        was neither allowed nor refused; 0 for none."""
+        inside = choices[(self.low[i] < choices) & (choices < self.high[i])].tolist()
+        about, tolerances = self._tried.about, self._tolerances
+        count = bisect_left(inside, True, key=lambda amount: any(_wrong(about(i, amount), tolerances)))
+        return float(inside[count - 1]) if count else 0.0
+
+
+def _wrong(faces: Mapping[int, Change], tolerances: Tolerances) -> tuple[tuple[Worse, ...], bool]:
+    """The figures by which faces are rougher than allowed, and whether one moves too far."""
+    wrong = tuple(w for each in faces.values() for w in worse(each, tolerances.growth))
+    return wrong, any(each.deviation > tolerances.deviation * (1 + 1e-9) for each in faces.values())
 
 
 def displaced(net: Net, offset: Array) -> Net:

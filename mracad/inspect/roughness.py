@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
 from enum import Enum
+from typing import Any, cast
 
 import numpy as np
 
@@ -25,6 +28,9 @@ class Rougher(Enum):
 
 
 SUMS = Rougher.BENDING, Rougher.VARIATION
+
+ALWAYS = frozenset({"before", "noise", "area", "ends"})
+"""What every amount of a change has in common."""
 
 SETTLED = 0.005
 """Share by which the curvature at singular points may change."""
@@ -208,3 +214,23 @@ def better(change: Change, share: float, local: float = np.inf, mean: float = 0.
     noise = change.noise.bending, change.noise.variation
     whole = any(old - new > share * old + ripple for (old, new), ripple in zip(both, noise, strict=True))
     return whole or (change.lost > local and change.fairer > mean)
+
+
+def between(known: Mapping[float, Change], amount: float) -> Change:
+    """About the change after an amount of a displacement: a parabola through the three nearest that are known.
+
+    Sums over places are nearly quadratic in the amount, motions linear.
+    """
+    near = sorted(known, key=lambda at: abs(at - amount))[:3]
+    weights = [math.prod((amount - other) / (at - other) for other in near if other != at) for at in near]
+    return cast(Change, _mixed([known[at] for at in near], weights))
+
+
+def _mixed(parts: Sequence[Any], weights: Sequence[float]) -> Any:
+    """The weighted sum of figures, also of arrays and of those within objects."""
+    if isinstance(parts[0], float | np.ndarray):
+        return sum(weight * part for weight, part in zip(weights, parts, strict=True))
+    if not isinstance(parts[0], Change | Roughness | Placed):
+        return parts[0]
+    names = (each.name for each in fields(parts[0]) if each.name not in ALWAYS)
+    return replace(parts[0], **{name: _mixed([getattr(part, name) for part in parts], weights) for name in names})
