@@ -22,6 +22,9 @@ Array = np.ndarray
 STEPS = 8, 32
 """Steps in which an amount is found: few among several displacements of one surface, otherwise more."""
 
+LEAST = 1 / 32, 1 / 16
+"""Amounts below all steps: part of a wave less is worth something, too."""
+
 PART, MEASURED = 0.25, 4
 """The part of a displacement that is measured where the whole is too much; how many amounts are measured at most."""
 
@@ -144,7 +147,7 @@ def amounts(
         Amounts below which nothing is done, and that must not be exceeded.
     tolerances : Tolerances
     steps : int
-        The amount is found in steps of this part of the ceiling.
+        The amount is found in this number of steps up to the ceiling; two more are very small.
     """
     search = _Search(tried, np.where(floor < ceiling, np.inf, 0.0), tolerances)
     for i, most in enumerate(ceiling):
@@ -154,7 +157,7 @@ def amounts(
     search.measure(ceiling)
     search.measure(np.maximum(floor, PART * ceiling))
     for _ in range(MEASURED - 2):
-        choices = (most * np.arange(steps) / steps for most in ceiling)
+        choices = (most * np.unique([*LEAST, *np.arange(1, steps) / steps]) for most in ceiling)
         search.measure(np.array([search.likely(i, each[each > floor[i]]) for i, each in enumerate(choices)]))
     return search.low.tolist(), search.best, search.why
 
