@@ -23,7 +23,7 @@ STEPS = 8, 32
 """Steps in which an amount is found: few among several displacements of one surface, otherwise more."""
 
 LEAST = 1 / 32, 1 / 16
-"""Amounts below all steps: part of a wave less is worth something, too."""
+"""Amounts below all steps."""
 
 PART, MEASURED = 0.25, 4
 """The part of a displacement that is measured where the whole is too much; how many amounts are measured at most."""
