@@ -147,14 +147,15 @@ def amounts(
         Amounts below which nothing is done, and that must not be exceeded.
     tolerances : Tolerances
     steps : int
-        The amount is found in this number of steps up to the ceiling; two more are very small.
+        The amount is found in this number of steps up to the ceiling; two more are very small. With 0,
+        the ceiling is all that is tried.
     """
     search = _Search(tried, np.where(floor < ceiling, np.inf, 0.0), tolerances)
     for i, most in enumerate(ceiling):
-        for amount in tried.measured(i):
-            if amount <= most:
-                search.measure(np.where(np.arange(len(floor)) == i, amount, 0.0))
+        search.recall(i, float(most))
     search.measure(ceiling)
+    if not steps:
+        return search.low.tolist(), search.best, search.why
     search.measure(np.maximum(floor, PART * ceiling))
     for _ in range(MEASURED - 2):
         choices = (most * np.unique([*LEAST, *np.arange(1, steps) / steps]) for most in ceiling)
@@ -176,11 +177,20 @@ class _Search:
         """Measure an amount of the displacement of each surface, where it may be the largest allowed."""
         those = np.flatnonzero((self.low < amounts) & (amounts < self.high)).tolist()
         for i, faces in self._tried.changes({i: float(amounts[i]) for i in those}).items():
-            wrong, far = _wrong(faces, self._tolerances)
-            if wrong or far:
-                self.high[i], self.why[i] = amounts[i], self.why[i] or wrong
-            else:
-                self.low[i], self.best[i] = amounts[i], faces
+            self._take(i, float(amounts[i]), faces)
+
+    def recall(self, i: int, most: float) -> None:
+        """Take amounts of the displacement of a surface that were measured before, up to a ceiling."""
+        for amount in self._tried.measured(i):
+            if self.low[i] < amount < self.high[i] and amount <= most:
+                self._take(i, amount, self._tried.changes({i: amount})[i])
+
+    def _take(self, i: int, amount: float, faces: Mapping[int, Change]) -> None:
+        wrong, far = _wrong(faces, self._tolerances)
+        if wrong or far:
+            self.high[i], self.why[i] = amount, self.why[i] or wrong
+        else:
+            self.low[i], self.best[i] = amount, faces
 
     def likely(self, i: int, choices: Array) -> float:
         """The largest of some increasing amounts of the displacement of a surface that will probably be allowed, if it
