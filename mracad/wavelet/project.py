@@ -22,7 +22,8 @@ from mracad.wavelet.ladder import arc_lengths, ladder_for_scale
 _SMALL = 256  # control points up to which the dense operator is as fast, and avoids loading LAPACK's banded solvers
 _TAME = 1e3
 """Ratio of the largest to the least pivot of the scaled normal equations up to which they lose few digits."""
-_LOW_DEGREE = 5
+_LOW_DEGREE = 10
+"""Degree up to which they lose at most five digits."""
 
 
 class Projection:
@@ -184,7 +185,7 @@ def projection(coarse: KnotVector, fine: KnotVector, weights: Array | None = Non
 
     Notes
     -----
-    Normal equations are used up to degree 5 on moderately uneven knots.  Beyond that, where they would square a large
+    Normal equations are used up to degree 10 on moderately uneven knots.  Beyond that, where they would square a large
     condition number, ``√W B'`` is triangularised orthogonally (QR) block by block, with ``B'`` the coarse basis at the
     Gauss points.
 
