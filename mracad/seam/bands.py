@@ -111,7 +111,7 @@ class Bands:
         total = np.zeros((len(self.points), self.width + 1))
         for weight, lower in zip(weights, self.lower, strict=True):
             if weight and lower is not None:
-                total += weight * lower
+                total += lower if weight == 1.0 else weight * lower
         return total
 
 
