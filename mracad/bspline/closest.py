@@ -14,6 +14,7 @@ from mracad.bspline.surface import Net
 Array = np.ndarray
 _STEPS = 30
 _SEEDS = 3  # with one, a point near a thin edge may end on the wrong side of it
+_SETTLED = 1e-14, 1e-8  # shares of the surface's extent and of the distance; shorter steps do not change the distance
 _PLACES = 100  # least number of places in each direction
 
 
@@ -59,7 +60,7 @@ def feet(net: Net, points: Array, uv: Array) -> tuple[Array, Array]:
     uv, best = _descend(net, points, uv)
     # near their minimum, distances hardly depend on parameters
     low, high = _limits(net)
-    tried = np.clip(uv + _newton(net, points, uv, low, high), low, high)
+    tried = np.clip(uv + _newton(net, points, uv, low, high)[0], low, high)
     good = np.linalg.norm(net.evaluate(tried) - points, axis=1) <= best * (1 + 1e-15)
     return np.where(good[:, None], tried, uv), best
 
@@ -76,9 +77,11 @@ def _descend(net: Net, points: Array, uv: Array) -> tuple[Array, Array]:
     low, high = _limits(net)
     uv = np.clip(uv, low, high)
     best = np.linalg.norm(net.evaluate(uv) - points, axis=1)
-    active = np.arange(len(points))
+    active, extent = np.arange(len(points)), float(np.linalg.norm(np.ptp(net.poles, axis=(0, 1))))
     for _ in range(_STEPS):
-        step = _newton(net, points[active], uv[active], low, high)
+        step, length = _newton(net, points[active], uv[active], low, high)
+        far = length > np.maximum(_SETTLED[0] * extent, _SETTLED[1] * best[active])
+        active, step = active[far], step[far]
         moved = np.zeros(len(active), bool)
         share = 1.0
         while share > 1e-3 and not moved.all():
@@ -96,8 +99,8 @@ def _descend(net: Net, points: Array, uv: Array) -> tuple[Array, Array]:
     return uv, best
 
 
-def _newton(net: Net, points: Array, uv: Array, low: Array, high: Array) -> Array:
-    """One step each."""
+def _newton(net: Net, points: Array, uv: Array, low: Array, high: Array) -> tuple[Array, Array]:
+    """One step each, and how far it goes on the surface."""
     s, su, sv, suu, suv, svv = net.evaluate(uv, 2)
     r = s - points
     gradient = np.stack([(r * su).sum(1), (r * sv).sum(1)], axis=1)
@@ -111,4 +114,5 @@ def _newton(net: Net, points: Array, uv: Array, low: Array, high: Array) -> Arra
     tiny = np.finfo(float).tiny
     determinant = np.maximum(a * c - b * b, 1e-14 * a * c + tiny)
     step = np.stack([b * gradient[:, 1] - c * gradient[:, 0], b * gradient[:, 0] - a * gradient[:, 1]], axis=1)
-    return np.asarray(step / determinant[:, None])
+    step /= determinant[:, None]
+    return step, np.linalg.norm(step[:, :1] * su + step[:, 1:] * sv, axis=1)
