@@ -189,6 +189,7 @@ def measure_solve(source: Path) -> None:
 
     from mracad.occ.step import read_step
     from mracad.occ.view import view
+    from mracad.seam import constrained
     from mracad.seam.solve import Effort, Problem
 
     problem, assembly = timed(lambda: group(view(read_step(source))))
@@ -198,6 +199,7 @@ def measure_solve(source: Path) -> None:
     off = float(np.abs(problem.rows @ found).max() / np.abs(found).max())
     line = f"solve {own:.2f} s, {memory:.0f} MB, |Lδ| / |δ| {off:.0e}"
     if len(found) <= WHOLE:
+        constrained.MANY = sys.maxsize  # multipliers for all conditions
         again = Problem(problem.spaces, problem.rows, effort=Effort(direct=sys.maxsize))
         whole, peer = timed(lambda: again.filtered(stiffness))
         apart = float(np.abs(found - whole).max() / np.abs(whole).max())
