@@ -24,7 +24,7 @@ def of_edge(ground: Ground, number: int, scale: float) -> Feet:
     """Points along an edge, evenly, both ends among them."""
     face, trace = edge_of(ground, number, "at", "give an edge as edge#4")
     assert face.surface is not None
-    points = ground.patches[face.surface].evaluate(trace.places(EVENLY))[0]
+    points = ground.patches[face.surface].evaluate(trace.evenly)[0]
     length = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
     count = 2 * math.ceil(length[-1] / (2 * APART * scale)) + 1
     uv = trace.places(np.interp(np.linspace(0.0, length[-1], count), length, EVENLY))

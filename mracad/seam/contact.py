@@ -94,10 +94,11 @@ class Rows:
         tolerances : ndarray (contacts, 3)
             Allowed growth, for each order.
         """
-        old, worst = np.linalg.norm(opened, axis=1), np.zeros((int(self.owner.max(initial=-1)) + 1, 3))
-        np.maximum.at(worst, (self.owner, self.order), old)
-        most = np.where(self.order == 0, old, worst[self.owner, self.order])
-        return np.asarray(most + tolerances[self.owner, self.order])
+        old, worst = np.linalg.norm(opened, axis=1), np.zeros(3 * (int(self.owner.max(initial=-1)) + 1))
+        place = 3 * self.owner + self.order
+        np.maximum.at(worst, place, old)
+        most = np.where(self.order == 0, old, worst[place])
+        return np.asarray(most + tolerances.ravel()[place])
 
     def form(self, limits: Array) -> Any:
         """``Cᵀ W C``, ``(points, points)``, W the widths over the squared limits ``(conditions,)``."""
@@ -129,29 +130,68 @@ def rows(nets: Mapping[int, Net], contacts: Sequence[Contact]) -> Rows:
     from scipy.sparse import csr_array
 
     first, total = laid_out(nets)
-    places, columns, values = [np.empty(0, int)], [np.empty(0, int)], [np.empty(0)]
-    orders, widths, owners, count = [np.empty(0, int)], [np.empty(0)], [np.empty(0, int)], 0
-    for number, contact in enumerate(contacts):
-        sides = [contact.a] + ([contact.b] if contact.b else [])
-        highest = max(knots.degree for side in sides for knots in (nets[side.surface].u, nets[side.surface].v))
-        share, part = pieces(sides, nets, highest + MORE)
-        ways = directions(nets, contact.a, contact.b or contact.a, share)
-        width = contact.a.length(nets[contact.a.surface]) * part
-        for order, along in _asked(contact):
-            row = count + np.arange(len(share))
-            for side, (way, bend, tangent), sign in zip(sides, ways, (1.0, -1.0), strict=False):
-                index, table = functions(nets[side.surface], side.places(share), order, side.limits)
-                places.append(np.repeat(row, index.shape[1]))
-                columns.append(first[side.surface] + index.ravel())
-                values.append(sign * derived(table, tangent if along else way, bend, order).ravel())
-            orders.append(np.full(len(share), order))
-            widths.append(width)
-            owners.append(np.full(len(share), number))
-            count += len(share)
-    matrix = csr_array(
-        (np.concatenate(values), (np.concatenate(places), np.concatenate(columns))), shape=(count, total)
-    )
-    return Rows(matrix, np.concatenate(orders), np.concatenate(widths), np.concatenate(owners))
+    parts = [_part(nets, first, contact) for contact in contacts]
+    places = np.array([len(part.width) * len(part.orders) for part in parts], int)
+    ends = np.cumsum(np.append(0, np.repeat([part.index.shape[1] for part in parts], places)), dtype=np.int32)
+    index = _joined([np.broadcast_to(part.index, part.values.shape).ravel() for part in parts], np.int32)
+    values = _joined([part.values.ravel() for part in parts], float)
+    order = _joined([np.repeat(part.orders, len(part.width)) for part in parts], int)
+    width = _joined([np.tile(part.width, len(part.orders)) for part in parts], float)
+    matrix = csr_array((values, index, ends), shape=(len(order), total))
+    return Rows(matrix, order, width, np.repeat(np.arange(len(parts)), places))
+
+
+def _joined(parts: Sequence[Array], kind: type) -> Array:
+    return np.concatenate([*parts, np.empty(0, kind)])
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """The conditions on one contact: each of some orders at the same places.
+
+    Attributes
+    ----------
+    index : ndarray (q, k) of int
+        Control points on which those at a place depend.
+    values : ndarray (n, q, k)
+    orders : list of int
+        Of length n.
+    width : ndarray (q,)
+        Length that each place represents, mm.
+    """
+
+    index: Array
+    values: Array
+    orders: list[int]
+    width: Array
+
+
+def _part(nets: Mapping[int, Net], first: Mapping[int, int], contact: Contact) -> _Part:
+    sides = [contact.a] + ([contact.b] if contact.b else [])
+    highest = max(knots.degree for side in sides for knots in (nets[side.surface].u, nets[side.surface].v))
+    share, part = pieces(sides, nets, highest + MORE)
+    found = [functions(nets[side.surface], side.places(share), contact.order, side.limits) for side in sides]
+    ways = [(share, share, share)] * len(sides)
+    if contact.order:
+        jets = [_jets(nets[side.surface], *each) for side, each in zip(sides, found, strict=True)]
+        ways = directions(jets, contact.a.way(share))
+    index = np.concatenate([first[side.surface] + i for side, (i, _) in zip(sides, found, strict=True)], axis=1)
+    asked = _asked(contact)
+    values = np.empty((len(asked), *index.shape))
+    for (order, along), value in zip(asked, np.split(values, len(asked)), strict=True):
+        each = [
+            derived(table, tangent if along else way, bend, order)
+            for (_, table), (way, bend, tangent) in zip(found, ways, strict=True)
+        ]
+        value[0, :, : each[0].shape[1]] = each[0]
+        value[0, :, each[0].shape[1] :] = -each[1] if len(each) > 1 else 0.0
+    width = contact.a.length(nets[contact.a.surface]) * part
+    return _Part(index.astype(np.int32), values, [order for order, _ in asked], width)
+
+
+def _jets(net: Net, index: Array, table: Sequence[Array]) -> Array:
+    """A surface and its derivatives, ``(len(table), q, 3)``, from its functions at places."""
+    return np.asarray(np.matmul(np.stack(table, axis=1), net.poles.reshape(-1, 3)[index]).swapaxes(0, 1))
 
 
 def _squared(matrix: Any, factors: Array) -> Any:

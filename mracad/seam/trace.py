@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -12,7 +13,8 @@ from mracad.bspline.curve import Curve
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.knots import Side as Limit
 from mracad.bspline.surface import Net
-from mracad.bspline.vectors import components, unit
+from mracad.bspline.vectors import components, cross, unit
+from mracad.memo import kept
 from mracad.model.brep import Face, Model, Trim
 from mracad.model.region import meeting
 from mracad.model.sampling import length, shares
@@ -66,6 +68,11 @@ class Trace:
             uv[:, self.line[0]] = self.line[1]
         return np.asarray(uv)
 
+    @cached_property
+    def evenly(self) -> Array:
+        """Parameters at the fractions ``EVENLY``."""
+        return self.places(EVENLY)
+
     def on(self, net: Net, share: Array, derivatives: int) -> tuple[Array, ...]:
         """A surface and its derivatives at fractions of the seam, seen from inside the face."""
         return tuple(np.asarray(x) for x in net.evaluate(self.places(share), derivatives, self.limits))
@@ -92,7 +99,7 @@ class Trace:
 
     def length(self, net: Net) -> float:
         """Length of the trace on a surface, mm."""
-        return length(net.evaluate(self.places(EVENLY[::8])))
+        return length(net.evaluate(self.evenly[::8]))
 
     def way(self, share: Array) -> Array:
         """Derivative of the curve by its own fraction, in the sense of the seam, ``(q, 2)``."""
@@ -111,6 +118,7 @@ def along(border: Border) -> Trace:
     return Trace(border.face, border.surface, ends, line=(border.axis, border.at), limits=border.limits("right"))
 
 
+@kept(1024)
 def trace_of(model: Model, face: Face, trim: Trim) -> Trace:
     """The trace by which a face meets one of its edges."""
     assert face.surface is not None
@@ -125,7 +133,7 @@ def crossings(trace: Trace, spaces: tuple[KnotVector, KnotVector]) -> Array:
     """Fractions of the edge, 0 and 1 among them, at which a trace crosses the knot lines of a space."""
     share = EVENLY
     found = [share[[0, -1]]]
-    for knots, x in zip(spaces, trace.places(share).T, strict=True):
+    for knots, x in zip(spaces, trace.evenly.T, strict=True):
         lines = knots.breaks
         if knots.periodic:
             lines = np.unique(lines[None] + knots.period * np.arange(-2, 3)[:, None])
@@ -163,28 +171,35 @@ def derived(table: Sequence[Array], way: Array, bend: Array, order: int) -> Arra
     -------
     ndarray (q, k)
     """
-    x, y = way[:, :1], way[:, 1:]
     if order == 0:
         return table[0]
+    x, y = way[:, :1], way[:, 1:]
     if order == 1:
         return np.asarray(x * table[1] + y * table[2])
     twice = x * x * table[3] + 2 * x * y * table[4] + y * y * table[5]
     return np.asarray(twice + bend[:, :1] * table[1] + bend[:, 1:] * table[2])
 
 
-def directions(ground: Mapping[int, Net], a: Trace, b: Trace, share: Array) -> list[tuple[Array, Array, Array]]:
-    """For a and b the directions c, z and t ``(q, 2)`` in the parameter planes, t the unit tangent of a."""
-    _, su, sv, *second = a.on(ground[a.surface], share, 2)
-    way = a.way(share)
+def directions(jets: Sequence[Sequence[Array] | Array], way: Array) -> list[tuple[Array, Array, Array]]:
+    """For one or two sides of a seam the directions c, z and t ``(q, 2)`` in the parameter planes, t the unit tangent.
+
+    Parameters
+    ----------
+    jets : sequence of sequence of ndarray (q, 3)
+        The surface of each side and its derivatives at places of the seam, up to the first for z = 0, or the second.
+    way : ndarray (q, 2)
+        Direction of the seam in the parameter plane of the first.
+    """
+    _, su, sv, *second = jets[0]
     tangent = unit(su * way[:, :1] + sv * way[:, 1:])
-    conormal = unit(np.cross(np.cross(su, sv), tangent))
-    _, tu, tv, *other = b.on(ground[b.surface], share, 2)
-    ways = components(su, sv, conormal), components(tu, tv, conormal)
-    bends = [_twice(x, y) for x, y in zip(ways, (second, other), strict=True)]
-    return [
-        (ways[0], np.zeros_like(way), components(su, sv, tangent)),
-        (ways[1], components(tu, tv, bends[0] - bends[1]), components(tu, tv, tangent)),
-    ]
+    conormal = unit(cross(cross(su, sv), tangent))
+    still = np.zeros_like(way)
+    found = [(components(su, sv, conormal), still, components(su, sv, tangent))]
+    for _, tu, tv, *other in jets[1:]:
+        over = components(tu, tv, conormal)
+        bend = components(tu, tv, _twice(found[0][0], second) - _twice(over, other)) if other else still
+        found.append((over, bend, components(tu, tv, tangent)))
+    return found
 
 
 def _twice(way: Array, second: Sequence[Array]) -> Array:

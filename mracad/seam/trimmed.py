@@ -121,7 +121,7 @@ def _first(model: Model, a: Trace, b: Trace) -> Array:
     """The even fractions of b whose points are nearest to those at even fractions of a."""
     from scipy.spatial import cKDTree
 
-    one, two = (np.asarray(model.surfaces[trace.surface].net.evaluate(trace.places(EVENLY))) for trace in (a, b))
+    one, two = (np.asarray(model.surfaces[trace.surface].net.evaluate(trace.evenly)) for trace in (a, b))
     return np.asarray(EVENLY[cKDTree(two).query(one)[1]])
 
 
@@ -134,7 +134,7 @@ def _followed(model: Model, a: Trace, b: Trace, back: bool) -> Array:
 
 def _nearest(model: Model, a: Trace, b: Trace, fractions: Array) -> Array:
     """Fractions of the curve of b nearest to points at even fractions of a, by Newton steps from given ones."""
-    points = model.surfaces[a.surface].net.evaluate(a.places(EVENLY))
+    points = model.surfaces[a.surface].net.evaluate(a.evenly)
     net = model.surfaces[b.surface].net
     for _ in range(NEWTON):
         s, su, sv = net.evaluate(b.places(fractions), 1)

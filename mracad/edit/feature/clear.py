@@ -97,7 +97,7 @@ def _spots(patch: Patch, face: Face, of: Array, uv: Array) -> Spots:
 def _along(ground: Ground, patch: Patch, face: Face, trim: Trim, step: float) -> Array:
     """Parameters of points along a border."""
     trace = trace_of(ground.model, face, trim)
-    points = np.asarray(patch.net.evaluate(trace.places(EVENLY)))
+    points = np.asarray(patch.net.evaluate(trace.evenly))
     steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
     pieces = np.maximum(np.ceil(steps * min(1 / step, MOST / max(steps.sum(), 1e-300))).astype(int), 1)
     share = [low + (high - low) * np.arange(n) / n for (low, high), n in zip(pairwise(EVENLY), pieces, strict=True)]

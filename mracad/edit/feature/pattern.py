@@ -164,7 +164,7 @@ def along(ground: Ground, given: spec.Along) -> list[Place]:
 
 def _even(patch: Patch, trace: Trace, count: int) -> tuple[Array, Array]:
     """Points and unit tangents in the middles of equal parts of a boundary curve."""
-    points = np.asarray(patch.net.evaluate(trace.places(EVENLY)))
+    points = np.asarray(patch.net.evaluate(trace.evenly))
     length = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
     share = np.interp(length[-1] * (np.arange(count) + 0.5) / count, length, EVENLY)
     found, su, sv, _ = patch.evaluate(trace.places(share))
