@@ -165,7 +165,7 @@ def pose(
     f = f - f.mean(axis=0)
     rows, goal = seam_rows(nets, joined.exact, everywhere=True)
     pairs = np.array([each.b is not None for each in contacts], bool)[found.owner]
-    opened = np.where(pairs[:, None], found.matrix @ f, 0.0)
+    opened = np.where(pairs[:, None], found.matrix @ f, 0.0) if pairs.any() else np.zeros((len(pairs), 3))
     most = WITHIN * np.array([scene.allowed(each, joined, width) for each in contacts]).reshape(-1, 3)
     limits, tolerances = found.limits(opened, most), found.limits(0.0 * opened, most)
     mends = np.array([(each.close, each.fit, False) for each in contacts], bool).reshape(-1, 3)
@@ -175,7 +175,8 @@ def pose(
     shut = np.where(mends[:, None], opened, 0.0) if joined.mended else opened
     smooth = pairs & np.array([each.order > 0 for each in contacts], bool)[found.owner]
     between = weight * found.form(np.where(smooth, EASY * limits, np.inf)) if smooth.any() else None
-    soft = Soft(weight * found.form(limits), -weight * found.pull(shut, limits), between) if contacts else None
+    pull = -weight * found.pull(shut, limits) if shut.any() else None
+    soft = Soft(weight * found.form(limits), pull, between) if contacts else None
     trimmed = mends & np.array([not each.since for each in contacts], bool)[found.owner]
     sliding = [each for each in joined.slides if each.trace.surface in nets]
     slid = led(nets, sliding, WITHIN * scene.tolerances.gap, weight)

@@ -17,23 +17,15 @@ from typing import Any
 
 import numpy as np
 
-from mracad.bspline.functions import ORDERS, functions
+from mracad.bspline.functions import ORDERS
 from mracad.bspline.jets import jets
-from mracad.bspline.knots import KnotVector, Side
 from mracad.bspline.surface import Net
-from mracad.memo import kept
 from mracad.model.cells import Quadrature
-from mracad.seam.integrals import Order, Sites, integrals, nothing, sites
+from mracad.seam.integrals import Order, Sites, integrals, nothing, sites, sparse
+from mracad.seam.kinks import FLATTEST, kinks
 from mracad.seam.stretch import EVEN, Stretch, stretched
 
 Array = np.ndarray
-
-KINK_WEIGHT = 1e3
-"""Weight of squared kinks on knot lines against squared curvature."""
-
-FLATTEST = 1e-4
-"""Least ratio of the metric's singular values: where it is smaller (at poles), the shorter direction is floored."""
-
 
 _AT_ONCE = 100_000
 """Points of the quadrature handled at a time."""
@@ -88,10 +80,9 @@ def forms(
         density, bend = _squared(net, along, np.where(mask, area, 0.0), frame)
         integrals(along, {(ORDERS[0], ORDERS[0]): density}, mass)
         integrals(along, bend, bending)
-    periodic, scale = (net.u.periodic, net.v.periodic), net.weights
-    smooth, sharp = _kinks(net, metric, quadrature, creases, stretch)
-    area, whole = _sparse(mass, periodic, scale), _sparse(bending, periodic, scale)
-    return Forms(area, whole + smooth if smooth.nnz else on_pattern(whole, area), sharp)
+    smooth, sharp = kinks(net, metric, quadrature, creases, stretch)
+    area, whole = sparse(mass, net), sparse(bending, net)
+    return Forms(area, on_pattern(whole + smooth if smooth.nnz else whole, area), sharp)
 
 
 def masses(net: Net, quadrature: Quadrature) -> Forms:
@@ -107,7 +98,7 @@ def masses(net: Net, quadrature: Quadrature) -> Forms:
             area = area / _jets(Net(net.u, net.v, net.weights[..., None]), along)[0, 0] ** 2
         integrals(along, {(ORDERS[0], ORDERS[0]): np.where(mask, area, 0.0)}, form)
     none = csr_array((net.u.count * net.v.count,) * 2)
-    return Forms(_sparse(form, (net.u.periodic, net.v.periodic), net.weights), none, none)
+    return Forms(sparse(form, net), none, none)
 
 
 def slopes(net: Net, metric: Net, quadrature: Quadrature) -> Any:
@@ -121,7 +112,7 @@ def slopes(net: Net, metric: Net, quadrature: Quadrature) -> Any:
     frame[0, 0], frame[1, 1] = 1 / np.sqrt(e), np.sqrt(e / (e * g - f * f))
     frame[0, 1] = -f / e * frame[1, 1]
     _, slope = _squared(net, along, np.where(quadrature.mask, area, 0.0), frame)
-    return _sparse(integrals(along, slope), (net.u.periodic, net.v.periodic), net.weights)
+    return sparse(integrals(along, slope), net)
 
 
 def _blocks(net: Net, quadrature: Quadrature, inside: bool = True) -> Iterator[tuple[tuple[Sites, Sites], Array]]:
@@ -146,90 +137,6 @@ def _squared(
         mass, frame = _over_weights(net, net.weights, along, area, frame)
     frame = frame * np.sqrt(area)
     return mass, {(a, b): _dot(frame[i], frame[j]) for i, a in enumerate(orders) for j, b in enumerate(orders[: i + 1])}
-
-
-def _kinks(
-    net: Net, metric: Net, quadrature: Quadrature, creases: Sequence[Collection[float]], stretch: Stretch
-) -> tuple[Any, Any]:
-    """Energies of kinks on knot lines of full multiplicity; those of creases separately."""
-    found = [_nothing(net.u.count * net.v.count)] * 2
-    for axis in (0, 1):
-        full = (net.u, net.v)[axis].full
-        for sharp in (False, True):
-            lines = [t for t in full if (t in creases[axis]) == sharp]
-            if lines:
-                kink = _kink(net, metric, quadrature, axis, np.array(lines))
-                found[sharp] = found[sharp] + stretch.lengths[axis] ** 4 * kink
-    return found[0], found[1]
-
-
-@kept(16)
-def _nothing(n: int) -> Any:
-    from scipy.sparse import csr_array
-
-    return csr_array((n, n))
-
-
-def _kink(net: Net, metric: Net, quadrature: Quadrature, axis: int, lines: Array) -> Any:
-    """``10³ ∫ [∂_n x]² / h`` on some knot lines of one direction."""
-    from scipy.sparse import csr_array
-
-    knots, total = (net.u, net.v)[axis], net.u.count * net.v.count
-    uv, weight = _on_lines(quadrature, axis, knots, lines)
-    sides: tuple[Side, Side] = ("left", "right")
-    (index, low), (_, high) = halves = [_sloped(net, metric, uv, axis, side) for side in sides]
-    row = np.repeat(np.arange(len(uv)), index.shape[1])
-    place = np.concatenate([row, row]), np.concatenate([where.ravel() for where, _ in halves])
-    jump = csr_array((np.concatenate([-low.slope.ravel(), high.slope.ravel()]), place), shape=(len(uv), total))
-    breaks = _onwards(knots)
-    near = np.searchsorted(breaks, uv[:, axis])
-    before, after = (breaks[near + k + 1] - breaks[near + k] for k in (-1, 0))
-    step = 0.5 * (before * low.height + after * high.height)
-    scaled = jump.multiply(np.sqrt(KINK_WEIGHT * high.length * weight / step)[:, None]).tocsr()
-    return scaled.T @ scaled
-
-
-def _onwards(knots: KnotVector) -> Array:
-    """The breaks; in a periodic direction also the first one of the next turn."""
-    return np.append(knots.breaks, knots.breaks[1] + knots.period) if knots.periodic else knots.breaks
-
-
-def _on_lines(quadrature: Quadrature, axis: int, knots: KnotVector, lines: Array) -> tuple[Array, Array]:
-    """Gauss points ``(q, 2)`` on knot lines with a face on both sides, and their weights."""
-    across, along = (quadrature.u, quadrature.v)[:: 1 - 2 * axis]
-    weight = (quadrature.wv, quadrature.wu)[axis]
-    mask = quadrature.mask if axis == 0 else quadrature.mask.T
-    breaks, after = _onwards(knots), across.ravel()[0] + knots.period if knots.periodic else np.inf
-    points = np.concatenate([[-np.inf], across.ravel(), [after]])
-    above, near = np.searchsorted(points, lines), np.searchsorted(breaks, lines)
-    beside = (points[above - 1] > breaks[near - 1]) & (points[above] < breaks[near + 1])
-    mask = np.concatenate([np.zeros_like(mask[:1]), mask, mask[:1] if knots.periodic else np.zeros_like(mask[:1])])
-    seen = mask[above - 1] & mask[above] & beside[:, None]
-    at, t = np.meshgrid(lines, along.ravel(), indexing="ij")
-    uv = np.stack([at[seen], t[seen]][:: 1 - 2 * axis], axis=1)
-    return uv, np.broadcast_to(weight.ravel(), at.shape)[seen]
-
-
-@dataclass(frozen=True, eq=False)
-class _Side:
-    """One side of a line: derivatives of the functions across it by length ``(q, k)``, and lengths per parameter across
-    and along it ``(q,)``."""
-
-    slope: Array
-    height: Array
-    length: Array
-
-
-def _sloped(net: Net, metric: Net, uv: Array, axis: int, side: Side) -> tuple[Array, _Side]:
-    """Control points ``(q, k)``, and their functions on one side of lines."""
-    limits: tuple[Side, Side] = (side, "right") if axis == 0 else ("right", side)
-    xn, xt = metric.evaluate(uv, 1, limits)[1:][:: 1 - 2 * axis]
-    e, f, g = ((a * b).sum(axis=1) for a, b in ((xn, xn), (xn, xt), (xt, xt)))
-    g = np.maximum(g, 1e-300)
-    height = np.sqrt(np.maximum(e - f * f / g, FLATTEST * e + 1e-300))
-    index, table = functions(net, uv, 1, limits)
-    dn, dt = table[1:][:: 1 - 2 * axis]
-    return index, _Side((dn - (f / g)[:, None] * dt) / height[:, None], height, np.sqrt(g))
 
 
 def _usual(metric: Net, blocks: Iterable[tuple[Sites, Sites]]) -> tuple[Any, Any]:
@@ -304,22 +211,3 @@ def on_pattern(form: Any, like: Any) -> Any:
 
     same = np.array_equal(form.indptr, like.indptr) and np.array_equal(form.indices, like.indices)
     return csr_array((form.data, like.indices, like.indptr), shape=form.shape) if same else form
-
-
-def _sparse(form: Array, periodic: tuple[bool, bool], scale: Array | None) -> Any:
-    """A stencil as ``scipy.sparse.csr_array`` on the control points in row-major order, scaled from both sides."""
-    from scipy.sparse import csr_array
-
-    nu, nv, wu, wv = form.shape
-    row, column = (
-        ((np.arange(n)[:, None] + np.arange(w) - w // 2) % n).astype(np.int32) for n, w in ((nu, wu), (nv, wv))
-    )
-    at = row[:, None, :, None] * np.int32(nv) + column[:, None]
-    if scale is not None:
-        form = form * scale[:, :, None, None] * scale.ravel()[at]
-    there = form != 0
-    ends = np.append(0, np.count_nonzero(there.reshape(nu * nv, -1), axis=1).cumsum()).astype(np.int32)
-    found = csr_array((form[there], at[there], ends), shape=(nu * nv, nu * nv))
-    if any(periodic):
-        found.sum_duplicates()
-    return found

@@ -17,6 +17,7 @@ import numpy as np
 
 from mracad.bspline.basis import jet
 from mracad.bspline.knots import KnotVector
+from mracad.bspline.surface import Net
 from mracad.memo import kept
 
 Array = np.ndarray
@@ -123,9 +124,9 @@ def integrals(
         lines = slice(begin * gu, min(begin + rows, su) * gu)
         orders, found = [], []
         for (i, j), each in pairs.items():
-            inner = _inner(v, [(k, m, c[lines]) for k, m, c in each], mirrored=i == j)
+            across = inner(v, [(k, m, c[lines]) for k, m, c in each], mirrored=i == j)
             orders += [(i, j)] if i == j else [(i, j), (j, i)]
-            found += [inner] if i == j else [inner, _transposed(inner)]
+            found += [across] if i == j else [across, _transposed(across)]
         outer = u.products(tuple(orders))[part].swapaxes(1, 2)
         count = len(outer)
         along_v = np.concatenate([each.reshape(count, gu, -1) for each in found], axis=1)
@@ -138,7 +139,7 @@ def nothing(u: KnotVector, v: KnotVector) -> Array:
     return np.zeros((u.count, 2 * u.degree + 1, v.count, 2 * v.degree + 1)).swapaxes(1, 2)
 
 
-def _inner(v: Sites, parts: list[tuple[int, int, Array]], mirrored: bool) -> Array:
+def inner(v: Sites, parts: list[tuple[int, int, Array]], mirrored: bool) -> Array:
     """``Σ ∫ c D^k N_b D^m N_b' dv`` on lines u = const, ``(lines, nv, 2q + 1)``; with its mirror image where asked."""
     (sv, gv), q = v.at.shape, v.knots.degree
     table = v.products(tuple((k, m) for k, m, _ in parts), mirrored)
@@ -166,3 +167,35 @@ def _transposed(stencil: Array) -> Array:
     n, width = stencil.shape[1:]
     place, offset = np.arange(n)[:, None], np.arange(width) - width // 2
     return np.asarray(stencil[:, (place + offset) % n, width // 2 - offset])
+
+
+def sparse(form: Array, net: Net, rows: tuple[Array, Array] | None = None) -> Any:
+    """A stencil as ``scipy.sparse.csr_array`` on the control points in row-major order, scaled from both sides by the
+    weights.
+
+    Parameters
+    ----------
+    form : ndarray (ku, kv, 2p + 1, 2q + 1)
+    net : Net
+    rows : (ndarray (ku,), ndarray (kv,)), optional
+        Rows and columns of control points that have entries, ascending; by default all.
+    """
+    from scipy.sparse import csr_array
+
+    nu, nv = net.u.count, net.v.count
+    own = rows or (np.arange(nu), np.arange(nv))
+    row, column = (
+        ((at[:, None] + np.arange(w) - w // 2) % n).astype(np.int32)
+        for at, n, w in zip(own, (nu, nv), form.shape[2:], strict=True)
+    )
+    at = row[:, None, :, None] * np.int32(nv) + column[:, None]
+    if net.weights is not None:
+        form = form * net.weights[np.ix_(*own)][:, :, None, None] * net.weights.ravel()[at]
+    there = form != 0
+    counts = np.zeros((nu, nv), np.int32)
+    counts[np.ix_(*own)] = np.count_nonzero(there.reshape(*there.shape[:2], -1), axis=2)
+    ends = np.append(np.int32(0), counts.cumsum(dtype=np.int32))
+    found = csr_array((form[there], at[there], ends), shape=(nu * nv, nu * nv))
+    if net.u.periodic or net.v.periodic:
+        found.sum_duplicates()
+    return found

@@ -312,15 +312,16 @@ def away(net: Net, faces: Iterable[Face], moving: Collection[int], stretch: Stre
     if not trims:
         return np.full(net.poles.shape[:2], np.inf)
     curves = [trim.curve.evaluate(np.linspace(*trim.curve.knots.domain, RIM_POINTS))[0] for trim in trims]
-    uv = pairs(net.u.greville(), net.v.greville())
-    rim, points = (_laid(net, each, stretch) for each in (np.concatenate(curves), uv))
+    rim, us, vs = np.concatenate(curves), net.u.greville(), net.v.greville()
+    if stretch.even:
+        points, rim = np.asarray(net.grid(us, vs)).reshape(-1, 3), np.asarray(net.evaluate(rim))
+    else:
+        points, rim = (_laid(net, uv, stretch) for uv in (pairs(us, vs), rim))
     return np.asarray(KDTree(rim).query(points)[0]).reshape(net.poles.shape[:2])
 
 
 def _laid(net: Net, uv: Array, stretch: Stretch) -> Array:
-    """Points of a surface; where directions differ, on a plane scaled so that their wavelengths become equal."""
-    if stretch.even:
-        return np.asarray(net.evaluate(uv))
+    """Points of a surface on a plane scaled so that wavelengths that differ by direction become equal."""
     lengths = [np.concatenate([[0.0], np.cumsum(arc_lengths(net, axis))]) for axis in (0, 1)]
     both = zip((net.u, net.v), uv.T, lengths, stretch.lengths, strict=True)
     return np.stack([np.interp(at, knots.breaks, along) / short for knots, at, along, short in both], axis=1)

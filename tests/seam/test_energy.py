@@ -8,7 +8,8 @@ from mracad.bspline.fit import interpolated, through
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
 from mracad.model.cells import quadrature
-from mracad.seam.energy import KINK_WEIGHT, forms, slopes
+from mracad.seam.energy import forms, slopes
+from mracad.seam.kinks import KINK_WEIGHT
 from tests.edit.models import rotation
 from tests.model.shapes import circle, cylinder, face, graph, plane, rectangle, sphere, torus
 
