@@ -25,7 +25,7 @@ STEPS = 8, 32
 LEAST = 1 / 32, 1 / 16
 """Amounts below all steps."""
 
-PART, MEASURED = 0.25, 4
+PART, MEASURED = 0.25, 5
 """The part of a displacement that is measured where the whole is too much; how many amounts are measured at most."""
 
 SINGULAR = 1e5
