@@ -241,8 +241,8 @@ def test_an_edge_stays_where_that_does_more(made, monkeypatch):
     model = looked(made("block"))
     real = Trial.judged
 
-    def strict(trial, delta, target, others=()):
-        verdict = real(trial, delta, target, others)
+    def strict(trial, *given, **more):
+        verdict = real(trial, *given, **more)
         return trial.nothing() if trial.pose.led is not None else verdict
 
     monkeypatch.setattr(Trial, "judged", strict)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import contextlib
 import io
 import itertools
 import json
@@ -22,6 +23,10 @@ from PIL import Image
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 PATIENCE = 90.0
 """Seconds that a machine under load may take for an answer."""
+
+
+class Navigated(Exception):
+    """The page was asked while another took its place."""
 
 
 class Browser:
@@ -82,6 +87,8 @@ class Browser:
         while True:
             told = json.loads(self._message())
             if told.get("id") == number:
+                if "navigated" in told.get("error", {}).get("message", ""):
+                    raise Navigated
                 assert "error" not in told, told
                 return told["result"]
             self.events.append(told)
@@ -110,7 +117,10 @@ class Browser:
     def wait(self, true: Any) -> None:
         """Wait until a function says so."""
         end = time.monotonic() + PATIENCE
-        while not true():
+        while True:
+            with contextlib.suppress(Navigated):
+                if true():
+                    return
             assert time.monotonic() < end, "the browser does not get ready"
             time.sleep(0.05)
 
