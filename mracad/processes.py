@@ -67,7 +67,8 @@ class Ahead(Generic[Result]):
         self._waiting: list[int] = []
         self._done: dict[int, Result] = {}
         self._staff: list[_Worker] = []
-        self._most = min(workers(), sys.maxsize if _can_fork() else 1)
+        most = workers()
+        self._most = most if _can_fork() else 1
         self._spent = 0.0
 
     def __enter__(self) -> Ahead[Result]:
