@@ -130,15 +130,15 @@ def _blend(trial: Trial, target: Array, found: list[Verdict]) -> None:
 
 def _explained(trial: Trial, moved: dict[int, Moved], target: Array) -> dict[int, Moved]:
     """Results, with what prevents more."""
+    unheld = trial.unheld(target)
     if len(moved) == 1 and target.any():
         moved = {
-            i: replace(each, held_back=each.amount < LEAST and trial.allowed_unheld(target))
+            i: replace(each, held_back=each.amount < LEAST and unheld.allowed, gaining=unheld.gaining[0])
             for i, each in moved.items()
         }
     if any(each.amount for each in moved.values()) or not trial.tolerances.fairer:
         return moved
-    fairer = trial.fairer(target)
-    return {i: replace(each, rough=fair) for (i, each), fair in zip(moved.items(), fairer, strict=True)}
+    return {i: replace(each, rough=fair) for (i, each), fair in zip(moved.items(), unheld.fairer, strict=True)}
 
 
 def _confirmed(trial: Trial, members: Mapping[int, Sheet], found: Sequence[Verdict], target: Array) -> dict[int, Moved]:

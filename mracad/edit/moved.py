@@ -47,6 +47,8 @@ class Moved:
         Whether its edges slide.
     held_back : bool
         Whether only its held rims prevent the wanted change: together with others it may do more.
+    gaining : bool
+        Whether some of the wanted change would make it fairer if nothing were held: more control points may help.
     """
 
     sheet: Sheet
@@ -60,6 +62,7 @@ class Moved:
     rough: bool = True
     sliding: bool = False
     held_back: bool = False
+    gaining: bool = True
 
     @classmethod
     def whole(cls, sheet: Sheet, net: Net, offset: Array, free: int, amount: float = 1.0) -> Moved:

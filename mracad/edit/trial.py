@@ -110,6 +110,49 @@ class Verdict:
         return min(self.amounts)
 
 
+@dataclass(frozen=True, eq=False)
+class Unheld:
+    """The judge's view of a target for which nothing is held.
+
+    Attributes
+    ----------
+    tried : Tried
+    tolerances : Tolerances
+    least : sequence of float
+        Least displacement of each surface that counts, mm.
+    """
+
+    tried: Tried
+    tolerances: Tolerances
+    least: Sequence[float]
+
+    @property
+    def allowed(self) -> bool:
+        """Whether it would be allowed in full."""
+        return not any(worse(change, self.tolerances.growth) for faces in self._whole for change in faces.values())
+
+    @property
+    def fairer(self) -> list[bool]:
+        """Whether it would reduce the roughness of each surface, whatever it adds to others."""
+        return [_fairer(faces, least, GAIN[0]) for faces, least in zip(self._whole, self.least, strict=True)]
+
+    @property
+    def gaining(self) -> list[bool]:
+        """Whether some amount of it would make each surface fairer by enough to change it."""
+        self._at(PART)
+        return [
+            any(gained(self.tried.about(i, amount), self.tolerances, least) for amount in reversed(SHARES))
+            for i, least in enumerate(self.least)
+        ]
+
+    @property
+    def _whole(self) -> list[Mapping[int, Change]]:
+        return self._at(1.0)
+
+    def _at(self, amount: float) -> list[Mapping[int, Change]]:
+        return list(self.tried.changes(dict.fromkeys(range(len(self.least)), amount)).values())
+
+
 class Trial:
     """Surfaces that move together: their problem, and the judge of their displacements."""
 
@@ -201,15 +244,9 @@ class Trial:
         together = self.judged(self.problem.nearest(wanted, stiffness(self.width)), target, others)
         return self.eased(together, target, others)
 
-    def fairer(self, delta: Array) -> list[bool]:
-        """Whether a displacement would reduce the roughness of each surface, whatever it adds to others."""
-        found = Tried(self.watch, self.nets, self._split(delta)).changes(dict.fromkeys(range(len(self.nets)), 1.0))
-        return [_fairer(faces, least, GAIN[0]) for faces, least in zip(found.values(), self.least, strict=True)]
-
-    def allowed_unheld(self, target: Array) -> bool:
-        """Whether the judge would allow a whole target if nothing were held."""
-        every = Tried(self.watch, self.nets, self._split(target)).changes(dict.fromkeys(range(len(self.nets)), 1.0))
-        return not any(worse(change, self.tolerances.growth) for faces in every.values() for change in faces.values())
+    def unheld(self, target: Array) -> Unheld:
+        """What the judge says of a whole target, as if nothing were held."""
+        return Unheld(Tried(self.watch, self.nets, self._split(target)), self.tolerances, self.least)
 
     def _floor(self, nearer: Gains, others: Sequence[Verdict]) -> Array:
         """Amounts below which a displacement is worth less than another; infinite if it always is."""

@@ -12,6 +12,7 @@ from mracad.seam.wishes import Wishes
 from mracad.spec.steps import Smooth
 from tests.edit import panels
 from tests.edit.models import noisy, sheet
+from tests.edit.test_fair import fillet
 
 
 @pytest.fixture(scope="module")
@@ -51,6 +52,12 @@ def test_control_points_are_multiplied_only_so_far(net, trials, monkeypatch):
     monkeypatch.setattr(alone, "MOST", (1.0, 0))
     faired(sheet(net), {0}, Filter(2.0), Wishes(), Tolerances())
     assert len(trials) == 1
+
+
+@pytest.mark.parametrize(("spans", "tried"), [(8, 1), (3, 2)], ids=["circular", "wavy"])
+def test_control_points_are_added_only_where_a_surface_would_get_fairer_if_nothing_were_held(spans, tried, trials):
+    moved = faired(sheet(fillet(spans=spans)), {0}, Filter(4.0), Wishes(), Tolerances()).moved[0]
+    assert len(trials) == tried and moved.gaining == (tried == 2)
 
 
 def test_amounts_of_joined_surfaces_are_only_found_where_no_way_is_allowed_whole(monkeypatch):
