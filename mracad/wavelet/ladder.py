@@ -114,11 +114,13 @@ def ladder_for_scale(
     if not scale > 0:
         raise UsageError(f"scale {scale} is not positive")
     ladder = _Ladder(kv, keep, lengths, tolerance, scale)
+    ladder.clear(_RESOLUTION)
     while ladder.drop(ladder.beside() < _RESOLUTION):
         pass
+    if not ladder.sensible(len(ladder.alive)):
+        return kv
     beside = ladder.beside()
-    copies = np.where(beside < 2 * _RESOLUTION, 1, 3 * beside // (2 * _RESOLUTION))
-    return ladder.thinned(copies) if ladder.sensible(len(ladder.alive)) else kv
+    return ladder.thinned(np.where(beside < 2 * _RESOLUTION, 1, 3 * beside // (2 * _RESOLUTION)))
 
 
 @kept(128)
@@ -180,13 +182,13 @@ class _Ladder:
         if self.kept.shape != kv.breaks.shape:
             raise UsageError(f"{self.kept.size} marks of kept knots for {len(kv.breaks)} breaks")
         if kv.periodic:
-            self.kept[[0, -1]] = self.kept[0] or self.kept[-1]
+            self.kept[0] = self.kept[-1] = self.kept[0] or self.kept[-1]
         apart = lengths >= max(tolerance, 1e-6 * lengths.sum())
         self.last = np.append(np.flatnonzero(apart), kv.spans)
         self.first = np.append(0, self.last[:-1] + 1)
         self.alive = np.arange(len(self.first))
         self.fixed = np.logical_or.reduceat(self.kept, self.first)
-        self.fixed[[0, -1]] = True
+        self.fixed[0] = self.fixed[-1] = True
         ratio = np.minimum(lengths[apart] / (unit or 1.0), 1e6)
         self.spans = np.rint(ratio * _RESOLUTION).astype(np.int64)
 
@@ -207,6 +209,12 @@ class _Ladder:
         within = np.pad(free, 1)
         within = free & within[:-2] & within[2:]
         return within if odd and within.any() else free
+
+    def clear(self, longest: int) -> None:
+        """Remove all clusters at once where the whole is shorter than ``longest``, as repeated sweeps would."""
+        if not self.kv.periodic and self.spans.sum() < longest:
+            self.alive = np.flatnonzero(self.fixed)
+            self.spans = np.add.reduceat(self.spans, self.alive[:-1])
 
     def drop(self, candidate: Array) -> bool:
         """Remove alternate clusters of each run of candidates; return whether any was removed."""
@@ -234,7 +242,7 @@ class _Ladder:
         for cluster, limit in zip(self.alive[crowded].tolist(), copies[crowded].tolist(), strict=True):
             inside = slice(self.first[cluster], self.last[cluster] + 1)
             mults[inside] = self._cut(inside, limit)
-        return self.kv if (mults == own).all() else self.kv.with_multiplicities(mults)
+        return self.kv if (mults == own).all() else _with_multiplicities(self.kv, mults.tobytes())
 
     @property
     def _lasting(self) -> Array:
@@ -255,19 +263,27 @@ class _Ladder:
         return mults
 
 
+@kept(512)
+def _with_multiplicities(kv: KnotVector, mults: bytes) -> KnotVector:
+    return kv.with_multiplicities(np.frombuffer(mults, dtype=int))
+
+
 def _alternate(candidate: Array, place: Array) -> Array:
     """Every second candidate of each run of them, never two neighbours.
 
     Counted from both ends of the run towards its middle; where two would meet there, the one nearer to the middle of
     the whole (``place`` in the domain) is taken.
     """
-    change = np.diff(np.concatenate([[0], candidate.astype(int), [0]]))
-    begin, end = np.flatnonzero(change == 1), np.flatnonzero(change == -1)
-    index = np.flatnonzero(candidate)
-    run = np.repeat(np.arange(len(begin)), end - begin)
+    index = candidate.nonzero()[0]
+    first = np.ones(len(index), dtype=bool)
+    first[1:] = index[1:] != index[:-1] + 1
+    start = first.nonzero()[0]
+    lengths = np.append(start[1:], len(index)) - start
+    after = np.arange(len(index)) - np.repeat(start, lengths)
     gone = np.zeros(len(candidate), dtype=bool)
-    gone[index[np.minimum(index - begin[run], end[run] - 1 - index) % 2 == 0]] = True
-    left = np.flatnonzero(gone[:-1] & gone[1:])
-    offset = np.abs(2 * place - place[-1])
-    gone[np.where(offset[left + 1] < offset[left], left, left + 1)] = False
+    gone[index[np.minimum(after, np.repeat(lengths - 1, lengths) - after) % 2 == 0]] = True
+    left = (gone[:-1] & gone[1:]).nonzero()[0]
+    if len(left):
+        offset = np.abs(2 * place - place[-1])
+        gone[np.where(offset[left + 1] < offset[left], left, left + 1)] = False
     return gone
