@@ -81,8 +81,8 @@ def forms(
         integrals(along, {(ORDERS[0], ORDERS[0]): density}, mass)
         integrals(along, bend, bending)
     smooth, sharp = kinks(net, metric, quadrature, creases, stretch)
-    area, whole = sparse(mass, net), sparse(bending, net)
-    return Forms(area, on_pattern(whole + smooth if smooth.nnz else whole, area), sharp)
+    area, whole = sparse([mass, bending], net)
+    return Forms(area, on_pattern(whole + smooth, area) if smooth.nnz else whole, sharp)
 
 
 def masses(net: Net, quadrature: Quadrature) -> Forms:
@@ -98,7 +98,7 @@ def masses(net: Net, quadrature: Quadrature) -> Forms:
             area = area / _jets(Net(net.u, net.v, net.weights[..., None]), along)[0, 0] ** 2
         integrals(along, {(ORDERS[0], ORDERS[0]): np.where(mask, area, 0.0)}, form)
     none = csr_array((net.u.count * net.v.count,) * 2)
-    return Forms(sparse(form, net), none, none)
+    return Forms(*sparse([form], net), none, none)
 
 
 def slopes(net: Net, metric: Net, quadrature: Quadrature) -> Any:
@@ -112,7 +112,7 @@ def slopes(net: Net, metric: Net, quadrature: Quadrature) -> Any:
     frame[0, 0], frame[1, 1] = 1 / np.sqrt(e), np.sqrt(e / (e * g - f * f))
     frame[0, 1] = -f / e * frame[1, 1]
     _, slope = _squared(net, along, np.where(quadrature.mask, area, 0.0), frame)
-    return sparse(integrals(along, slope), net)
+    return sparse([integrals(along, slope)], net)[0]
 
 
 def _blocks(net: Net, quadrature: Quadrature, inside: bool = True) -> Iterator[tuple[tuple[Sites, Sites], Array]]:
@@ -136,7 +136,11 @@ def _squared(
         orders = ORDERS
         mass, frame = _over_weights(net, net.weights, along, area, frame)
     frame = frame * np.sqrt(area)
-    return mass, {(a, b): _dot(frame[i], frame[j]) for i, a in enumerate(orders) for j, b in enumerate(orders[: i + 1])}
+    squares = {}
+    for i, a in enumerate(orders):
+        products = (frame[i] * frame[: i + 1]).sum(axis=1)
+        squares |= {(a, b): product for b, product in zip(orders, products, strict=False)}
+    return mass, squares
 
 
 def _usual(metric: Net, blocks: Iterable[tuple[Sites, Sites]]) -> tuple[Any, Any]:

@@ -8,7 +8,7 @@ products of all functions would take (p + 1)³ (q + 1)³.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -115,22 +115,26 @@ def integrals(
     for both, values in coefficients.items():
         low, high = sorted(both)
         pairs.setdefault((low[0], high[0]), []).append((low[1], high[1], values))
-    if form is None:
-        form = nothing(u.knots, v.knots)
-    stencil = form.swapaxes(1, 2).reshape(u.knots.count, 2 * p + 1, v.knots.count * (2 * q + 1))
+    form = nothing(u.knots, v.knots) if form is None else form
+    lopsided = any(i != j for i, j in pairs)  # then half of the form is added up, and its mirror image is the other half
+    half = nothing(u.knots, v.knots) if lopsided else form
+    stencil = half.swapaxes(1, 2).reshape(u.knots.count, 2 * p + 1, v.knots.count * (2 * q + 1))
+    outer = u.products(tuple(pairs)).swapaxes(1, 2)
     rows = max(1, _BLOCK // (len(pairs) * gu * stencil.shape[2] * 2))
     for begin in range(0, su, rows):
         part = slice(begin, begin + rows)
         lines = slice(begin * gu, min(begin + rows, su) * gu)
-        orders, found = [], []
-        for (i, j), each in pairs.items():
-            across = inner(v, [(k, m, c[lines]) for k, m, c in each], mirrored=i == j)
-            orders += [(i, j)] if i == j else [(i, j), (j, i)]
-            found += [across] if i == j else [across, _transposed(across)]
-        outer = u.products(tuple(orders))[part].swapaxes(1, 2)
-        count = len(outer)
-        along_v = np.concatenate([each.reshape(count, gu, -1) for each in found], axis=1)
-        _added(stencil, u, part, np.matmul(outer, along_v).reshape(count, p + 1, p + 1, -1))
+        groups = [[(k, m, c[lines]) for k, m, c in each] for each in pairs.values()]
+        found = inner(v, groups, [i == j for i, j in pairs])
+        along_v = found.reshape(stencil.shape[2], len(pairs), -1, gu).transpose(2, 1, 3, 0)
+        count = len(along_v)
+        if lopsided:
+            along_v = along_v * np.array([[[0.5 if i == j else 1.0]] for i, j in pairs])
+        cells = np.matmul(outer[part], along_v.reshape(count, len(pairs) * gu, -1))
+        _added(stencil, u, part, cells.reshape(count, p + 1, p + 1, -1))
+    if lopsided:
+        form += half
+        form += _mirrored(half)
     return form
 
 
@@ -139,15 +143,25 @@ def nothing(u: KnotVector, v: KnotVector) -> Array:
     return np.zeros((u.count, 2 * u.degree + 1, v.count, 2 * v.degree + 1)).swapaxes(1, 2)
 
 
-def inner(v: Sites, parts: list[tuple[int, int, Array]], mirrored: bool) -> Array:
-    """``Σ ∫ c D^k N_b D^m N_b' dv`` on lines u = const, ``(lines, nv, 2q + 1)``; with its mirror image where asked."""
-    (sv, gv), q = v.at.shape, v.knots.degree
-    table = v.products(tuple((k, m) for k, m, _ in parts), mirrored)
-    values = np.concatenate([c.reshape(-1, sv, gv).swapaxes(0, 1) for _, _, c in parts], axis=2)
-    cells = np.matmul(values, table).reshape(sv, len(values[0]), q + 1, q + 1)
-    found = np.zeros((v.knots.count, 2 * q + 1, cells.shape[1]))
-    _added(found, v, slice(None), cells.transpose(0, 2, 3, 1))
-    return np.ascontiguousarray(found.transpose(2, 0, 1))
+def inner(v: Sites, groups: Sequence[Sequence[tuple[int, int, Array]]], mirrored: Sequence[bool]) -> Array:
+    """``Σ ∫ c D^k N_b D^m N_b' dv`` on lines u = const, for groups of k, m and c ``(lines, points)``.
+
+    Returns
+    -------
+    ndarray (nv, 2q + 1, groups, lines)
+        With their mirror images where asked.
+    """
+    (sv, gv), q, lines = v.at.shape, v.knots.degree, len(groups[0][0][2])
+    cells = np.empty((sv, v.width, len(groups), lines))
+    for number, (group, both) in enumerate(zip(groups, mirrored, strict=True)):
+        table = v.products(tuple((k, m) for k, m, _ in group), both)
+        values = np.empty((sv, len(group), gv, lines))
+        for place, (_, _, c) in enumerate(group):
+            values[:, place] = c.T.reshape(sv, gv, lines)
+        np.matmul(table.swapaxes(1, 2), values.reshape(sv, -1, lines), out=cells[:, :, number])
+    found = np.zeros((v.knots.count, 2 * q + 1, len(groups), lines))
+    _added(found, v, slice(None), cells.reshape(sv, q + 1, q + 1, len(groups), lines))
+    return found
 
 
 def _added(form: Array, along: Sites, part: slice, cells: Array) -> None:
@@ -162,40 +176,89 @@ def _added(form: Array, along: Sites, part: slice, cells: Array) -> None:
         form[place, d - a : 2 * d + 1 - a] += cells[:, a]
 
 
-def _transposed(stencil: Array) -> Array:
-    """A stencil ``(lines, n, 2d + 1)`` with its two functions exchanged."""
-    n, width = stencil.shape[1:]
-    place, offset = np.arange(n)[:, None], np.arange(width) - width // 2
-    return np.asarray(stencil[:, (place + offset) % n, width // 2 - offset])
+def _mirrored(form: Array) -> Array:
+    """A form ``(nu, nv, 2p + 1, 2q + 1)`` with its two functions exchanged."""
+    rows, columns = (
+        ((np.arange(n)[:, None] + np.arange(w) - w // 2) % n * w + np.arange(w)[::-1]).ravel()
+        for n, w in zip(form.shape[:2], form.shape[2:], strict=True)
+    )
+    flat = form.swapaxes(1, 2).reshape(len(rows), len(columns))
+    nu, nv, wu, wv = form.shape
+    return flat[rows].take(columns, axis=1).reshape(nu, wu, nv, wv).swapaxes(1, 2)
 
 
-def sparse(form: Array, net: Net, rows: tuple[Array, Array] | None = None) -> Any:
-    """A stencil as ``scipy.sparse.csr_array`` on the control points in row-major order, scaled from both sides by the
-    weights.
+@dataclass(frozen=True, eq=False)
+class _Pattern:
+    """The entries of a matrix over the control points of a net that a stencil can have.
+
+    Attributes
+    ----------
+    rows : ndarray (rows,) of int
+        Control points with entries, ascending.
+    there : ndarray of int, optional
+        Places of the entries in the stencil; None if all are.
+    indices, indptr : ndarray of int32
+        As of ``scipy.sparse.csr_array``.
+    """
+
+    there: Array | None
+    row: Array
+    indices: Array
+    indptr: Array
+
+
+@kept(16)
+def _pattern(size: tuple[int, int], width: tuple[int, int], periodic: tuple[bool, bool], rows: Any) -> _Pattern:
+    own = [np.arange(n) if rows is None else np.frombuffer(each, int) for n, each in zip(size, rows or size, strict=True)]
+    at = [each[:, None] + np.arange(w) - w // 2 for each, w in zip(own, width, strict=True)]
+    inside = [(each >= 0) & (each < n) | round for each, n, round in zip(at, size, periodic, strict=True)]
+    nv = size[1]
+    row, column = ((each % n).astype(np.int32) for each, n in zip(at, size, strict=True))
+    every = row[:, None, :, None] * np.int32(nv) + column[:, None]
+    there = inside[0][:, None, :, None] & inside[1][:, None]
+    counts = np.zeros(size, np.int32)
+    counts[np.ix_(*own)] = np.count_nonzero(there, axis=(2, 3))
+    places = None if there.all() else np.flatnonzero(there)
+    counts = counts.ravel()
+    start = np.append(np.int32(0), counts.cumsum(dtype=np.int32))
+    return _Pattern(places, np.repeat(np.arange(counts.size, dtype=np.int32), counts), every[there], start)
+
+
+def sparse(forms: Sequence[Array], net: Net, rows: tuple[Array, Array] | None = None) -> list[Any]:
+    """Stencils as ``scipy.sparse.csr_array`` on the control points in row-major order, scaled from both sides by the
+    weights; with the same entries, those in which one of them is not zero.
 
     Parameters
     ----------
-    form : ndarray (ku, kv, 2p + 1, 2q + 1)
+    forms : sequence of ndarray (ku, kv, 2p + 1, 2q + 1)
     net : Net
     rows : (ndarray (ku,), ndarray (kv,)), optional
         Rows and columns of control points that have entries, ascending; by default all.
     """
     from scipy.sparse import csr_array
 
-    nu, nv = net.u.count, net.v.count
-    own = rows or (np.arange(nu), np.arange(nv))
-    row, column = (
-        ((at[:, None] + np.arange(w) - w // 2) % n).astype(np.int32)
-        for at, n, w in zip(own, (nu, nv), form.shape[2:], strict=True)
-    )
-    at = row[:, None, :, None] * np.int32(nv) + column[:, None]
+    size, width, count = (net.u.count, net.v.count), forms[0].shape[2:], net.u.count * net.v.count
+    marks = None if rows is None else tuple(np.asarray(each, int).tobytes() for each in rows)
+    pattern = _pattern(size, width, (net.u.periodic, net.v.periodic), marks)
+    values = [each.ravel() if pattern.there is None else each.ravel()[pattern.there] for each in forms]
+    row, indices, ends = pattern.row, pattern.indices, pattern.indptr
+    some = np.logical_or.reduce([each != 0 for each in values])
+    if some.all():
+        indices, ends = indices.copy(), ends.copy()
+    else:
+        values, row, indices = [each[some] for each in values], row[some], indices[some]
+        ends = np.append(np.int32(0), np.bincount(row, minlength=count).cumsum(dtype=np.int32))
     if net.weights is not None:
-        form = form * net.weights[np.ix_(*own)][:, :, None, None] * net.weights.ravel()[at]
-    there = form != 0
-    counts = np.zeros((nu, nv), np.int32)
-    counts[np.ix_(*own)] = np.count_nonzero(there.reshape(*there.shape[:2], -1), axis=2)
-    ends = np.append(np.int32(0), counts.cumsum(dtype=np.int32))
-    found = csr_array((form[there], at[there], ends), shape=(nu * nv, nu * nv))
+        weights = net.weights.ravel()
+        scale = weights[row] * weights[indices]
+        values = [each * scale for each in values]
+    found = [csr_array((values[0], indices, ends), shape=(count, count))]
     if net.u.periodic or net.v.periodic:
-        found.sum_duplicates()
+        found += [csr_array((each, indices.copy(), ends.copy()), shape=(count, count)) for each in values[1:]]
+        for each in found:
+            each.sum_duplicates()
+        for each in found[1:]:
+            each.indices, each.indptr = found[0].indices, found[0].indptr
+    else:
+        found += [csr_array((each, indices, ends), shape=(count, count)) for each in values[1:]]
     return found

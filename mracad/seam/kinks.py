@@ -75,19 +75,20 @@ def _kink(net: Net, metric: Net, quadrature: Quadrature, axis: int, lines: Array
     ]
     width, n, wide = numbers.shape[3], along.count, 2 * along.degree + 1
     outer = np.stack([x[:, :, None] * y[:, None] for x, _, _ in terms for y, _, _ in terms], axis=1)
-    inside = [inner(where, [(i, j, a * b)], False) for _, i, a in terms for _, j, b in terms]
-    products = np.stack(inside, axis=1).reshape(len(lines), len(inside), -1)
+    groups = [[(i, j, a * b)] for _, i, a in terms for _, j, b in terms]
+    inside = inner(where, groups, [False] * len(groups))
+    products = inside.transpose(3, 2, 0, 1).reshape(len(lines), len(groups), -1)
     places = (start[:, None] + np.arange(width)) % knots.count
     rows, place = np.unique(places, return_inverse=True)
     form = np.zeros((len(rows), n, 2 * width - 1, wide))
     for mine, numbers_, each in zip(place.reshape(places.shape), outer, products, strict=True):
-        block = (numbers_.reshape(len(inside), -1).T @ each).reshape(width, width, n, wide)
+        block = (numbers_.reshape(len(groups), -1).T @ each).reshape(width, width, n, wide)
         for k, row in enumerate(mine):
             form[row, :, width - 1 - k : 2 * width - 1 - k] += block[k].swapaxes(0, 1)
     every = np.arange(n)
     if axis:
-        return sparse(form.transpose(1, 0, 3, 2), net, (every, rows))
-    return sparse(form, net, (rows, every))
+        return sparse([form.transpose(1, 0, 3, 2)], net, (every, rows))[0]
+    return sparse([form], net, (rows, every))[0]
 
 
 def _onwards(knots: KnotVector) -> Array:
