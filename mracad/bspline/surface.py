@@ -11,13 +11,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mracad.brief import line
-from mracad.bspline.basis import jet
+from mracad.bspline.basis import SHORT, jet
 from mracad.bspline.curve import check_weights, euclidean, homogeneous
 from mracad.bspline.knots import Array, KnotVector, Side
 from mracad.bspline.refine import refinement
 from mracad.bspline.rows import Rows
 from mracad.bspline.vectors import cross
 from mracad.errors import UsageError
+from mracad.memo import kept
 
 _BLOCK = 1 << 19
 
@@ -277,6 +278,19 @@ def _pairs(total: int) -> list[tuple[int, int]]:
 
 def collocation(kv: KnotVector, x: Array, derivatives: int, side: Side) -> list[Rows]:
     """Collocation matrices of the derivatives up to the given one."""
+    x = np.asarray(x, dtype=float)
+    if x.size <= SHORT:
+        return _remembered(kv, x.tobytes(), derivatives, side)
+    return _collocation(kv, x, derivatives, side)
+
+
+@kept(1024)
+def _remembered(kv: KnotVector, x: bytes, derivatives: int, side: Side) -> list[Rows]:
+    """Cached matrices for few parameters: the same ones are often taken on many surfaces."""
+    return _collocation(kv, np.frombuffer(x), derivatives, side)
+
+
+def _collocation(kv: KnotVector, x: Array, derivatives: int, side: Side) -> list[Rows]:
     first, values = jet(kv, x, range(derivatives + 1), side)
     return [Rows(first, np.ascontiguousarray(part), kv.count, kv.periodic) for part in values.swapaxes(0, 1)]
 

@@ -16,7 +16,8 @@ from mracad.inspect.roughness import Growth
 from mracad.model.brep import Face, Model
 from mracad.model.cells import quadrature
 from mracad.model.congruence import CLOSE, Congruence, Figure, Figures, congruences
-from mracad.seam.energy import Forms, forms, on_pattern
+from mracad.seam.energy import Forms, forms
+from mracad.seam.integrals import on_pattern
 from mracad.seam.interface import Joints
 from mracad.seam.ladders import Creases
 from mracad.seam.metric import SMOOTHER, creases, seen, smoothed
@@ -312,8 +313,12 @@ def _follows(trend: Net, net: Net, metric: Net, form: Forms) -> bool:
     normals = cross(metric.tangents(us, vs, 0), metric.tangents(us, vs, 1))
     normals /= np.maximum(np.linalg.norm(normals, axis=-1, keepdims=True), 1e-300)
     left = ((net.poles - trend.poles) * normals).sum(axis=-1).ravel()
-    points, stiff = (net.poles - net.poles.mean(axis=(0, 1))).reshape(-1, 3), form.bending + form.creases
-    return float(left @ (stiff @ left)) <= ROUGHEST * float((points * (stiff @ points)).sum())
+    points = (net.poles - net.poles.mean(axis=(0, 1))).reshape(-1, 3)
+    bends = [
+        sum(float((each * (stiff @ each)).sum()) for stiff in (form.bending, form.creases) if stiff.nnz)
+        for each in (left, points)
+    ]
+    return bends[0] <= ROUGHEST * bends[1]
 
 
 def largest(wish: Wish, alone: Problem, sheet: Sheet) -> float:

@@ -110,6 +110,8 @@ def quadrature(
     face too narrow to contain a point counts as the box around it.
     """
     shapes = [outline(face, net) for face in faces]
+    if len(shapes) == 1 and shapes[0].natural:
+        return _whole(net.u, net.v, points, fewest, ends)
     for halvings in range(HALVINGS + 1):
         (u, wu), (v, wv) = (
             _gauss(_breaks(kv, axis, shapes, PIECES << halvings), points or kv.degree + 1, fewest, ends)
@@ -124,6 +126,15 @@ def quadrature(
     keep_u, keep_v = cells.any(axis=1), cells.any(axis=0)
     mask = mask[np.repeat(keep_u, u.shape[1])][:, np.repeat(keep_v, v.shape[1])]
     return Quadrature(u[keep_u], v[keep_v], wu[keep_u], wv[keep_v], mask)
+
+
+@kept(64)
+def _whole(u: KnotVector, v: KnotVector, points: int | None, fewest: int, ends: bool) -> Quadrature:
+    """Points over a whole surface."""
+    pieces = (np.stack([kv.breaks[:-1], kv.breaks[1:]], axis=1) for kv in (u, v))
+    found = [_gauss(each, points or kv.degree + 1, fewest, ends) for each, kv in zip(pieces, (u, v), strict=True)]
+    (at_u, in_u), (at_v, in_v) = found
+    return Quadrature(at_u, at_v, in_u, in_v, np.ones((at_u.size, at_v.size), bool))
 
 
 def _boxed(shape: Outline, net: Net, u: Array, v: Array) -> Array:

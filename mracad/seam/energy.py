@@ -21,7 +21,7 @@ from mracad.bspline.functions import ORDERS
 from mracad.bspline.jets import jets
 from mracad.bspline.surface import Net
 from mracad.model.cells import Quadrature
-from mracad.seam.integrals import Order, Sites, integrals, nothing, sites, sparse
+from mracad.seam.integrals import Order, Sites, integrals, nothing, on_pattern, sites, sparse
 from mracad.seam.kinks import FLATTEST, kinks
 from mracad.seam.stretch import EVEN, Stretch, stretched
 
@@ -98,7 +98,7 @@ def masses(net: Net, quadrature: Quadrature) -> Forms:
             area = area / _jets(Net(net.u, net.v, net.weights[..., None]), along)[0, 0] ** 2
         integrals(along, {(ORDERS[0], ORDERS[0]): np.where(mask, area, 0.0)}, form)
     none = csr_array((net.u.count * net.v.count,) * 2)
-    return Forms(*sparse([form], net), none, none)
+    return Forms(sparse([form], net)[0], none, none)
 
 
 def slopes(net: Net, metric: Net, quadrature: Quadrature) -> Any:
@@ -136,7 +136,7 @@ def _squared(
         orders = ORDERS
         mass, frame = _over_weights(net, net.weights, along, area, frame)
     frame = frame * np.sqrt(area)
-    squares = {}
+    squares: dict[tuple[Order, Order], Array] = {}
     for i, a in enumerate(orders):
         products = (frame[i] * frame[: i + 1]).sum(axis=1)
         squares |= {(a, b): product for b, product in zip(orders, products, strict=False)}
@@ -207,11 +207,3 @@ def _jets(net: Net, along: tuple[Sites, Sites], most: int = 2) -> Array:
 
 def _dot(a: Array, b: Array) -> Array:
     return np.asarray(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
-
-
-def on_pattern(form: Any, like: Any) -> Any:
-    """The matrix, sharing the index arrays of another one if the patterns are equal."""
-    from scipy.sparse import csr_array
-
-    same = np.array_equal(form.indptr, like.indptr) and np.array_equal(form.indices, like.indices)
-    return csr_array((form.data, like.indices, like.indptr), shape=form.shape) if same else form

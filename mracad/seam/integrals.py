@@ -116,7 +116,9 @@ def integrals(
         low, high = sorted(both)
         pairs.setdefault((low[0], high[0]), []).append((low[1], high[1], values))
     form = nothing(u.knots, v.knots) if form is None else form
-    lopsided = any(i != j for i, j in pairs)  # then half of the form is added up, and its mirror image is the other half
+    lopsided = any(
+        i != j for i, j in pairs
+    )  # then half of the form is added up, and its mirror image is the other half
     half = nothing(u.knots, v.knots) if lopsided else form
     stencil = half.swapaxes(1, 2).reshape(u.knots.count, 2 * p + 1, v.knots.count * (2 * q + 1))
     outer = u.products(tuple(pairs)).swapaxes(1, 2)
@@ -184,7 +186,7 @@ def _mirrored(form: Array) -> Array:
     )
     flat = form.swapaxes(1, 2).reshape(len(rows), len(columns))
     nu, nv, wu, wv = form.shape
-    return flat[rows].take(columns, axis=1).reshape(nu, wu, nv, wv).swapaxes(1, 2)
+    return np.asarray(flat[rows].take(columns, axis=1).reshape(nu, wu, nv, wv).swapaxes(1, 2))
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,12 +195,12 @@ class _Pattern:
 
     Attributes
     ----------
-    rows : ndarray (rows,) of int
-        Control points with entries, ascending.
-    there : ndarray of int, optional
-        Places of the entries in the stencil; None if all are.
-    indices, indptr : ndarray of int32
-        As of ``scipy.sparse.csr_array``.
+    there : ndarray (entries,) of int, optional
+        Their places in the stencil; None if all are.
+    row, indices : ndarray (entries,) of int32
+        Their rows and columns.
+    indptr : ndarray (points + 1,) of int32
+        Where the entries of each row begin.
     """
 
     there: Array | None
@@ -209,19 +211,17 @@ class _Pattern:
 
 @kept(16)
 def _pattern(size: tuple[int, int], width: tuple[int, int], periodic: tuple[bool, bool], rows: Any) -> _Pattern:
-    own = [np.arange(n) if rows is None else np.frombuffer(each, int) for n, each in zip(size, rows or size, strict=True)]
+    own = [np.frombuffer(rows[k], int) if rows else np.arange(n) for k, n in enumerate(size)]
     at = [each[:, None] + np.arange(w) - w // 2 for each, w in zip(own, width, strict=True)]
-    inside = [(each >= 0) & (each < n) | round for each, n, round in zip(at, size, periodic, strict=True)]
-    nv = size[1]
+    inside = [(each >= 0) & (each < n) | closed for each, n, closed in zip(at, size, periodic, strict=True)]
     row, column = ((each % n).astype(np.int32) for each, n in zip(at, size, strict=True))
-    every = row[:, None, :, None] * np.int32(nv) + column[:, None]
+    every = row[:, None, :, None] * np.int32(size[1]) + column[:, None]
     there = inside[0][:, None, :, None] & inside[1][:, None]
     counts = np.zeros(size, np.int32)
     counts[np.ix_(*own)] = np.count_nonzero(there, axis=(2, 3))
-    places = None if there.all() else np.flatnonzero(there)
-    counts = counts.ravel()
-    start = np.append(np.int32(0), counts.cumsum(dtype=np.int32))
-    return _Pattern(places, np.repeat(np.arange(counts.size, dtype=np.int32), counts), every[there], start)
+    first = np.repeat(np.arange(counts.size, dtype=np.int32), counts.ravel())
+    ends = np.append(np.int32(0), counts.cumsum(dtype=np.int32))
+    return _Pattern(None if there.all() else np.flatnonzero(there), first, every[there], ends)
 
 
 def sparse(forms: Sequence[Array], net: Net, rows: tuple[Array, Array] | None = None) -> list[Any]:
@@ -237,9 +237,9 @@ def sparse(forms: Sequence[Array], net: Net, rows: tuple[Array, Array] | None = 
     """
     from scipy.sparse import csr_array
 
-    size, width, count = (net.u.count, net.v.count), forms[0].shape[2:], net.u.count * net.v.count
-    marks = None if rows is None else tuple(np.asarray(each, int).tobytes() for each in rows)
-    pattern = _pattern(size, width, (net.u.periodic, net.v.periodic), marks)
+    n, closed = net.u.count * net.v.count, (net.u.periodic, net.v.periodic)
+    marks = rows and tuple(np.asarray(each, int).tobytes() for each in rows)
+    pattern = _pattern((net.u.count, net.v.count), forms[0].shape[2:], closed, marks)
     values = [each.ravel() if pattern.there is None else each.ravel()[pattern.there] for each in forms]
     row, indices, ends = pattern.row, pattern.indices, pattern.indptr
     some = np.logical_or.reduce([each != 0 for each in values])
@@ -247,18 +247,22 @@ def sparse(forms: Sequence[Array], net: Net, rows: tuple[Array, Array] | None = 
         indices, ends = indices.copy(), ends.copy()
     else:
         values, row, indices = [each[some] for each in values], row[some], indices[some]
-        ends = np.append(np.int32(0), np.bincount(row, minlength=count).cumsum(dtype=np.int32))
+        ends = np.append(np.int32(0), np.bincount(row, minlength=n).cumsum(dtype=np.int32))
     if net.weights is not None:
         weights = net.weights.ravel()
         scale = weights[row] * weights[indices]
         values = [each * scale for each in values]
-    found = [csr_array((values[0], indices, ends), shape=(count, count))]
-    if net.u.periodic or net.v.periodic:
-        found += [csr_array((each, indices.copy(), ends.copy()), shape=(count, count)) for each in values[1:]]
-        for each in found:
-            each.sum_duplicates()
-        for each in found[1:]:
-            each.indices, each.indptr = found[0].indices, found[0].indptr
-    else:
-        found += [csr_array((each, indices, ends), shape=(count, count)) for each in values[1:]]
-    return found
+    if not any(closed):
+        return [csr_array((each, indices, ends), shape=(n, n)) for each in values]
+    found = [csr_array((each, indices.copy(), ends.copy()), shape=(n, n)) for each in values]
+    for each in found:
+        each.sum_duplicates()
+    return [found[0], *(on_pattern(each, found[0]) for each in found[1:])]
+
+
+def on_pattern(form: Any, like: Any) -> Any:
+    """The matrix, sharing the index arrays of another one if the patterns are equal."""
+    from scipy.sparse import csr_array
+
+    same = np.array_equal(form.indptr, like.indptr) and np.array_equal(form.indices, like.indices)
+    return csr_array((form.data, like.indices, like.indptr), shape=form.shape) if same else form

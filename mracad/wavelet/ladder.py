@@ -113,8 +113,10 @@ def ladder_for_scale(
     """
     if not scale > 0:
         raise UsageError(f"scale {scale} is not positive")
+    lengths = np.asarray(lengths, dtype=float)
+    if isinstance(keep, AbstractSet) and not keep and _short(kv, lengths, scale, tolerance):
+        return _bare(kv)
     ladder = _Ladder(kv, keep, lengths, tolerance, scale)
-    ladder.clear(_RESOLUTION)
     while ladder.drop(ladder.beside() < _RESOLUTION):
         pass
     if not ladder.sensible(len(ladder.alive)):
@@ -210,12 +212,6 @@ class _Ladder:
         within = free & within[:-2] & within[2:]
         return within if odd and within.any() else free
 
-    def clear(self, longest: int) -> None:
-        """Remove all clusters at once where the whole is shorter than ``longest``, as repeated sweeps would."""
-        if not self.kv.periodic and self.spans.sum() < longest:
-            self.alive = np.flatnonzero(self.fixed)
-            self.spans = np.add.reduceat(self.spans, self.alive[:-1])
-
     def drop(self, candidate: Array) -> bool:
         """Remove alternate clusters of each run of candidates; return whether any was removed."""
         candidate = candidate & ~self.fixed[self.alive]
@@ -261,6 +257,20 @@ class _Ladder:
             chief = np.arange(len(mults)) == np.lexsort((middle, -mults))[0]
         mults[~kept] = np.where(chief, np.minimum(mults, limit), 0)[~kept]
         return mults
+
+
+def _short(kv: KnotVector, lengths: Array, scale: float, tolerance: float) -> bool:
+    """Whether a clamped direction is certainly shorter than a scale, and no two of its breaks count as one."""
+    if kv.periodic or lengths.shape != (kv.spans,):
+        return False
+    whole = float(lengths.sum())
+    return whole < 0.999 * scale and float(lengths.min()) >= max(tolerance, 1e-6 * whole)
+
+
+@kept(128)
+def _bare(kv: KnotVector) -> KnotVector:
+    """The knot vector without the breaks inside."""
+    return kv if kv.spans == 1 else kv.with_multiplicities(np.append(1, np.zeros(kv.spans)))
 
 
 @kept(512)
