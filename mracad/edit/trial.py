@@ -320,18 +320,10 @@ def rank(verdict: Verdict) -> tuple[float, float]:
 
 
 def bounded(net: Net, offset: Array, bound: float, widths: tuple[float, float]) -> Array:
-    """Offsets ``(nu, nv, 3)`` scaled back, smoothly within widths, until none exceeds a bound along the normal.
+    """Offsets ``(nu, nv, 3)`` scaled back, smoothly within widths along u and v, until none exceeds a bound along the
+    normal; all in mm.
 
     Each gets the share min(1, bound / |δ · n|), smoothed, for the largest |δ · n| beside its Greville point.
-
-    Parameters
-    ----------
-    net : Net
-    offset : ndarray (nu, nv, 3)
-    bound : float
-        mm.
-    widths : (float, float)
-        Along u and v, mm.
     """
     share = bound / np.maximum(heights(net, offset), bound)
     return np.asarray(offset * eased(net, share, widths)[..., None])
