@@ -16,6 +16,7 @@ from dataclasses import replace
 import numpy as np
 
 from mracad.bspline.vectors import across, unit
+from mracad.memo import kept
 from mracad.model.brep import Edge, Model, Side
 from mracad.model.sampling import between, hermite, slopes
 from mracad.model.sampling import length as polygon
@@ -34,8 +35,8 @@ OF_MODEL, OF_EDGE, PRECISION = 1e-4, 2e-3, 1e-6
 BEYOND = 0.125
 """Share of the first and last steps by which an edge continues beyond its samples."""
 
-NEWTON = 4
-"""Newton steps to the nearest point of a curve."""
+NEWTON, SETTLED = 4, 1e-13
+"""Newton steps to the nearest point of a curve, and the change of its fraction after which no more follow."""
 
 COARSE = 0.1
 """Distance from an edge, over the step between its samples, beyond which it is certainly not its seam: arcs between
@@ -153,6 +154,7 @@ def apart(model: Model, edge: Edge, other: Edge) -> float:
     return _laid(model, edge, other)[1]
 
 
+@kept(4096)
 def _laid(model: Model, edge: Edge, other: Edge) -> tuple[Side, float]:
     """The side of another edge at the samples of an edge, and their largest distance from it, mm."""
     off, at = _carried(edge.points, other)
@@ -169,12 +171,13 @@ def _carried(points: Array, edge: Edge) -> tuple[Array, Array]:
     start, chord = edge.points[:-1], np.diff(edge.points, axis=0)
     square = np.maximum((chord**2).sum(axis=1), np.finfo(float).tiny)
     low, high = np.zeros(len(chord)), np.ones(len(chord))
-    along = ((points[:, None] - start) * chord).sum(axis=2) / square
+    away = points.T[:, :, None] - start.T[:, None]
+    along = sum(one * step for one, step in zip(away, chord.T, strict=True)) / square
     middle = along[len(points) // 2]
     if middle[0] > 0 and middle[-1] < 1:
         low[0], high[-1] = -BEYOND, 1.0 + BEYOND
     along = np.clip(along, low, high)
-    off = ((points[:, None] - start - along[..., None] * chord) ** 2).sum(axis=2)
+    off = sum((one - along * step) ** 2 for one, step in zip(away, chord.T, strict=True))
     segment = off.argmin(axis=1)
     s = along[np.arange(len(points)), segment][:, None]
     on = hermite(edge.points, slopes(edge.points, edge.tangents), segment, s)
@@ -207,7 +210,9 @@ def _sided(model: Model, points: Array, edge: Edge, at: Array) -> tuple[Side, fl
         s, su, sv = net.evaluate(uv, 1)
         along = face.turned((stop - start) * (su * way[:, :1] + sv * way[:, 1:]))
         step = ((points - face.placed(s)) * along).sum(axis=1) / np.maximum((along**2).sum(axis=1), 1e-300)
-        share = np.clip(share + step, 0.0, 1.0)
+        last, share = share, np.clip(share + step, 0.0, 1.0)
+        if np.abs(share - last).max() <= SETTLED:
+            break
     uv = curve.evaluate(start + share * (stop - start))[0]
     off = across(points - face.placed(net.evaluate(uv)), unit(along))
     return Side(face.index, uv=uv), float(np.linalg.norm(off, axis=1).max())

@@ -29,8 +29,8 @@ Array = np.ndarray
 GAUSS = 4
 """Conditions in each piece of a seam between crossings."""
 
-NEWTON = 6
-"""Newton steps to find corresponding fractions of two edges."""
+NEWTON, SETTLED = 6, 1e-13
+"""Newton steps to find corresponding fractions of two edges, and the change of these after which no more follow."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,7 +141,9 @@ def _nearest(model: Model, a: Trace, b: Trace, fractions: Array) -> Array:
         way = b.way(fractions)
         along = su * way[:, :1] + sv * way[:, 1:]
         step = ((points - s) * along).sum(axis=1) / np.maximum((along**2).sum(axis=1), 1e-300)
-        fractions = np.clip(fractions + step, 0.0, 1.0)
+        last, fractions = fractions, np.clip(fractions + step, 0.0, 1.0)
+        if np.abs(fractions - last).max() <= SETTLED:
+            break
     return np.asarray(fractions)
 
 
