@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -25,16 +26,24 @@ def scattered(places: Sequence[Place], derivatives: int) -> tuple[Array, ...]:
 
     Surfaces with different numbers k of coordinates cannot be mixed.
     """
-    sizes = [len(uv) for _, uv, _ in places]
-    ends = np.cumsum([0, *sizes])
-    found: list[Array] = []
-    for those in _alike(places, sizes):
-        parts = _evaluated([places[i] for i in those], derivatives)
-        found = found or [np.empty((ends[-1], part.shape[1])) for part in parts]
-        at = np.concatenate([np.arange(ends[i], ends[i + 1]) for i in those])
-        for whole, part in zip(found, parts, strict=True):
-            whole[at] = part
-    return tuple(found)
+    return _gathered(_batches(places, derivatives), [net for net, _, _ in places])
+
+
+class Scattered:
+    """The functions at places, for surfaces over the same knots.
+
+    Parameters
+    ----------
+    places : sequence of Place
+    derivatives : {0, 1, 2}
+    """
+
+    def __init__(self, places: Sequence[Place], derivatives: int) -> None:
+        self._batches = list(_batches(places, derivatives))
+
+    def evaluate(self, nets: Sequence[Net]) -> tuple[Array, ...]:
+        """Points and derivatives, as from :func:`scattered`, given the surface of each place."""
+        return _gathered(self._batches, nets)
 
 
 def normals(places: Sequence[Place], su: Array, sv: Array) -> Array:
@@ -67,22 +76,67 @@ def _alike(places: Sequence[Place], sizes: Sequence[int]) -> Iterator[list[int]]
     yield from (those for those, _ in blocks.values())
 
 
-def _evaluated(places: Sequence[Place], derivatives: int) -> tuple[Array, ...]:
-    """Those of surfaces of equal degrees."""
-    nets = {id(net): net for net, _, _ in places}
-    begins = dict(
-        zip(nets, np.cumsum([0, *(net.u.count * net.v.count for net in nets.values())]).tolist(), strict=False)
-    )
-    poles = np.concatenate(
-        [(each := homogeneous(net.poles, net.weights)).reshape(-1, each.shape[-1]) for net in nets.values()]
-    )
-    orders = range(derivatives + 1)
-    first_u, in_u = zip(*(jet(net.u, uv[:, 0], orders, side[0]) for net, uv, side in places), strict=True)
-    first_v, in_v = zip(*(jet(net.v, uv[:, 1], orders, side[1]) for net, uv, side in places), strict=True)
-    layout = np.array([(begins[id(net)], net.u.count, net.v.count) for net, _, _ in places])
-    begin, count_u, count_v = np.repeat(layout, [len(uv) for _, uv, _ in places], axis=0).T[..., None]
-    net = places[0][0]
-    row = (np.concatenate(first_u)[:, None] + np.arange(net.u.degree + 1)) % count_u
-    column = (np.concatenate(first_v)[:, None] + np.arange(net.v.degree + 1)) % count_v
-    index = (begin + row * count_v)[:, :, None] + column[:, None, :]
-    return evaluated(poles[index], np.concatenate(in_u), np.concatenate(in_v), net.weights is not None)
+def _batches(places: Sequence[Place], derivatives: int) -> Iterator[_Batch]:
+    sizes = [len(uv) for _, uv, _ in places]
+    ends = np.cumsum([0, *sizes])
+    for those in _alike(places, sizes):
+        at = np.concatenate([np.arange(ends[i], ends[i + 1]) for i in those])
+        yield _Batch.of(those, at, [places[i] for i in those], derivatives)
+
+
+def _gathered(batches: Iterable[_Batch], nets: Sequence[Net]) -> tuple[Array, ...]:
+    """What is evaluated batch by batch, in the order of places."""
+    found = [(batch.at, batch.evaluate(nets)) for batch in batches]
+    size = sum(len(at) for at, _ in found)
+    every = tuple(np.empty((size, part.shape[1])) for part in found[0][1]) if found else ()
+    for at, parts in found:
+        for whole, part in zip(every, parts, strict=True):
+            whole[at] = part
+    return every
+
+
+@dataclass(frozen=True, eq=False)
+class _Batch:
+    """The functions at places on surfaces of equal degrees.
+
+    Attributes
+    ----------
+    at : ndarray of int (q,)
+        Numbers of the parameters.
+    firsts : list of int
+        Places on different surfaces.
+    index : ndarray of int (q, du + 1, dv + 1)
+        Control points that matter, of the surfaces there one after another.
+    in_u, in_v : ndarray (q, derivatives + 1, d + 1)
+        Values and derivatives of their functions.
+    """
+
+    at: Array
+    firsts: list[int]
+    index: Array
+    in_u: Array
+    in_v: Array
+
+    @classmethod
+    def of(cls, those: Sequence[int], at: Array, places: Sequence[Place], derivatives: int) -> _Batch:
+        """Those at places with the given positions among all."""
+        firsts: dict[int, int] = {}
+        for i, (net, _, _) in zip(those, places, strict=True):
+            firsts.setdefault(id(net), i)
+        counts = {id(net): net.u.count * net.v.count for net, _, _ in places}
+        begins = dict(zip(firsts, np.cumsum([0, *(counts[each] for each in firsts)]).tolist(), strict=False))
+        orders, net = range(derivatives + 1), places[0][0]
+        first_u, in_u = zip(*(jet(net.u, uv[:, 0], orders, side[0]) for net, uv, side in places), strict=True)
+        first_v, in_v = zip(*(jet(net.v, uv[:, 1], orders, side[1]) for net, uv, side in places), strict=True)
+        layout = np.array([(begins[id(net)], net.u.count, net.v.count) for net, _, _ in places])
+        begin, count_u, count_v = np.repeat(layout, [len(uv) for _, uv, _ in places], axis=0).T[..., None]
+        row = (np.concatenate(first_u)[:, None] + np.arange(net.u.degree + 1)) % count_u
+        column = (np.concatenate(first_v)[:, None] + np.arange(net.v.degree + 1)) % count_v
+        index = (begin + row * count_v)[:, :, None] + column[:, None, :]
+        return cls(at, list(firsts.values()), index, np.concatenate(in_u), np.concatenate(in_v))
+
+    def evaluate(self, nets: Sequence[Net]) -> tuple[Array, ...]:
+        """Points and derivatives, given the surfaces of all places."""
+        own = [nets[i] for i in self.firsts]
+        poles = [(each := homogeneous(net.poles, net.weights)).reshape(-1, each.shape[-1]) for net in own]
+        return evaluated(np.concatenate(poles)[self.index], self.in_u, self.in_v, own[0].weights is not None)

@@ -135,13 +135,19 @@ class Net:
         """
         uv = np.asarray(uv, dtype=float).reshape(-1, 2)
         su, sv = tangents or self.evaluate(uv, 1, side)[1:]
-        lengths = [np.linalg.norm(x, axis=1) for x in (su, sv)]
+        return np.asarray(self.normals_beside(su[None], sv[None], [(uv, side)])[0])
+
+    def normals_beside(self, su: Array, sv: Array, sides: Sequence[tuple[Array, tuple[Side, Side]]]) -> Array:
+        """The same where several limits are taken at once, ``(sides, q, 3)``; from ``S_u`` and ``S_v``, and for each
+        side the parameters and limits."""
+        lengths = [np.linalg.norm(x, axis=2) for x in (su, sv)]
         floor = self.least_tangents
         normal = cross(su, sv)
-        bad = ~(np.linalg.norm(normal, axis=1) > 1e-9 * lengths[0] * lengths[1])
+        bad = ~(np.linalg.norm(normal, axis=2) > 1e-9 * lengths[0] * lengths[1])
         bad |= (lengths[0] < floor[0]) | (lengths[1] < floor[1])
         if bad.any():
-            normal[bad] = self._limits(uv[bad], side)
+            for own, degenerate, (uv, side) in zip(normal, bad, sides, strict=True):
+                own[degenerate] = self._limits(uv[degenerate], side)
         return _unit(normal)
 
     @cached_property

@@ -10,7 +10,7 @@ from mracad.bspline.surface import Net
 from mracad.edit.pose import Scene
 from mracad.model.brep import Edge, Side
 from mracad.seam.interface import Joints
-from mracad.seam.sides import Looks
+from mracad.seam.sides import Bends
 
 MORE = 0.1
 """Share by which a jump may grow, on top of what an edit may add where there is none."""
@@ -41,7 +41,7 @@ class Jumps:
                 uses += [(scene.model.edges[edge], side) for side in meeting.sides]
                 self.seams.append((meeting.bend, meeting.bend + allowed / max(apart, 1)))
                 self.surfaces.append(beside.intersection(nets))
-        self.looks = Looks(scene.model, uses, nets)
+        self.bends = Bends(scene.model, uses, nets)
 
     def room(self, moved: Mapping[int, Net]) -> dict[int, float]:
         """The share of a displacement that each surface may make, 0 to 1, by index; surfaces that may make all are left
@@ -52,10 +52,10 @@ class Jumps:
         moved : mapping of int to Net
             The surfaces after the whole displacement.
         """
-        looks = self.looks.views(moved)
+        bends = self.bends.after(moved)
         room: dict[int, float] = {}
-        for (bend, most), beside, a, b in zip(self.seams, self.surfaces, looks[::2], looks[1::2], strict=True):
-            jump = float(np.nanmax(np.abs(a[:, 6] - b[:, 6]), initial=0.0))
+        for (bend, most), beside, a, b in zip(self.seams, self.surfaces, bends[::2], bends[1::2], strict=True):
+            jump = float(np.nanmax(np.abs(a - b), initial=0.0))
             if jump > most:
                 share = (most - bend) / (jump - bend)
                 room |= {i: min(share, room.get(i, 1.0)) for i in beside if i is not None}

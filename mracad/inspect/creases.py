@@ -17,7 +17,8 @@ from mracad.model.cells import inside_grid
 from mracad.wavelet.ladder import arc_lengths
 
 Array = np.ndarray
-Tangents = Sequence[tuple[Array, Array]]
+Tangents = tuple[Array, Array]
+"""S_u and S_v on the left and right of knot lines, ``(2, n, 3)`` each."""
 
 CLUSTER = 1e-4, 1e-6
 """Knots closer than this, mm, or than this fraction of the surface, count as one."""
@@ -80,7 +81,7 @@ class Crossing:
     seen: Array
 
     def tangents(self, net: Net) -> Tangents:
-        """S_u and S_v of a surface over these knots on either side of the lines, ``(n, 3)`` each."""
+        """Those of a surface over these knots."""
         poles, found = np.swapaxes(homogeneous(net.poles, net.weights), 0, self.axis), []
         along, *across = self._rows
         for value, slope in across:
@@ -90,12 +91,13 @@ class Crossing:
                 stack = surface_quotient(stack)
             first, second = (part[self.seen] for part in stack[1:])
             found.append((first, second) if self.axis == 0 else (second, first))
-        return found
+        su, sv = zip(*found, strict=True)
+        return np.stack(su), np.stack(sv)
 
     def angles(self, net: Net, tangents: Tangents) -> Array:
         """Angles between the normals on either side of these knot lines of a surface with the given tangents; radians,
         NaN where it is degenerate."""
-        one, other = (net.normals(*side, both) for side, both in zip(self._sides, tangents, strict=True))
+        one, other = net.normals_beside(*tangents, self._sides)
         return np.asarray(2 * np.arcsin(np.minimum(np.linalg.norm(other - one, axis=1) / 2, 1.0)))
 
     @cached_property

@@ -35,35 +35,52 @@ class Placed:
 
     Attributes
     ----------
-    spread : ndarray
-        Bending or variation of the place beyond its base, over the largest around it before, less 1.
-    lost : ndarray
-        Share of its bending or curvature variation that the place lost, whichever is larger.
-    rise : ndarray (2, nu, nv)
-        Growth of bending and curvature variation of the place, over the mean growth of all places.
-    curvature : ndarray
-        Largest curvature after the edit, 1/mm.
-    turn : ndarray
-        Largest angle between normals before and after, radians.
-    opened : ndarray
-        Largest growth of the angle across a knot line, radians.
-    unsettled : ndarray
-        See :class:`mracad.inspect.roughness.Change`.
+    figures : ndarray (8, nu, nv)
+        All that depends on the amount of a displacement.
     area : ndarray
         Area, mm²; zero where a place is too small to count.
     ends : (ndarray, ndarray)
         Parameters at which places end, along u and v.
     """
 
-    spread: Array
-    lost: Array
-    rise: Array
-    curvature: Array
-    turn: Array
-    opened: Array
-    unsettled: Array
+    figures: Array
     area: Array
     ends: tuple[Array, Array]
+
+    @property
+    def spread(self) -> Array:
+        """Bending or variation of the place beyond its base, over the largest around it before, less 1."""
+        return np.asarray(self.figures[0])
+
+    @property
+    def lost(self) -> Array:
+        """Share of its bending or curvature variation that the place lost, whichever is larger."""
+        return np.asarray(self.figures[1])
+
+    @property
+    def curvature(self) -> Array:
+        """Largest curvature after the edit, 1/mm."""
+        return np.asarray(self.figures[2])
+
+    @property
+    def turn(self) -> Array:
+        """Largest angle between normals before and after, radians."""
+        return np.asarray(self.figures[3])
+
+    @property
+    def opened(self) -> Array:
+        """Largest growth of the angle across a knot line, radians."""
+        return np.asarray(self.figures[4])
+
+    @property
+    def unsettled(self) -> Array:
+        """See :class:`mracad.inspect.roughness.Change`."""
+        return np.asarray(self.figures[5])
+
+    @property
+    def rise(self) -> Array:
+        """Growth of bending and curvature variation of the place, over the mean growth of all, ``(2, nu, nv)``."""
+        return np.asarray(self.figures[6:])
 
     def at(self, u: Array, v: Array) -> tuple[Array, Array]:
         """Indices of the places at parameters, along u and along v."""
@@ -124,16 +141,17 @@ class Places:
         """
         shape, counts = self.area.shape, self.area > 0
         means, beyond = _means(tally, shape)
-        spread = np.where(counts, (beyond / self.around - 1).max(axis=0), 0.0)
         fell = self.before - means
-        lost = np.where(counts, (fell / self.most).max(axis=0), 0.0)
-        rise = np.maximum(-fell * self.area, 0.0)
-        rise /= np.maximum(rise.mean(axis=(1, 2), keepdims=True), 1e-300)
-        grown = np.zeros(shape)
+        found = np.zeros((8, *shape))
+        for figure, (bending, variation) in zip(found, (beyond / self.around - 1, fell / self.most), strict=False):
+            np.maximum(bending, variation, out=figure)
+        found[:2, ~counts] = 0.0
+        found[2], found[3], found[5] = (each.reshape(shape) for each in (tally.tops[0], turned, unsettled))
         for at, each in zip(self.crossed, opened, strict=True):
-            np.fmax.at(grown, at, each)
-        peaks, turn, singular = (each.reshape(shape) for each in (tally.tops[0], turned, unsettled))
-        return Placed(spread, lost, rise, peaks, turn, grown, singular, self.area, self.ends)
+            np.fmax.at(found[4], at, each)
+        rise = np.maximum(-fell * self.area, 0.0, out=found[6:])
+        rise /= np.maximum(rise.mean(axis=(1, 2), keepdims=True), 1e-300)
+        return Placed(found, self.area, self.ends)
 
 
 def strips(rule: Quadrature, column: Array, speeds: Array, axis: int, side: float) -> tuple[Array, Array]:

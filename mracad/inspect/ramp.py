@@ -109,9 +109,8 @@ def _normals(survey: Survey, net: Net, tally: Tally) -> tuple[Array, Array]:
 def _angles(survey: Survey, slope: _Slope, net: Net, amount: float) -> Iterator[Array]:
     """The angles at places where tangents may jump, of a displaced net."""
     for each, added in zip(survey.crossed, slope.tangents, strict=True):
-        sides = zip(each.tangents, added, strict=True)
-        now = [(su + amount * tu, sv + amount * tv) for (su, sv), (tu, tv) in sides]
-        yield each.crossing.angles(net, now)
+        (su, sv), (tu, tv) = each.tangents, added
+        yield each.crossing.angles(net, (su + amount * tu, sv + amount * tv))
 
 
 def _unsettled(survey: Survey, form: Forms) -> Array:

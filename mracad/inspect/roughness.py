@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from enum import Enum
-from typing import Any, cast
+from operator import attrgetter, mul
+from typing import Any
 
 import numpy as np
 
@@ -28,9 +29,6 @@ class Rougher(Enum):
 
 
 SUMS = Rougher.BENDING, Rougher.VARIATION
-
-ALWAYS = frozenset({"before", "noise", "area", "ends"})
-"""What every amount of a change has in common."""
 
 SETTLED = 0.005
 """Share by which the curvature at singular points may change."""
@@ -223,14 +221,21 @@ def between(known: Mapping[float, Change], amount: float) -> Change:
     """
     near = sorted(known, key=lambda at: abs(at - amount))[:3]
     weights = [math.prod((amount - other) / (at - other) for other in near if other != at) for at in near]
-    return cast(Change, _mixed([known[at] for at in near], weights))
+    parts = [known[at] for at in near]
+    after, opened, turn, deviation, motion, unsettled = zip(*map(_FIGURES, parts), strict=True)
+
+    def mixed(figures: Iterable[Any]) -> Any:
+        return sum(map(mul, weights, figures))
+
+    first, placed = parts[0], parts[0].placed
+    if placed is not None:
+        placed = Placed(mixed(part.placed.figures for part in parts if part.placed), placed.area, placed.ends)
+    sums = (mixed(each) for each in zip(*map(_AFTER, after), strict=True))
+    return Change(
+        first.before, Roughness(first.after.area, *sums), first.noise,
+        mixed(opened), mixed(turn), mixed(deviation), mixed(motion), mixed(unsettled), placed,
+    )  # fmt: skip
 
 
-def _mixed(parts: Sequence[Any], weights: Sequence[float]) -> Any:
-    """The weighted sum of figures, also of arrays and of those within objects."""
-    if isinstance(parts[0], float | np.ndarray):
-        return sum(weight * part for weight, part in zip(weights, parts, strict=True))
-    if not isinstance(parts[0], Change | Roughness | Placed):
-        return parts[0]
-    names = (each.name for each in fields(parts[0]) if each.name not in ALWAYS)
-    return replace(parts[0], **{name: _mixed([getattr(part, name) for part in parts], weights) for name in names})
+_FIGURES = attrgetter("after", "opened", "turn", "deviation", "motion", "unsettled")
+_AFTER = attrgetter("bending", "variation", "curvature", "kink")

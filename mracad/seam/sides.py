@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import dataclass
 
 import numpy as np
 
 from mracad.bspline.knots import Side as Limit
-from mracad.bspline.scattered import normals, scattered
+from mracad.bspline.scattered import Place, Scattered, normals, scattered
 from mracad.bspline.surface import Net, curvature
 from mracad.bspline.vectors import cross
 from mracad.model.brep import Edge, Face, Model, Side
@@ -23,90 +22,53 @@ BLOCK = 50_000
 
 
 def views(model: Model, uses: Sequence[tuple[Edge, Side]]) -> list[Array]:
-    """Faces at the samples of edges; see :class:`Looks`."""
-    return Looks(model, uses).views()
+    """Faces at the samples of edges, evaluated at once.
+
+    Returns
+    -------
+    list of ndarray (k, 7)
+        Points (mm), outward normals and normal curvatures across the edge (1/mm) in the part's frame; NaN where there
+        is none.
+    """
+    found, strips = _still(uses), list(_strips(model, dict(enumerate(uses)), {}))
+    ends = np.cumsum([len(strip.place[1]) for strip in strips], dtype=int)
+    for block in np.split(np.arange(len(strips)), np.flatnonzero(np.diff(ends // BLOCK)) + 1):
+        if len(block):
+            for i, table in _seen([strips[k] for k in block], uses):
+                found[i] = table
+    return found
 
 
-class Looks:
-    """Faces at the samples of edges, before and after their surfaces move.
-
-    Faces are evaluated at once.
+class Bends:
+    """Normal curvatures of faces across edges while surfaces move.
 
     Parameters
     ----------
     model : Model
     uses : sequence of (Edge, Side)
-    nets : mapping of int to Net, optional
-        Surfaces over other knots than in the model, by index.
+    nets : mapping of int to Net
+        The surfaces that move, over the knots of their displacements, by index.
     """
 
-    def __init__(self, model: Model, uses: Sequence[tuple[Edge, Side]], nets: Mapping[int, Net] | None = None) -> None:
-        self._still: list[Array] = [np.empty((0, 7))] * len(uses)
-        groups: dict[tuple[int, tuple[Limit, Limit]], list[tuple[int, Array]]] = defaultdict(list)
-        nets = {surface.index: surface.net for surface in model.surfaces} | dict(nets or {})
-        for i, (edge, side) in enumerate(uses):
-            if side.uv is None:
-                bends = np.full(len(side.points), np.nan) if side.curvatures is None else side.curvatures  # type: ignore[arg-type]
-                self._still[i] = np.column_stack([side.points, side.normals, bends])  # type: ignore[list-item]
-            else:
-                face = model.faces[side.face]
-                assert face.surface is not None
-                uv, limits = from_inside(face, nets[face.surface], edge.index, side.uv)
-                groups[side.face, limits].append((i, uv))
-        self._strips = []
-        for (number, limits), members in groups.items():
-            face = model.faces[number]
-            assert face.surface is not None
-            uv = np.concatenate([each for _, each in members])
-            self._strips.append(_Strip(face, face.surface, nets[face.surface], limits, [i for i, _ in members], uv))
-        self._along = [edge.tangents for edge, _ in uses]
+    def __init__(self, model: Model, uses: Sequence[tuple[Edge, Side]], nets: Mapping[int, Net]) -> None:
+        moving = [side.uv is not None and model.faces[side.face].surface in nets for _, side in uses]
+        before = iter(views(model, [use for use, moves in zip(uses, moving, strict=True) if not moves]))
+        self._found = [np.empty(0) if moves else next(before)[:, 6] for moves in moving]
+        self._strips = list(_strips(model, {i: use for i, use in enumerate(uses) if moving[i]}, nets))
+        if self._strips:
+            self._functions = Scattered([strip.place for strip in self._strips], 2)
+            self._sense = _Sense.of(self._strips, uses)
 
-    def views(self, moved: Mapping[int, Net] | None = None) -> list[Array]:
-        """What is seen after some surfaces have moved, given over the same knots, by index.
-
-        Returns
-        -------
-        list of ndarray (k, 7)
-            Points (mm), outward normals and normal curvatures across the edge (1/mm) in the part's frame; NaN where
-            there is none.
-        """
-        found = list(self._before)
-        if moved:
-            now = [replace(each, net=moved[each.surface]) for each in self._strips if each.surface in moved]
-            for i, part in self._seen(now):
+    def after(self, moved: Mapping[int, Net]) -> list[Array]:
+        """Curvatures at the samples of each edge, 1/mm; NaN where there is none.  All surfaces that move are given."""
+        found = list(self._found)
+        if self._strips:
+            _, *derivatives = self._functions.evaluate([moved[strip.surface] for strip in self._strips])
+            vectors = self._sense.turned(np.stack(derivatives))
+            bends = self._sense.bends(vectors, cross(vectors[0], vectors[1]))
+            for i, part in self._sense.divided(bends):
                 found[i] = part
         return found
-
-    @cached_property
-    def _before(self) -> list[Array]:
-        found = list(self._still)
-        for i, part in self._seen(self._strips):
-            found[i] = part
-        return found
-
-    def _seen(self, strips: Sequence[_Strip]) -> Iterator[tuple[int, Array]]:
-        """What is seen at the samples of strips, by the number of the edge."""
-        ends = np.cumsum([len(strip.uv) for strip in strips], dtype=int)
-        for block in np.split(np.arange(len(strips)), np.flatnonzero(np.diff(ends // BLOCK)) + 1):
-            if len(block):
-                yield from self._at_once([strips[k] for k in block])
-
-    def _at_once(self, strips: Sequence[_Strip]) -> Iterator[tuple[int, Array]]:
-        sizes, members = [len(strip.uv) for strip in strips], [i for strip in strips for i in strip.members]
-        places = [(strip.net, strip.uv, strip.limits) for strip in strips]
-        stack = scattered(places, 2)
-        frames = np.array([strip.face.frame for strip in strips])
-        outward = np.repeat([float(strip.face.outward) for strip in strips], sizes)
-        vectors: Array = np.stack([*stack, normals(places, *stack[1:3])])
-        if (frames == frames[0]).all():
-            vectors = vectors @ frames[0, :3, :3].T
-        else:
-            vectors = np.einsum("qij,kqj->kqi", np.repeat(frames[:, :3, :3], sizes, axis=0), vectors)
-        point, *derivatives, normal = vectors
-        along = [self._along[i] for i in members]
-        bends = outward * curvature(tuple(derivatives), cross(normal, np.concatenate(along)))
-        table = np.column_stack([point + np.repeat(frames[:, :3, 3], sizes, axis=0), outward[:, None] * normal, bends])
-        yield from zip(members, np.split(table, np.cumsum([len(each) for each in along])[:-1]), strict=True)
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,20 +79,100 @@ class _Strip:
     ----------
     face : Face
     surface : int
-    net : Net
-    limits : pair of {"right", "left"}
+    place : Place
+        The surface, parameters of the samples of all of them, and limits.
     members : list of int
         Numbers of the edges.
-    uv : ndarray (q, 2)
-        Parameters of the samples of all of them.
     """
 
     face: Face
     surface: int
-    net: Net
-    limits: tuple[Limit, Limit]
+    place: Place
     members: list[int]
-    uv: Array
+
+
+def _strips(model: Model, uses: Mapping[int, tuple[Edge, Side]], nets: Mapping[int, Net]) -> Iterator[_Strip]:
+    """The samples of edges that lie on surfaces, some of which have other knots than in the model."""
+    groups: dict[tuple[int, tuple[Limit, Limit]], list[tuple[int, Array]]] = defaultdict(list)
+    known = {surface.index: surface.net for surface in model.surfaces} | dict(nets)
+    for i, (edge, side) in uses.items():
+        face = model.faces[side.face]
+        if side.uv is not None and face.surface is not None:
+            uv, limits = from_inside(face, known[face.surface], edge.index, side.uv)
+            groups[side.face, limits].append((i, uv))
+    for (number, limits), members in groups.items():
+        face = model.faces[number]
+        assert face.surface is not None
+        place = known[face.surface], np.concatenate([uv for _, uv in members]), limits
+        yield _Strip(face, face.surface, place, [i for i, _ in members])
+
+
+@dataclass(frozen=True, eq=False)
+class _Sense:
+    """How the samples of strips lie in the part.
+
+    Attributes
+    ----------
+    members : list of int
+        Numbers of the edges, one after another.
+    ends : ndarray of int
+        Ends of their samples.
+    along : ndarray (q, 3)
+        Tangents of the edges.
+    outward : ndarray (q,)
+        1 where normals point outwards, otherwise -1.
+    frames : ndarray (q, 4, 4) or (1, 4, 4)
+        Places of the faces.
+    """
+
+    members: list[int]
+    ends: Array
+    along: Array
+    outward: Array
+    frames: Array
+
+    @classmethod
+    def of(cls, strips: Sequence[_Strip], uses: Sequence[tuple[Edge, Side]]) -> _Sense:
+        """Those of strips of some of the edges."""
+        sizes, members = [len(strip.place[1]) for strip in strips], [i for strip in strips for i in strip.members]
+        along = [uses[i][0].tangents for i in members]
+        frames = np.array([strip.face.frame for strip in strips])
+        outward = np.repeat([float(strip.face.outward) for strip in strips], sizes)
+        frames = frames[:1] if (frames == frames[0]).all() else np.repeat(frames, sizes, axis=0)
+        return cls(members, np.cumsum([len(each) for each in along]), np.concatenate(along), outward, frames)
+
+    def turned(self, vectors: Array) -> Array:
+        """Vectors ``(k, q, 3)`` in the part's frame."""
+        turn = self.frames[:, :3, :3]
+        return vectors @ turn[0].T if len(turn) == 1 else np.asarray(np.einsum("qij,kqj->kqi", turn, vectors))
+
+    def bends(self, derivatives: Array, normal: Array) -> Array:
+        """Normal curvatures across the edges, from first and second derivatives and normals of any length."""
+        return np.asarray(self.outward * curvature(tuple(derivatives), cross(normal, self.along)))
+
+    def divided(self, figures: Array) -> Iterator[tuple[int, Array]]:
+        """The figures of each edge, with its number."""
+        return zip(self.members, np.split(figures, self.ends[:-1]), strict=True)
+
+
+def _still(uses: Sequence[tuple[Edge, Side]]) -> list[Array]:
+    """What is known of edges on faces without control points; nothing of others."""
+    found = [np.empty((0, 7))] * len(uses)
+    for i, (_, side) in enumerate(uses):
+        if side.uv is None:
+            bends = np.full(len(side.points), np.nan) if side.curvatures is None else side.curvatures  # type: ignore[arg-type]
+            found[i] = np.column_stack([side.points, side.normals, bends])  # type: ignore[list-item]
+    return found
+
+
+def _seen(strips: Sequence[_Strip], uses: Sequence[tuple[Edge, Side]]) -> Iterator[tuple[int, Array]]:
+    """What is seen at the samples of strips, by the number of the edge."""
+    places, sense = [strip.place for strip in strips], _Sense.of(strips, uses)
+    stack = scattered(places, 2)
+    point, *derivatives, normal = sense.turned(np.stack([*stack, normals(places, *stack[1:3])]))
+    bends = sense.bends(np.stack(derivatives), normal)
+    point = point + sense.frames[:, :3, 3]
+    return sense.divided(np.column_stack([point, sense.outward[:, None] * normal, bends]))
 
 
 def from_inside(face: Face, net: Net, edge: int, uv: Array) -> tuple[Array, tuple[Limit, Limit]]:

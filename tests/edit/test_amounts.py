@@ -16,8 +16,8 @@ BEFORE = Roughness(10.0, 4.0, 2.0, 1.0, 0.5)
 
 def placed(figures):
     ends = np.array([1.0]), np.arange(1.0, 1.0 + figures.shape[1])
-    still = np.zeros(figures.shape)
-    return Placed(figures, -figures, np.stack([figures, figures]), still, still, still, still, still + 1.0, ends)
+    still = np.zeros((4, *figures.shape))
+    return Placed(np.stack([figures, -figures, *still, figures, figures]), still[0] + 1.0, ends)
 
 
 def change(amount, most):
