@@ -1,7 +1,8 @@
-"""Functions on flat arrays as machine code, which is kept on disk: to load it takes a tenth of the compiler's start.
+"""Functions on flat arrays as machine code, which is kept on disk and loaded without a compiler.
 
 It is kept beside the bytecode of the function's module, or in the cache of the user where that cannot be written, for
-one kind of processor, and used until the modules of its parts or the compiler change.
+one kind of processor, and used until the modules of its parts or the compiler change.  Code in one piece takes
+nothing but memory to load (:mod:`mracad.flat`); any other takes the library of the compiler, 45 MB.
 """
 
 from __future__ import annotations
@@ -9,21 +10,23 @@ from __future__ import annotations
 import contextlib
 import ctypes
 import hashlib
-from collections.abc import Callable, Sequence
+import os
+from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property, partial
+from importlib.metadata import version
 from importlib.util import cache_from_source
 from pathlib import Path
 from types import FunctionType
 from typing import Any
 
-from mracad import cache, note
+from mracad import cache, flat, note
 from mracad.errors import MracadError
 from mracad.output import put
 
 _NUMBERS = {"float64": ctypes.c_double, "int64": ctypes.c_int64}
 
 Function = Any
-_engines: list[Any] = []  # machine code lives as long as they do
+_owners: list[Any] = []  # machine code lives as long as they do
 
 
 class Compiled:
@@ -67,12 +70,10 @@ class Compiled:
 
     @cached_property
     def _key(self) -> bytes:
-        from llvmlite import __version__, binding
-
         parts = (self._function, *self._helpers, *self._inlined)
         sources = b"".join(Path(each).read_bytes() for each in sorted({part.__code__.co_filename for part in parts}))
-        processor = binding.get_host_cpu_name() + binding.get_host_cpu_features().flatten()
-        return hashlib.sha256(sources + "|".join([__version__, processor, repr(self._arguments)]).encode()).digest()
+        about = "|".join([version("llvmlite"), flat.processor() or _processor(), repr(self._arguments)])
+        return hashlib.sha256(sources + about.encode()).digest()
 
     @cached_property
     def _name(self) -> str:
@@ -84,6 +85,9 @@ class Compiled:
 
     @cached_property
     def _found(self) -> bytes | None:
+        return self._on_disk()
+
+    def _on_disk(self) -> bytes | None:
         """The machine code on disk, if it is whole."""
         for place in (self._beside, cache.find(self._name)):
             with contextlib.suppress(OSError):
@@ -93,15 +97,19 @@ class Compiled:
         return None
 
     def _made(self) -> bytes:
-        """The machine code, which is stored."""
-        note.doing(note.COMPILING)
-        code = self._compiled()
-        try:
-            self._beside.parent.mkdir(parents=True, exist_ok=True)
-            put(cache.sealed(self._key + code), self._beside)
-        except (OSError, MracadError):
-            cache.keep(self._name, cache.sealed(self._key + code))
-        return code
+        """The machine code, which is stored; by another process, if that was compiling it already."""
+        with _alone(Path(self._function.__code__.co_filename).parent):
+            found = self._on_disk()
+            if found is not None:
+                return found
+            note.doing(note.COMPILING)
+            code = self._compiled()
+            try:
+                self._beside.parent.mkdir(parents=True, exist_ok=True)
+                put(cache.sealed(self._key + code), self._beside)
+            except (OSError, MracadError):
+                cache.keep(self._name, cache.sealed(self._key + code))
+            return code
 
     def _compiled(self) -> bytes:
         from llvmlite import binding
@@ -123,7 +131,7 @@ class Compiled:
         passes = binding.create_new_module_pass_manager()
         passes.add_global_dead_code_eliminate_pass()
         passes.run(module, binding.create_pass_builder(machine, binding.create_pipeline_tuning_options()))
-        return bytes(machine.emit_object(module))
+        return flat.flat(machine.emit_object(module), _NAME)
 
     def _linked(self, compiler: Callable[..., Any]) -> Function:
         """The function, with helpers that are compiled when it is."""
@@ -137,20 +145,50 @@ class Compiled:
         return FunctionType(self._function.__code__, self._function.__globals__ | names, self._function.__name__)
 
     def _load(self, code: bytes) -> Callable[..., None]:
-        from llvmlite import binding
-
-        engine = binding.create_mcjit_compiler(binding.parse_assembly(""), _machine())
-        engine.add_object_file(binding.ObjectFileRef.from_data(code))
-        engine.finalize_object()
-        _engines.append(engine)
+        owner, start = flat.placed(code) if flat.is_flat(code) else _linked_by_compiler(code)
+        _owners.append(owner)
         names = [name for group in self._arguments for name in group]
         kinds: Any = [ctypes.c_void_p if name.endswith("*") else _NUMBERS[name] for name in names]
         native = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p, *kinds)
         unused = (ctypes.c_int64 * 2)()  # for a result and an exception, of which there are none
-        return partial(native(engine.get_function_address(_NAME)), unused, unused)
+        return partial(native(start), unused, unused)
 
 
 _NAME = "function"
+
+
+@contextlib.contextmanager
+def _alone(folder: Path) -> Iterator[None]:
+    """Have other processes wait that compile code of the same folder, where the system can do that."""
+    try:
+        from fcntl import LOCK_EX, flock
+
+        lock = os.open(folder, os.O_RDONLY)
+    except (ImportError, OSError):
+        yield
+        return
+    try:
+        with contextlib.suppress(OSError):
+            flock(lock, LOCK_EX)
+        yield
+    finally:
+        os.close(lock)
+
+
+def _processor() -> str:
+    from llvmlite import binding
+
+    return str(binding.get_host_cpu_name() + binding.get_host_cpu_features().flatten())
+
+
+def _linked_by_compiler(code: bytes) -> tuple[Any, int]:
+    """The owner of the code of an object file in memory, and its address."""
+    from llvmlite import binding
+
+    engine = binding.create_mcjit_compiler(binding.parse_assembly(""), _machine())
+    engine.add_object_file(binding.ObjectFileRef.from_data(code))
+    engine.finalize_object()
+    return engine, engine.get_function_address(_NAME)
 
 
 def _machine(processor: str = "", features: str = "") -> Any:

@@ -1,11 +1,15 @@
 """Machine code on disk: made once, loaded without a compiler, and made again where it is stale or damaged."""
 
+import os
+import subprocess
 import sys
+from pathlib import Path
+from threading import Thread
 
 import numpy as np
 import pytest
 
-from mracad import note
+from mracad import flat, note
 from mracad.compiled import Compiled
 
 
@@ -69,6 +73,60 @@ def test_it_is_in_the_users_cache_where_it_cannot_be_beside_its_module(folder, m
     made().prepare()
     monkeypatch.setattr(Compiled, "_compiled", None)
     assert made().ready and len(list((tmp_path / "kept").iterdir())) == 1
+
+
+def test_only_one_process_compiles_and_the_others_wait_for_it(folder, monkeypatch, tmp_path):
+    fcntl = pytest.importorskip("fcntl")
+    (file,) = folder.rglob("*.o")
+    monkeypatch.setattr(sys, "pycache_prefix", str(tmp_path))
+    monkeypatch.setattr(Compiled, "_compiled", None)
+    waiting = made()
+    assert not waiting.ready
+    other = os.open(Path(__file__).parent, os.O_RDONLY)
+    fcntl.flock(other, fcntl.LOCK_EX)
+    thread = Thread(target=waiting.prepare)
+    thread.start()
+    thread.join(0.1)
+    assert thread.is_alive()
+    copy = tmp_path / file.relative_to(folder)
+    copy.parent.mkdir(parents=True)
+    copy.write_bytes(file.read_bytes())
+    os.close(other)
+    thread.join(10)
+    assert waiting.ready and waiting._loaded
+
+
+@pytest.mark.skipif(not flat.processor(), reason="code in one piece is for Linux on x86-64")
+def test_the_compilers_library_is_not_loaded_for_code_in_one_piece(folder):
+    code = f"""
+import sys
+import numpy as np
+sys.pycache_prefix = {str(folder)!r}
+from tests.test_compiled import made
+before, after = np.arange(5.0), np.zeros(5)
+made()(5, before.ctypes.data, after.ctypes.data, 1.5)
+assert after.tolist() == [0.0, 3.0, 6.0, 9.0, 12.0]
+assert "llvmlite" not in sys.modules
+"""
+    subprocess.run([sys.executable, "-c", code], cwd=Path(__file__).parent.parent, check=True)
+
+
+@pytest.fixture(scope="module")
+def outward():
+    """A function that calls one of the system, so that its code cannot lie just anywhere."""
+
+    def powers(count, pointer, exponent):
+        for i in range(count):
+            pointer[i] = pointer[i] ** exponent
+
+    return Compiled(powers, (("int64",), ("float64*",), ("float64",)))
+
+
+def test_code_that_calls_the_system_is_loaded_by_the_compilers_library(outward):
+    code, numbers = outward._compiled(), np.arange(5.0)
+    assert not flat.is_flat(code)
+    outward._load(code)(5, numbers.ctypes.data, 3.0)
+    assert numbers.tolist() == [0.0, 1.0, 8.0, 27.0, 64.0]
 
 
 @pytest.fixture

@@ -18,7 +18,7 @@ from mracad.model.cells import Quadrature
 
 Array = np.ndarray
 
-FEW, MANY = 30_000, 1_000_000
+FEW, MANY = 10_000, 4_000_000
 """Numbers of points above which it pays to load compiled code, and to compile it."""
 
 

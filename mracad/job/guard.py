@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import gc
 import math
 import os
 import select
@@ -102,7 +103,11 @@ _OUT_OF_MEMORY = (
 
 
 def _child(work: Callable[[], Any], writer: int, memory: int | None) -> None:
-    """Run the work, send its result or error, and end the process in any case."""
+    """Run the work, send its result or error, and end the process in any case.
+
+    It ends too soon to gain from searching for cycles, which takes long among the classes of the kernel.
+    """
+    gc.disable()
     try:
         end_with_parent()
         signal.signal(signal.SIGTERM, _terminated)
