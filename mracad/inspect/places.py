@@ -175,7 +175,7 @@ def _met(crossing: Crossing, ends: tuple[Array, Array]) -> tuple[Array, Array]:
 
 def _means(tally: Tally, shape: tuple[int, int]) -> tuple[Array, Array]:
     """Means of bending and curvature variation, and of both beyond the base, ``(2, nu, nv)`` each."""
-    means = (tally.sums[2:] / np.maximum(tally.sums[1], 1e-300)).reshape(2, 2, *shape)
+    means = (tally.sums[2:6] / np.maximum(tally.sums[1], 1e-300)).reshape(2, 2, *shape)
     return means[0], means[1]
 
 

@@ -12,15 +12,15 @@ from mracad.inspect.creases import Tangents
 from mracad.inspect.curvature import Forms
 from mracad.inspect.roughness import Change
 from mracad.inspect.survey import Survey, largest, roughness
+from mracad.inspect.sweep import NOISY
 from mracad.inspect.tally import Tally
 
 Array = np.ndarray
 
-NOISY, STEEP = 1.0, 20.0
-"""If normals turn by more than the first in the median, degrees, noise is being removed; those that turn by more than
-the second are then also compared with those around."""
+STEEP = 20.0
+"""Where noise is being removed, normals that turn by more than this, degrees, are compared with those around, too."""
 
-_CHORDS = 2 * np.sin(np.radians([NOISY / 2, STEEP / 2]))
+_STEEP = 2 * np.sin(np.radians(STEEP / 2))
 
 STEADY = 0.05
 """Weight of a turn of the normal at a singular point, per radian, against a relative change of its curvature."""
@@ -97,7 +97,7 @@ def _change(survey: Survey, slope: _Slope, amount: float) -> Change:
 def _normals(survey: Survey, net: Net, tally: Tally) -> tuple[Array, Array]:
     """Turns of normals, radians, and changes of singular points: the largest of each place."""
     chords, unsettled = tally.tops[2], np.zeros(survey.marks.places)
-    if survey.singular or (chords > _CHORDS[1]).any():
+    if survey.singular or (tally.sums[6].sum() >= 0 and (chords > _STEEP).any()):
         form = survey.sight.forms(net)
         place = survey.sight.pairs(*survey.marks.strips, np.add)
         np.maximum.at(unsettled, place, _unsettled(survey, form))
@@ -133,8 +133,8 @@ def _turned(survey: Survey, form: Forms) -> Array:
     normals, regular = form.normal.astype(np.float32), survey.marks.counts > 0
     counted = form.regular & regular
     off = np.where(counted, np.linalg.norm(normals - survey.marks.normals, axis=0), 0.0)
-    rule, (noisy, most) = survey.rule, _CHORDS
-    if (off > most).any() and np.median(off[counted]) > noisy:
+    rule = survey.rule
+    if (off > _STEEP).any() and np.median(off[counted]) > NOISY:
         reach, mask = (rule.v.shape[1], rule.u.shape[1]), rule.mask.T
         place = np.full(mask.shape, -1)
         place[mask] = np.where(regular, np.arange(len(off)), -1)
@@ -142,7 +142,7 @@ def _turned(survey: Survey, form: Forms) -> Array:
         row, column = np.nonzero(mask)
         steps = np.ndindex(2 * reach[0] + 1, 2 * reach[1] + 1)
         for down, right in sorted(steps, key=lambda step: float(np.abs(np.subtract(step, reach)).sum())):
-            those = np.flatnonzero(off > most)
+            those = np.flatnonzero(off > _STEEP)
             beside = place[row[those] + down, column[those] + right]
             near = np.linalg.norm(normals[:, those] - survey.marks.normals[:, beside], axis=0)
             off[those] = np.where(beside < 0, off[those], np.minimum(off[those], near))

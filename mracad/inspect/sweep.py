@@ -12,16 +12,19 @@ import numpy as np
 from mracad.compiled import Compiled
 from mracad.inspect.curvature import dot, figures
 
-SUMS, TOPS = 6, 3
+SUMS, TOPS = 7, 3
 """Numbers per place that are added up, and of which the largest counts."""
+
+NOISY = 2 * np.sin(np.radians(0.5))
+"""If normals turn by more than a degree in the median, noise is being removed; as a chord."""
 
 _WIDE = 128
 """Points that the compiled code processes at once."""
 
 
-# Rows of the compiled code's scratch memory, _WIDE numbers each.
-_JETS, _WEIGHTS, _BASE, _OLD, _WEIGHT, _COUNTS, _ROUNDING, _PLACE = 0, 30, 40, 45, 48, 49, 50, 51
-_FORMS, _TOLD, SCRATCH = 52, 65, 74 * _WIDE
+# Rows of the compiled code's scratch memory, _WIDE numbers each.  Derivatives of equal order along u lie side by side.
+_JETS, _WEIGHTS, _BASE, _OLD, _WEIGHT, _COUNTS, _ROUNDING, _PLACE = 0, 30, 60, 65, 68, 69, 70, 71
+_FORMS, _TOLD, SCRATCH = 72, 85, 95 * _WIDE
 
 
 def told(seen: Any, base: Any, old: Any, rows: Any) -> Any:
@@ -33,6 +36,7 @@ def told(seen: Any, base: Any, old: Any, rows: Any) -> Any:
     counted = area * counts
     da, db, dc, du, dv = a - base[0], b - base[1], c - base[2], hu - base[3], hv - base[4]
     off = np.float32(nx) - old[0], np.float32(ny) - old[1], np.float32(nz) - old[2]
+    chord, looked = np.sqrt(dot(off, off)), share * counts
     return (
         area,
         counted,
@@ -40,9 +44,10 @@ def told(seen: Any, base: Any, old: Any, rows: Any) -> Any:
         (hu * hu + hv * hv) * counted,
         (da * da + 2.0 * (db * db) + dc * dc) * counted,
         (du * du + dv * dv) * counted,
+        looked * (2.0 * (chord > NOISY) - 1.0),
         largest * counts,
         (largest - rounding) * counts,
-        np.sqrt(dot(off, off)) * (share * counts),
+        chord * looked,
     )
 
 
@@ -79,7 +84,7 @@ def _sweep_points(lines: Any, sites: Any, marks: Any, found: Any, w: Any) -> Non
         fill, column, left = fill + n, column + n, left - n
         if fill == _WIDE or (run == count and left == 0):
             if lines[2] > 3:
-                _divide(lines[1], w)
+                _divide(w)
             if lines[1] > 1:
                 _figure(w)
                 _tell(marks, found, at, fill, w)
@@ -94,19 +99,23 @@ def _spread(lines: Any, sites: Any, part: Any, w: Any) -> None:
     rows, order, columns, taps = sites
     row, column, n, fill = part
     for r in range(orders):
-        for s in range(orders - r):
-            place = (r + s) * (r + s + 1) // 2 + s
-            for k in range(size):
-                to = (_JETS + 3 * place + k if k < 3 else _WEIGHTS + place) * _WIDE + fill
-                start = (r * size + k) * curves
-                for j in range(0, order, 4):
-                    at = row * order + j
-                    of = s * rows * order + at
-                    a = (start + columns[at]) * wide + column
-                    b = (start + columns[at + 1]) * wide + column
-                    c = (start + columns[at + 2]) * wide + column
-                    d = (start + columns[at + 3]) * wide + column
-                    _add_four(along, (a, b, c, d), (taps[of], taps[of + 1], taps[of + 2], taps[of + 3]), (to, n, j), w)
+        for k in range(size):
+            start, first = (r * size + k) * curves, r * (9 - r) // 2
+            for j in range(0, order, 4):
+                at = row * order + j
+                a = (start + columns[at]) * wide + column
+                b = (start + columns[at + 1]) * wide + column
+                c = (start + columns[at + 2]) * wide + column
+                d = (start + columns[at + 3]) * wide + column
+                for s in range(0, orders - r, 2):
+                    to = (_JETS + 3 * (first + s) + k if k < 3 else _WEIGHTS + 3 * (first + s)) * _WIDE + fill
+                    of, next = s * rows * order + at, (s + 1) * rows * order + at
+                    four = taps[of], taps[of + 1], taps[of + 2], taps[of + 3]
+                    if s + 1 < orders - r:
+                        eight = taps[next], taps[next + 1], taps[next + 2], taps[next + 3]
+                        _add_eight(along, (a, b, c, d), (four, eight), (to, n, j), w)
+                    else:
+                        _add_four(along, (a, b, c, d), four, (to, n, j), w)
 
 
 def _add_four(along: Any, lines: Any, taps: Any, part: Any, w: Any) -> None:
@@ -121,75 +130,122 @@ def _add_four(along: Any, lines: Any, taps: Any, part: Any, w: Any) -> None:
             w[to + i] = total + tc * along[c + i] + td * along[d + i]
 
 
-def _divide(orders: Any, w: Any) -> None:
-    """Derivatives of A / w from those of A and w, as in :mod:`mracad.bspline.jets`."""
-    for total in range(orders):
-        for b in range(total + 1):
-            to = total * (total + 1) // 2 + b
-            for i in range(total - b + 1):
-                for j in range(b + 1):
-                    if i + j > 0:
-                        _take(total, b, i, j, w)
-            x = (_JETS + 3 * to) * _WIDE
-            for p in range(_WIDE):
-                inverse = 1.0 / w[_WEIGHTS * _WIDE + p]
-                w[x + p] *= inverse
-                w[x + _WIDE + p] *= inverse
-                w[x + 2 * _WIDE + p] *= inverse
+def _add_eight(along: Any, lines: Any, taps: Any, part: Any, w: Any) -> None:
+    """The same for two derivatives."""
+    (a, b, c, d), ((ta, tb, tc, td), (sa, sb, sc, sd)), (to, n, j) = lines, taps, part
+    if j == 0:
+        for i in range(n):
+            pa, pb, pc, pd = along[a + i], along[b + i], along[c + i], along[d + i]
+            w[to + i] = ta * pa + tb * pb + tc * pc + td * pd
+            w[to + 3 * _WIDE + i] = sa * pa + sb * pb + sc * pc + sd * pd
+    else:
+        for i in range(n):
+            pa, pb, pc, pd = along[a + i], along[b + i], along[c + i], along[d + i]
+            w[to + i] = w[to + i] + ta * pa + tb * pb + tc * pc + td * pd
+            w[to + 3 * _WIDE + i] = w[to + 3 * _WIDE + i] + sa * pa + sb * pb + sc * pc + sd * pd
 
 
-def _take(total: Any, b: Any, i: Any, j: Any, w: Any) -> None:
-    """Take the product of derivatives (i, j) of w and (a - i, b - j) of A / w from that of A, a + b in total."""
-    factor = float((1 if i in (0, total - b) else total - b) * (1 if j in (0, b) else b))
-    rest = total - i - j
-    x, y = (_JETS + 3 * (total * (total + 1) // 2 + b)) * _WIDE, (_JETS + 3 * (rest * (rest + 1) // 2 + b - j)) * _WIDE
-    by = (_WEIGHTS + (i + j) * (i + j + 1) // 2 + j) * _WIDE
+def _divide(w: Any) -> None:
+    """Derivatives of A / w from those of A and w."""
     for p in range(_WIDE):
-        share = factor * w[by + p]
-        w[x + p] -= share * w[y + p]
-        w[x + _WIDE + p] -= share * w[y + _WIDE + p]
-        w[x + 2 * _WIDE + p] -= share * w[y + 2 * _WIDE + p]
+        w[30 * _WIDE + p] = 1.0 / w[30 * _WIDE + p]
+    for k in range(3):
+        for p in range(_WIDE):
+            at, to = k * _WIDE + p, 30 * _WIDE + p
+            (
+                w[at], w[12 * _WIDE + at], w[3 * _WIDE + at], w[21 * _WIDE + at], w[15 * _WIDE + at],
+                w[6 * _WIDE + at], w[27 * _WIDE + at], w[24 * _WIDE + at], w[18 * _WIDE + at], w[9 * _WIDE + at],
+            ) = quotient(
+                (
+                    w[at], w[12 * _WIDE + at], w[3 * _WIDE + at], w[21 * _WIDE + at], w[15 * _WIDE + at],
+                    w[6 * _WIDE + at], w[27 * _WIDE + at], w[24 * _WIDE + at], w[18 * _WIDE + at], w[9 * _WIDE + at],
+                ),
+                (
+                    w[to], w[12 * _WIDE + to], w[3 * _WIDE + to], w[21 * _WIDE + to], w[15 * _WIDE + to],
+                    w[6 * _WIDE + to], w[27 * _WIDE + to], w[24 * _WIDE + to], w[18 * _WIDE + to], w[9 * _WIDE + to],
+                ),
+            )  # fmt: skip
+
+
+def quotient(top: Any, w: Any) -> Any:
+    """Derivatives of A / w from those of A and w, in the order of :mod:`mracad.bspline.jets` and as there; the first of
+    those of w is 1 / w."""
+    inverse = w[0]
+    s = top[0] * inverse
+    su = (top[1] - w[1] * s) * inverse
+    sv = (top[2] - w[2] * s) * inverse
+    suu = (top[3] - 2.0 * w[1] * su - w[3] * s) * inverse
+    suv = (top[4] - w[2] * su - w[1] * sv - w[4] * s) * inverse
+    svv = (top[5] - 2.0 * w[2] * sv - w[5] * s) * inverse
+    suuu = (top[6] - 3.0 * w[1] * suu - 3.0 * w[3] * su - w[6] * s) * inverse
+    suuv = (top[7] - w[2] * suu - 2.0 * w[1] * suv - 2.0 * w[4] * su - w[3] * sv - w[7] * s) * inverse
+    suvv = (top[8] - 2.0 * w[2] * suv - w[5] * su - w[1] * svv - 2.0 * w[4] * sv - w[8] * s) * inverse
+    svvv = (top[9] - 3.0 * w[2] * svv - 3.0 * w[5] * sv - w[9] * s) * inverse
+    return s, su, sv, suu, suv, svv, suuu, suuv, suvv, svvv
 
 
 def _figure(w: Any) -> None:
     """Figures from derivatives."""
     for p in range(_WIDE):
         (
-            w[52 * _WIDE + p], w[53 * _WIDE + p], w[54 * _WIDE + p], w[55 * _WIDE + p], w[56 * _WIDE + p],
-            w[57 * _WIDE + p], w[58 * _WIDE + p], w[59 * _WIDE + p], w[60 * _WIDE + p], w[61 * _WIDE + p],
-            w[62 * _WIDE + p], w[63 * _WIDE + p], w[64 * _WIDE + p],
+            w[72 * _WIDE + p], w[73 * _WIDE + p], w[74 * _WIDE + p], w[75 * _WIDE + p], w[76 * _WIDE + p],
+            w[77 * _WIDE + p], w[78 * _WIDE + p], w[79 * _WIDE + p], w[80 * _WIDE + p], w[81 * _WIDE + p],
+            w[82 * _WIDE + p], w[83 * _WIDE + p], w[84 * _WIDE + p],
         ) = figures(
+            (w[12 * _WIDE + p], w[13 * _WIDE + p], w[14 * _WIDE + p]),
             (w[3 * _WIDE + p], w[4 * _WIDE + p], w[5 * _WIDE + p]),
-            (w[6 * _WIDE + p], w[7 * _WIDE + p], w[8 * _WIDE + p]),
             (
-                (w[9 * _WIDE + p], w[10 * _WIDE + p], w[11 * _WIDE + p]),
-                (w[12 * _WIDE + p], w[13 * _WIDE + p], w[14 * _WIDE + p]),
+                (w[21 * _WIDE + p], w[22 * _WIDE + p], w[23 * _WIDE + p]),
                 (w[15 * _WIDE + p], w[16 * _WIDE + p], w[17 * _WIDE + p]),
+                (w[6 * _WIDE + p], w[7 * _WIDE + p], w[8 * _WIDE + p]),
             ),
             (
-                (w[18 * _WIDE + p], w[19 * _WIDE + p], w[20 * _WIDE + p]),
-                (w[21 * _WIDE + p], w[22 * _WIDE + p], w[23 * _WIDE + p]),
-                (w[24 * _WIDE + p], w[25 * _WIDE + p], w[26 * _WIDE + p]),
                 (w[27 * _WIDE + p], w[28 * _WIDE + p], w[29 * _WIDE + p]),
+                (w[24 * _WIDE + p], w[25 * _WIDE + p], w[26 * _WIDE + p]),
+                (w[18 * _WIDE + p], w[19 * _WIDE + p], w[20 * _WIDE + p]),
+                (w[9 * _WIDE + p], w[10 * _WIDE + p], w[11 * _WIDE + p]),
             ),
         )  # fmt: skip
 
 
 def _tell(marks: Any, found: Any, at: Any, fill: Any, w: Any) -> None:
     """Add up, or store, the figures of the points from ``at`` on."""
-    points, (places, sums, tops, first, last, every) = marks[1], found
+    points, first, last, every = marks[1], found[3], found[4], found[5]
     if marks[0]:
         _mark(marks, at, fill, w)
-        for p in range(fill):
-            place = int(w[_PLACE * _WIDE + p])
-            for r in range(SUMS):
-                sums[r * places + place] += w[(_TOLD + r) * _WIDE + p]
-            for r in range(TOPS):
-                tops[r * places + place] = max(tops[r * places + place], w[(_TOLD + SUMS + r) * _WIDE + p])
+        begin = 0
+        while begin < fill:
+            place, end = w[_PLACE * _WIDE + begin], begin + 1
+            while end < fill and w[_PLACE * _WIDE + end] == place:
+                end += 1
+            _sum(found, int(place), (begin, end), w)
+            begin = end
     else:
         for r in range(first, last):
             for i in range(fill):
                 every[(r - first) * points + at + i] = w[(_FORMS + r) * _WIDE + i]
+
+
+def _sum(found: Any, place: Any, part: Any, w: Any) -> None:
+    """Add up the figures of points of one place, one after another, and take the largest."""
+    places, sums, tops = found[0], found[1], found[2]
+    a, b, c, d = sums[place], sums[places + place], sums[2 * places + place], sums[3 * places + place]
+    e, f, g = sums[4 * places + place], sums[5 * places + place], sums[6 * places + place]
+    x, y, z = tops[place], tops[places + place], tops[2 * places + place]
+    for p in range(part[0], part[1]):
+        a += w[85 * _WIDE + p]
+        b += w[86 * _WIDE + p]
+        c += w[87 * _WIDE + p]
+        d += w[88 * _WIDE + p]
+        e += w[89 * _WIDE + p]
+        f += w[90 * _WIDE + p]
+        g += w[91 * _WIDE + p]
+        x = max(x, w[92 * _WIDE + p])
+        y = max(y, w[93 * _WIDE + p])
+        z = max(z, w[94 * _WIDE + p])
+    sums[place], sums[places + place], sums[2 * places + place], sums[3 * places + place] = a, b, c, d
+    sums[4 * places + place], sums[5 * places + place], sums[6 * places + place] = e, f, g
+    tops[place], tops[places + place], tops[2 * places + place] = x, y, z
 
 
 def _mark(marks: Any, at: Any, fill: Any, w: Any) -> None:
@@ -206,16 +262,16 @@ def _mark(marks: Any, at: Any, fill: Any, w: Any) -> None:
             w[(_OLD + r) * _WIDE + i] = normals[r * points + at + i]
     for p in range(_WIDE):
         (
-            w[65 * _WIDE + p], w[66 * _WIDE + p], w[67 * _WIDE + p], w[68 * _WIDE + p], w[69 * _WIDE + p],
-            w[70 * _WIDE + p], w[71 * _WIDE + p], w[72 * _WIDE + p], w[73 * _WIDE + p],
+            w[85 * _WIDE + p], w[86 * _WIDE + p], w[87 * _WIDE + p], w[88 * _WIDE + p], w[89 * _WIDE + p],
+            w[90 * _WIDE + p], w[91 * _WIDE + p], w[92 * _WIDE + p], w[93 * _WIDE + p], w[94 * _WIDE + p],
         ) = told(
-            (w[48 * _WIDE + p], w[49 * _WIDE + p], w[50 * _WIDE + p]),
-            (w[40 * _WIDE + p], w[41 * _WIDE + p], w[42 * _WIDE + p], w[43 * _WIDE + p], w[44 * _WIDE + p]),
-            (np.float32(w[45 * _WIDE + p]), np.float32(w[46 * _WIDE + p]), np.float32(w[47 * _WIDE + p])),
+            (w[68 * _WIDE + p], w[69 * _WIDE + p], w[70 * _WIDE + p]),
+            (w[60 * _WIDE + p], w[61 * _WIDE + p], w[62 * _WIDE + p], w[63 * _WIDE + p], w[64 * _WIDE + p]),
+            (np.float32(w[65 * _WIDE + p]), np.float32(w[66 * _WIDE + p]), np.float32(w[67 * _WIDE + p])),
             (
-                w[52 * _WIDE + p], w[53 * _WIDE + p], w[54 * _WIDE + p], w[55 * _WIDE + p], w[56 * _WIDE + p],
-                w[57 * _WIDE + p], w[58 * _WIDE + p], w[59 * _WIDE + p], w[60 * _WIDE + p], w[61 * _WIDE + p],
-                w[62 * _WIDE + p], w[63 * _WIDE + p], w[64 * _WIDE + p],
+                w[72 * _WIDE + p], w[73 * _WIDE + p], w[74 * _WIDE + p], w[75 * _WIDE + p], w[76 * _WIDE + p],
+                w[77 * _WIDE + p], w[78 * _WIDE + p], w[79 * _WIDE + p], w[80 * _WIDE + p], w[81 * _WIDE + p],
+                w[82 * _WIDE + p], w[83 * _WIDE + p], w[84 * _WIDE + p],
             ),
         )  # fmt: skip
 
@@ -240,6 +296,6 @@ SWEEP = Compiled(
         (_WHOLE, _REAL, _REAL, _WHOLE, _WHOLE, _REAL),
         (_REAL,),
     ),
-    (_spread, _add_four, _divide, _take, _figure, _tell, _mark, _move),
-    (dot, figures, told),
+    (_spread, _add_four, _add_eight, _divide, _figure, _tell, _sum, _mark, _move),
+    (dot, figures, quotient, told),
 )

@@ -28,9 +28,10 @@ class Tally:
 
     Attributes
     ----------
-    sums : ndarray (6, places)
-        Area; area of the points that count; and over these the integrals of bending κ₁² + κ₂², of variation |∇H|²,
-        and of both without the base.
+    sums : ndarray (7, places)
+        Area; area of the points that count; over these the integrals of bending κ₁² + κ₂², of variation |∇H|², and of
+        both without the base; and how many more of them turn by more than :data:`mracad.inspect.sweep.NOISY` than by
+        less.
     tops : ndarray (3, places)
         Largest curvature of the points that count, the same less rounding, and distance between normals before and
         after, as a chord.
