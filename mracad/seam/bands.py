@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import Any
 
 import numpy as np
+
+from mracad.memo import kept
 
 Array = np.ndarray
 
@@ -22,6 +24,10 @@ SPARSE = 3.0
 
 FEW, MOST = 500, 4
 """Number of unknowns up to which a band of all of them is also factored for some, and times how many of these."""
+
+
+REMEMBERED = 50_000
+"""Number of entries of a matrix up to which the order of its unknowns is kept for others with the same entries."""
 
 
 class Bands:
@@ -50,18 +56,20 @@ class Bands:
         there = np.zeros(self.size, bool)
         for matrix in self.matrices:
             there |= np.diff(matrix.indptr) > 0
-        return _ordered(self.matrices[0], np.flatnonzero(there), self._places)
+        first = self.matrices[0]
+        pattern = first.indptr, first.indices, np.flatnonzero(there)
+        if self._places is None or first.nnz > REMEMBERED:
+            return _ordered(*pattern, self._places)
+        return np.asarray(_known(_ordered, *pattern, self._places))
 
     @cached_property
     def width(self) -> int:
         """The bandwidth."""
-        place = _places(self.points, self.size)
         for matrix in self.matrices:
             if id(matrix.indices) not in self._entries:
-                column = place[matrix.indices]
-                below = np.repeat(place, np.diff(matrix.indptr)) - column
-                lower = below >= 0
-                self._entries[id(matrix.indices)] = lower, column[lower], below[lower]
+                known = self._places is not None and matrix.nnz <= REMEMBERED
+                pattern = matrix.indptr, matrix.indices, self.points
+                self._entries[id(matrix.indices)] = _known(_lower, *pattern) if known else _lower(*pattern)
         width = max(int(below.max(initial=0)) for _, _, below in self._entries.values())
         if width > WIDEST * len(self.points) ** 0.25:
             self._entries.clear()
@@ -176,29 +184,53 @@ class Cholesky:
         return found
 
 
-def _ordered(matrix: Any, points: Array, places: Array | None) -> Array:
+def _known(function: Callable[..., Any], *arrays: Array) -> Any:
+    """A function of arrays of whole numbers, kept for equal ones."""
+    return _remembered(function, tuple((each.astype(int, copy=False).tobytes(), each.shape) for each in arrays))
+
+
+@kept(64)
+def _remembered(function: Callable[..., Any], arrays: tuple[tuple[bytes, tuple[int, ...]], ...]) -> Any:
+    """Cached, because surfaces often have equal knots."""
+    return function(*(np.frombuffer(data, int).reshape(shape) for data, shape in arrays))
+
+
+def _ordered(indptr: Array, indices: Array, points: Array, places: Array | None) -> Array:
     """Unknowns in the order with the narrowest band: along one side of a net, from both ends if it is closed, or as
     given or by Cuthill and McKee."""
     if places is None:
+        from scipy.sparse import csr_array
         from scipy.sparse.csgraph import reverse_cuthill_mckee
 
-        there = _places(points, matrix.shape[0]) >= 0
-        order = reverse_cuthill_mckee(matrix, symmetric_mode=True)
-        return _narrowest(slice(None), matrix, [points, order[there[order]]])
+        n = len(indptr) - 1
+        there = _places(points, n) >= 0
+        order = reverse_cuthill_mckee(csr_array((np.ones(len(indices)), indices, indptr), (n, n)), symmetric_mode=True)
+        return _narrowest(slice(None), indptr, indices, [points, order[there[order]]])
     own = places[points]
     folded = np.minimum(2 * own, 2 * (own.max(axis=0, initial=0) - own) + 1)
     keys = [(own[:, 1 - axis], along[:, axis]) for along in (own, folded) for axis in (0, 1)]
-    starts = matrix.indptr[points]
-    ends = np.concatenate([starts, matrix.indptr[points + 1] - 1])[np.tile(np.diff(matrix.indptr)[points] > 0, 2)]
-    return _narrowest(ends, matrix, [points[np.lexsort(key)] for key in keys])
+    starts = indptr[points]
+    ends = np.concatenate([starts, indptr[points + 1] - 1])[np.tile(np.diff(indptr)[points] > 0, 2)]
+    return _narrowest(ends, indptr, indices, [points[np.lexsort(key)] for key in keys])
 
 
-def _narrowest(some: Any, matrix: Any, orders: Sequence[Array]) -> Array:
+def _narrowest(some: Any, indptr: Array, indices: Array, orders: Sequence[Array]) -> Array:
     """The order with the narrowest band, judged by some entries: those at the ends of rows tell enough on a net."""
-    row = np.repeat(np.arange(matrix.shape[0], dtype=np.int32), np.diff(matrix.indptr))[some]
-    column = matrix.indices[some]
-    places = [_places(order, matrix.shape[0]) for order in orders]
+    n = len(indptr) - 1
+    row = np.repeat(np.arange(n, dtype=np.int32), np.diff(indptr))[some]
+    column = indices[some]
+    places = [_places(order, n) for order in orders]
     return orders[int(np.argmin([np.abs(place[row] - place[column]).max(initial=0) for place in places]))]
+
+
+def _lower(indptr: Array, indices: Array, points: Array) -> tuple[Array, Array, Array]:
+    """Which entries of a matrix are in its lower half in an order of unknowns, their columns and how far below the
+    diagonal they are."""
+    place = _places(points, len(indptr) - 1)
+    column = place[indices]
+    below = np.repeat(place, np.diff(indptr)) - column
+    lower = below >= 0
+    return lower, column[lower], below[lower]
 
 
 def _places(order: Array, size: int) -> Array:
