@@ -23,7 +23,7 @@ from mracad.bspline.surface import Net
 from mracad.model.cells import Quadrature
 from mracad.seam.integrals import Order, Sites, integrals, nothing, on_pattern, sites, sparse
 from mracad.seam.kinks import FLATTEST, kinks
-from mracad.seam.stretch import EVEN, Stretch, stretched
+from mracad.seam.stretch import EVEN, Stretch
 
 Array = np.ndarray
 
@@ -93,7 +93,7 @@ def masses(net: Net, quadrature: Quadrature) -> Forms:
     for along, mask in _blocks(net, quadrature):
         xu, xv = _jets(net, along, 1)[1:]
         e, f, g = _dot(xu, xu), _dot(xu, xv), _dot(xv, xv)
-        area = np.sqrt(np.maximum(e * g - f * f, 0.0)) * (along[0].weight.reshape(-1, 1) * along[1].weight.ravel())
+        area = np.sqrt(np.maximum(e * g - f * f, 0.0)) * _weights(along)
         if net.weights is not None:
             area = area / _jets(Net(net.u, net.v, net.weights[..., None]), along)[0, 0] ** 2
         integrals(along, {(ORDERS[0], ORDERS[0]): np.where(mask, area, 0.0)}, form)
@@ -106,7 +106,7 @@ def slopes(net: Net, metric: Net, quadrature: Quadrature) -> Any:
     along = sites(net.u, quadrature.u, quadrature.wu), sites(net.v, quadrature.v, quadrature.wv)
     xu, xv = _jets(metric, along)[1:3]
     e, f, g = _dot(xu, xu), _dot(xu, xv), _dot(xv, xv)
-    area = np.sqrt(np.maximum(e * g - f * f, 0.0)) * (along[0].weight.reshape(-1, 1) * along[1].weight.ravel())
+    area = np.sqrt(np.maximum(e * g - f * f, 0.0)) * _weights(along)
     e, f, g = _floored(e, f, g, (np.median(e), np.median(g)))
     frame = np.zeros((5, 3, *e.shape))
     frame[0, 0], frame[1, 1] = 1 / np.sqrt(e), np.sqrt(e / (e * g - f * f))
@@ -122,7 +122,7 @@ def _blocks(net: Net, quadrature: Quadrature, inside: bool = True) -> Iterator[t
     for begin in range(0, pieces, step):
         mask, part = quadrature.mask[begin * points : (begin + step) * points], slice(begin, begin + step)
         if not inside or mask.any():
-            yield (sites(net.u, quadrature.u[part], quadrature.wu[part]), across), mask
+            yield (sites(net.u, quadrature.u[part], quadrature.wu[part]), across), np.ascontiguousarray(mask.T).T
 
 
 def _squared(
@@ -154,29 +154,29 @@ def _frames(
     metric: Net, along: tuple[Sites, Sites], stretch: Stretch, usual: tuple[Any, Any] | None = None
 ) -> tuple[Array, Array]:
     """Coefficients in H̃_11, √2 H̃_12, H̃_22 of ∂_u, ∂_v, ∂_uu, ∂_uv, ∂_vv, ``(5, 3, qu, qv)``; areas ``(qu, qv)``."""
-    xu, xv, xuu, xuv, xvv = _jets(metric, along)[1:]
+    _, xu, xv, *seconds = _jets(metric, along)
     e, f, g = _dot(xu, xu), _dot(xu, xv), _dot(xv, xv)
-    root = np.sqrt(np.maximum(e * g - f * f, 0.0))
+    area = np.sqrt(np.maximum(e * g - f * f, 0.0)) * _weights(along)
     e, f, g = _floored(e, f, g, usual or (np.median(e), np.median(g)))
     det = e * g - f * f
-    christoffel = []
-    for second in (xuu, xuv, xvv):
-        a, b = _dot(second, xu), _dot(second, xv)
-        christoffel.append(((g * a - f * b) / det, (e * b - f * a) / det))
-    p = 1 / np.sqrt(e)
-    r = np.sqrt(e / det)
-    q = -f / e * r
-    two = np.sqrt(2.0)
-    rows = (p * p,), (two * p * q, two * p * r), (q * q, 2 * q * r, r * r)
-    frame = np.zeros((5, 3, *p.shape))
-    for i, row in enumerate(rows):
-        for k, value in enumerate(row):
-            frame[2 + k, i] = value
-            for d in (0, 1):
-                frame[d, i] -= value * christoffel[k][d]
+    p, r = 1 / np.sqrt(e), np.sqrt(e / det)
+    x, y, skew = (p, -f / e * r), (0.0, r), 2.0**0.5
     if not stretch.plain:
-        frame = stretched(frame, stretch.root(along[0].at, along[1].at, (e, f, g), (p, q, r)))
-    return frame, root * (along[0].weight.reshape(-1, 1) * along[1].weight.ravel())
+        a, b, c = stretch.root(along[0].at, along[1].at, (e, f, g), (p, x[1], r))
+        x, y = (x[0] * a + x[1] * b, x[0] * b + x[1] * c), (r * b, r * c)  # the frame, times R
+    frame = np.empty((5, 3, *p.shape[::-1])).swapaxes(2, 3)
+    for row, (i, j, factor) in enumerate(((0, 0, 1.0), (0, 1, skew), (1, 1, 1.0))):
+        frame[2, row] = factor * x[i] * x[j]
+        frame[3, row] = factor * (x[i] * y[j] + x[j] * y[i])
+        frame[4, row] = factor * y[i] * y[j]
+    dots = [(_dot(second, xu) / det, _dot(second, xv) / det) for second in seconds]
+    for slope, christoffel in zip(
+        frame, ([g * a - f * b for a, b in dots], [e * b - f * a for a, b in dots]), strict=False
+    ):
+        np.multiply(frame[2], -christoffel[0], out=slope)
+        slope -= frame[3] * christoffel[1]
+        slope -= frame[4] * christoffel[2]
+    return frame, area
 
 
 def _floored(e: Array, f: Array, g: Array, usual: tuple[Any, Any]) -> tuple[Array, Array, Array]:
@@ -199,10 +199,16 @@ def _over_weights(
 
 
 def _jets(net: Net, along: tuple[Sites, Sites], most: int = 2) -> Array:
-    """Points and derivatives ``(6, k, qu, qv)`` by ``ORDERS``, up to an order."""
+    """Points and derivatives ``(6, k, qu, qv)`` by ``ORDERS``, up to an order; in memory u is fastest, as integrals
+    want it."""
     shape = along[0].at.size, along[1].at.size
     found = jets(net, along[0].at, along[1].at, np.ones(shape, bool), np.zeros(net.poles.shape[2]), most)
-    return np.ascontiguousarray(found.reshape(*found.shape[:2], *shape[::-1]).swapaxes(2, 3))
+    return found.reshape(*found.shape[:2], *shape[::-1]).swapaxes(2, 3)
+
+
+def _weights(along: tuple[Sites, Sites]) -> Array:
+    """Weights of pairs of parameters, ``(qu, qv)``."""
+    return np.asarray((along[1].weight.reshape(-1, 1) * along[0].weight.ravel()).T)
 
 
 def _dot(a: Array, b: Array) -> Array:

@@ -35,8 +35,6 @@ THETA = 0.3
 HALVINGS = 6
 """How often the wavelength is halved at most to find the shape."""
 
-_TWO = 2.0**0.5
-
 
 class Looks:
     """Lengths (mm), from long to short, and a surface without waves shorter than 2π times each.
@@ -109,17 +107,23 @@ class Limit:
     def shape(self, u: Array, v: Array, frame: Form) -> Form:
         """The shape operator in the frame (p, q, r: p ∂_u and q ∂_u + r ∂_v are orthonormal), ``(qu, qv)`` each."""
         p, q, r = frame
-        found = np.zeros((3, *p.shape))
-        left = np.ones(p.shape, bool)
+        found: Form | None = None
+        left = np.zeros(())
         for length, net in self.looks:
             a, b, c = _bent(net, (u.tobytes(), v.tobytes()), (u.shape, v.shape))
-            now = p * p * a, p * (q * a + r * b), q * q * a + 2 * q * r * b + r * r * c
-            found = np.where(left, now, found)
+            across = q * a + r * b
+            now = p * p * a, p * across, q * (across + r * b) + r * r * c
             mean, half = _halves(now)
-            left &= (np.abs(mean) + half) * length > THETA
+            turns = (np.abs(mean) + half) * length > THETA
+            if found is not None:
+                turns &= left
+                for old, new in zip(found, now, strict=True):
+                    np.copyto(old, new, where=left)
+            found, left = found or now, turns
             if not left.any():
                 break
-        return found[0], found[1], found[2]
+        assert found is not None
+        return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -194,17 +198,6 @@ def orthonormal(net: Net, us: Array, vs: Array) -> Form:
     return 1 / np.sqrt(e), -f / e / rest, 1 / rest
 
 
-def stretched(frame: Array, root: Form) -> Array:
-    """Coefficients ``(5, 3, …)`` in H_11, √2 H_12 and H_22, as they are in R H R."""
-    a, b, c = root
-    rows = (
-        (a * a, _TWO * a * b, b * b),
-        (_TWO * a * b, a * c + b * b, _TWO * b * c),
-        (b * b, _TWO * b * c, c * c),
-    )
-    return np.stack([sum(x * frame[:, k] for k, x in enumerate(row)) for row in rows], axis=1)
-
-
 @kept(8)
 def _bent(net: Net, places: tuple[bytes, bytes], shapes: tuple[tuple[int, ...], tuple[int, ...]]) -> Form:
     """The second fundamental form at pairs of parameters; kept, because it is needed in different metrics."""
@@ -213,7 +206,7 @@ def _bent(net: Net, places: tuple[bytes, bytes], shapes: tuple[tuple[int, ...], 
     xu, xv, *second = every.reshape(6, 3, at_v.size, at_u.size)[1:]
     normal = xu[1] * xv[2] - xu[2] * xv[1], xu[2] * xv[0] - xu[0] * xv[2], xu[0] * xv[1] - xu[1] * xv[0]
     size = np.maximum(np.sqrt(_dot(normal, normal)), 1e-300)
-    a, b, c = (np.ascontiguousarray((_dot(normal, each) / size).T) for each in second)
+    a, b, c = ((_dot(normal, each) / size).T for each in second)
     return a, b, c
 
 
