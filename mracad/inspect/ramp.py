@@ -77,7 +77,7 @@ class _Slope:
 def _change(survey: Survey, slope: _Slope, amount: float) -> Change:
     """The change of a face after an amount of a displacement."""
     net = survey.net.with_poles(survey.net.poles + amount * slope.offset)
-    tally, places = survey.sight.tally(net, survey.marks), survey.places
+    tally, places = survey.sight.tally(net, survey.marks) if amount else survey.tally, survey.places
     turned, unsettled = _normals(survey, net, tally)
     now = list(_angles(survey, slope, net, amount))
     opened = [angles - each.angles for each, angles in zip(survey.crossed, now, strict=True)]

@@ -55,6 +55,8 @@ class Survey:
         What is known there: curvature counts where the surface is neither degenerate nor singular and knots lie apart.
     sharp : ndarray (q,)
         Curvature at singular points, 1/mm; 0 elsewhere.
+    tally : Tally
+        The figures of the places of the points.
     crossed : list of Crossed
     roughness, noise : Roughness
     places : Places or None
@@ -67,6 +69,7 @@ class Survey:
     sight: Sight
     marks: Marks
     sharp: Array
+    tally: Tally
     crossed: Sequence[Crossed]
     roughness: Roughness
     noise: Roughness
@@ -124,7 +127,7 @@ def _survey(
     sides = np.maximum(sides, least)
     rounding = ROUNDING * float(np.abs(net.poles).max()) * _wavenumber(sides.min(axis=0)) ** 2
     across, ends = _divided(rule, form, reach)
-    bent = np.zeros((5, len(sharp))) if base is None else Sight.of(base, rule).bent(base)
+    bent = np.zeros((5, len(sharp))) if base is None else sight.over(base, rule).bent(base)
     marks = Marks(
         regular.astype(np.uint8), rounding.astype(np.float32), bent, form.normal.astype(np.float32), across,
         len(ends[0]) * len(ends[1]),
@@ -132,7 +135,7 @@ def _survey(
     areas = sight.pairs(*sight.weights, np.multiply) * form.density * regular
     tally, crossed = sight.tally(net, marks), _crossed(net, faces, rule)
     return Survey(
-        net, faces, rule, sight, marks, sharp, crossed,
+        net, faces, rule, sight, marks, sharp, tally, crossed,
         roughness(tally, largest(each.angles for each in crossed)), _noise(areas, sides, rounding),
         Places.of(ends, tally, reach, [each.crossing for each in crossed]) if reach else None,
     )  # fmt: skip

@@ -11,6 +11,7 @@ from functools import cached_property
 import numpy as np
 
 from mracad.bspline.jets import ORDERS, Sites
+from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
 from mracad.inspect.curvature import BENT, FORMS, Forms, dot, figures, shapes
 from mracad.inspect.sweep import SCRATCH, SUMS, SWEEP, TOPS, told
@@ -79,6 +80,7 @@ class Sight:
 
     Attributes
     ----------
+    knots : (KnotVector, KnotVector)
     sites : Sites
     runs : ndarray of int64 (k, 3)
         Row, first column and length of points that lie side by side in a row.
@@ -88,6 +90,7 @@ class Sight:
         Origin of the points.
     """
 
+    knots: tuple[KnotVector, KnotVector]
     sites: Sites
     runs: Array
     weights: tuple[Array, Array]
@@ -101,7 +104,11 @@ class Sight:
         row, column = np.nonzero(edges)
         runs = np.stack([row[::2], column[::2], column[1::2] - column[::2]], axis=1)
         weights = np.ascontiguousarray(rule.wu.ravel()), np.ascontiguousarray(rule.wv.ravel())
-        return cls(sites, np.ascontiguousarray(runs), weights, np.asarray(net.poles.mean(axis=(0, 1))))
+        return cls((net.u, net.v), sites, np.ascontiguousarray(runs), weights, np.asarray(net.poles.mean(axis=(0, 1))))
+
+    def over(self, net: Net, rule: Quadrature) -> Sight:
+        """The same points of the rule on another net, with the same origin if its knots are the same."""
+        return self if (net.u, net.v) == self.knots else Sight.of(net, rule)
 
     @cached_property
     def points(self) -> int:
