@@ -124,7 +124,10 @@ class Bands:
 
 
 class Blocks:
-    """A block-diagonal matrix, with one of the matrices in the bands of every surface."""
+    """A block-diagonal matrix, with one of the matrices in the bands of every surface.
+
+    Products with several surfaces are sparse: bands would be no faster, and take more memory than the forms.
+    """
 
     def __init__(self, bands: Sequence[Bands], number: int) -> None:
         self.bands, self.number = bands, number
@@ -133,7 +136,7 @@ class Blocks:
         if len(self.bands) == 1:
             return self.bands[0].times(self.number, x)
         parts = np.split(x, np.cumsum([each.size for each in self.bands])[:-1])
-        return np.concatenate([each.times(self.number, part) for each, part in zip(self.bands, parts, strict=True)])
+        return np.concatenate([each.matrices[self.number] @ part for each, part in zip(self.bands, parts, strict=True)])
 
     def diagonal(self) -> Array:
         """The diagonal, ``(points,)``."""

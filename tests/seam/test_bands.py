@@ -48,6 +48,16 @@ def test_products_and_minima_are_those_of_dense_algebra(u, v, widest):
         np.testing.assert_allclose(found, sparse, atol=1e-9 * np.abs(found).max())
 
 
+def test_products_with_several_surfaces_keep_no_bands():
+    (mass, _), places = forms(EVEN[False], EVEN[True])
+    both, x = (
+        [Bands([mass], places), Bands([2.0 * mass], places)],
+        np.random.default_rng(0).standard_normal((len(places), 3)),
+    )
+    np.testing.assert_allclose(Blocks(both, 0) @ np.concatenate([x, x]), np.concatenate([mass @ x, 2.0 * mass @ x]))
+    assert all(each.dense and "lower" not in vars(each) for each in both)
+
+
 def test_a_control_point_without_mass_stays_where_the_form_hardly_holds_it():
     mass = csr_array(np.diag([1.0, 1e-30, 2.0]))
     solve = Banded(Bands([mass]), [1.0], np.ones(3, bool))
