@@ -39,7 +39,7 @@ Solver = Alone | Guided
 KEPT = 60_000
 """Largest number of control points for which factors are cached, besides the last one."""
 
-OVERLAP = 2.0
+OVERLAP = 4.0
 """Largest share of control points in strips for the alternating method."""
 
 WIDTH = 7.0

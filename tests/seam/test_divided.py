@@ -85,6 +85,12 @@ def test_filtered_is_that_of_the_whole_system(held):
     assert np.trace(x.T @ (p.bending @ x)) < np.trace(p.f.T @ (p.bending @ p.f))
 
 
+def test_patches_hardly_wider_than_strips_are_also_divided():
+    """Strips along joints hold more than twice as many control points as there are."""
+    _, found, wanted = both(lambda p: p.filtered(0.9**4))
+    assert size(found - wanted) < 1e-6 * size(wanted)
+
+
 def test_little_is_left_of_what_strips_make_good():
     _, found, wanted = both(lambda p: p.filtered(STIFFNESS), left=LEFT)
     assert size(found - wanted) < 1e-4 * size(wanted)
