@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from itertools import pairwise
+from itertools import pairwise, product
 
 import numpy as np
+
+from mracad.bspline.vectors import cross
 
 Array = np.ndarray
 _BLOCK = 200_000  # pairs of triangles tested at once
@@ -34,10 +36,12 @@ def crossings(points: Array, corners: Array, parts: Array) -> tuple[Array, Array
     where : ndarray (k, 3)
     """
     found, where = [np.empty((0, 2), int)], [np.empty((0, 3))]
-    spots = points[corners]
+    spots, corners = points[corners], np.asfortranarray(corners)
     planes = _Planes(spots)
     for pairs in _near(spots, parts):
-        shared = (corners[pairs[:, 0]][:, :, None] == corners[pairs[:, 1]][:, None, :]).any(axis=(1, 2))
+        shared = np.zeros(len(pairs), bool)
+        for one, other in product(corners.T, repeat=2):
+            shared |= one[pairs[:, 0]] == other[pairs[:, 1]]
         pairs = pairs[~shared]
         for one, other in ((0, 1), (1, 0)):
             across = pairs[planes.across(spots, pairs[:, one], pairs[:, other])]
@@ -56,7 +60,7 @@ class _Planes:
 
     def __init__(self, spots: Array) -> None:
         self._origins, u, v = spots[:, 0], spots[:, 1] - spots[:, 0], spots[:, 2] - spots[:, 0]
-        self._normals = np.cross(u, v)
+        self._normals = cross(u, v)
         self._sizes = np.linalg.norm(u, axis=1) * np.linalg.norm(v, axis=1)
 
     def across(self, spots: Array, ones: Array, others: Array) -> Array:
@@ -71,12 +75,12 @@ def _pierced(start: Array, end: Array, triangle: Array) -> Array:
     """The fraction of each segment at which it passes through the inside of its triangle, or NaN."""
     along = end - start
     u, v = triangle[:, 1] - triangle[:, 0], triangle[:, 2] - triangle[:, 0]
-    p = np.cross(along, v)
+    p = cross(along, v)
     determinant = (u * p).sum(1)
-    size = np.linalg.norm(along, axis=1) * np.linalg.norm(np.cross(u, v), axis=1)
+    size = np.linalg.norm(along, axis=1) * np.linalg.norm(cross(u, v), axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):
         off = start - triangle[:, 0]
-        q = np.cross(off, u)
+        q = cross(off, u)
         a, b, t = ((x * y).sum(1) / determinant for x, y in ((off, p), (along, q), (v, q)))
         inside = (np.abs(determinant) > 1e-9 * size) & (a > 1e-6) & (b > 1e-6) & (a + b < 1 - 1e-6)
         return np.where(inside & (t > 1e-6) & (t < 1 - 1e-6), t, np.nan)
@@ -84,7 +88,7 @@ def _pierced(start: Array, end: Array, triangle: Array) -> Array:
 
 def _near(spots: Array, parts: Array) -> Iterable[Array]:
     """Pairs of triangles of one part whose boxes meet, in blocks, found by a grid of cells."""
-    low, high = spots.min(axis=1), spots.max(axis=1)
+    low, high = (np.asfortranarray(found(axis=1)) for found in (spots.min, spots.max))
     if not len(spots):
         return
     cell = max(float(np.median((high - low).max(axis=1))), 1e-12)
@@ -119,8 +123,8 @@ def _near(spots: Array, parts: Array) -> Iterable[Array]:
         a = np.repeat(position[begin:end], count)
         b = a + 1 + np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
         cells, a, b = place[a], which[a], which[b]
-        for axis in range(3):
-            meet = (low[a, axis] <= high[b, axis]) & (low[b, axis] <= high[a, axis])
+        for least, most in zip(low.T, high.T, strict=True):
+            meet = (least[a] <= most[b]) & (least[b] <= most[a])
             cells, a, b = cells[meet], a[meet], b[meet]
         once = cells == numbered(np.maximum(first[a], first[b]), parts[a].astype(np.int64))  # of several shared cells
         yield np.column_stack([np.minimum(a, b), np.maximum(a, b)])[once]

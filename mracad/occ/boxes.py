@@ -10,14 +10,14 @@ from OCP.BRep import BRep_Tool
 from OCP.BRepBuilderAPI import BRepBuilderAPI_Copy
 from OCP.BRepMesh import BRepMesh_IncrementalMesh
 from OCP.TopAbs import TopAbs_VERTEX
-from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS, TopoDS_Face
 
 from mracad.model.boxes import box as nurbs_box
 from mracad.model.boxes import rims
 from mracad.model.brep import Face, Model
 from mracad.occ.document import Document
-from mracad.occ.topology import box, inside, nodes, placed
+from mracad.occ.polygons import polygons
+from mracad.occ.topology import box, inside, placed
 
 Array = np.ndarray
 
@@ -98,10 +98,10 @@ def _meshed(shape: TopoDS_Face, chord: float, outer: Array) -> Array:
     """The box of the points of a mesh of a face; ``outer`` where there is none."""
     copy = BRepBuilderAPI_Copy(shape, False, False).Shape()
     BRepMesh_IncrementalMesh(copy, chord, False, ANGLE, False)
-    mesh = BRep_Tool.Triangulation_s(TopoDS.Face_s(copy), location := TopLoc_Location())
-    if mesh is None:
+    meshes = polygons({0: TopoDS.Face_s(copy)})
+    if not meshes:
         return outer
-    points = nodes(mesh, location)
+    points = meshes[0][0]
     return np.clip(np.array([points.min(axis=0), points.max(axis=0)]), outer[0], outer[1])
 
 

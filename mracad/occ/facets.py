@@ -18,7 +18,6 @@ from OCP.Geom import (
     Geom_TrimmedCurve,
 )
 from OCP.gp import gp_Pnt, gp_Vec
-from OCP.Poly import Poly_Triangulation
 from OCP.TopAbs import TopAbs_FORWARD, TopAbs_REVERSED
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS, TopoDS_Face
@@ -29,9 +28,10 @@ from mracad.model.facets import Body, Closed, Facets, Ground, Jet, Placed, Splin
 from mracad.occ.document import Document, Part, nested_colours, tint
 from mracad.occ.geometry import basis, is_nurbs, nets
 from mracad.occ.labels import label_key, referred, usages
+from mracad.occ.polygons import polygons
 from mracad.occ.rails import elementary
 from mracad.occ.settings import quiet
-from mracad.occ.topology import box, compound, edge_uses, matrix, nodes, placed
+from mracad.occ.topology import box, compound, edge_uses, matrix, placed
 
 Array = np.ndarray
 
@@ -98,12 +98,14 @@ def facets(document: Document, chord: float, angle: float) -> Body:
 
 def _collected(document: Document, known: list[tuple[Ground, int]]) -> dict[int, Facets]:
     """The triangles that the kernel keeps with the faces."""
-    return {
-        index: found
-        for part in document.parts
-        for index in part.numbers
-        if (found := _facets(document, part, index, *known[index]))
-    }
+    meshes = polygons(dict(enumerate(document.faces)))
+    found = {}
+    for part in document.parts:
+        for index in filter(meshes.__contains__, part.numbers):
+            (points, uv, corners), (ground, outward) = meshes[index], known[index]
+            rims = _rims(part, document.faces[index])
+            found[index] = Facets(index, points, uv, corners[:, ::outward], ground, outward, rims)
+    return found
 
 
 def _of(every: dict[int, Facets], place: Placed) -> Iterator[Facets]:
@@ -114,19 +116,9 @@ def _extent(points: Array) -> Array:
     return np.array([points.min(axis=0), points.max(axis=0)])
 
 
-def _facets(document: Document, part: Part, index: int, ground: Ground, outward: int) -> Facets | None:
-    """The triangles that the kernel keeps with a face; None if it could not mesh it."""
-    face, location = document.faces[index], TopLoc_Location()
+def _rims(part: Part, face: TopoDS_Face) -> dict[int, Array]:
+    location = TopLoc_Location()
     mesh = BRep_Tool.Triangulation_s(face, location)
-    if mesh is None or not mesh.NbTriangles():
-        return None
-    corners = np.array([mesh.Triangle(i).Get() for i in range(1, mesh.NbTriangles() + 1)]) - 1
-    uv = np.array([mesh.UVNode(i).Coord() for i in range(1, mesh.NbNodes() + 1)])
-    rims = _rims(part, face, mesh, location)
-    return Facets(index, nodes(mesh, location), uv, corners[:, ::outward], ground, outward, rims)
-
-
-def _rims(part: Part, face: TopoDS_Face, mesh: Poly_Triangulation, location: TopLoc_Location) -> dict[int, Array]:
     found: dict[int, Array] = {}
     closing = set()
     for edge in edge_uses(TopoDS.Face_s(face.Oriented(TopAbs_FORWARD))):

@@ -12,7 +12,6 @@ from OCP.BRepAdaptor import BRepAdaptor_Curve, BRepAdaptor_Curve2d, BRepAdaptor_
 from OCP.BRepBndLib import BRepBndLib
 from OCP.BRepLib import BRepLib_ValidateEdge
 from OCP.Geom2d import Geom2d_Curve
-from OCP.Poly import Poly_Triangulation
 from OCP.ShapeFix import ShapeFix_Edge
 from OCP.TopAbs import TopAbs_EDGE, TopAbs_SOLID
 from OCP.TopExp import TopExp, TopExp_Explorer
@@ -72,11 +71,6 @@ def matrix(location: TopLoc_Location) -> Array:
         transform = location.Transformation()
         out[:3] = [[transform.Value(i, j) for j in (1, 2, 3, 4)] for i in (1, 2, 3)]
     return out
-
-
-def nodes(mesh: Poly_Triangulation, location: TopLoc_Location) -> Array:
-    """The points of a face's mesh, ``(n, 3)``."""
-    return placed(np.array([mesh.Node(i).Coord() for i in range(1, mesh.NbNodes() + 1)]), matrix(location))
 
 
 def placed(points: Array, frame: Array) -> Array:

@@ -16,8 +16,9 @@ from mracad.errors import UsageError
 from mracad.model.facts import Triangles
 from mracad.occ.document import Document
 from mracad.occ.geometry import basis, is_nurbs
+from mracad.occ.polygons import polygons
 from mracad.occ.settings import quiet
-from mracad.occ.topology import box, compound, nodes
+from mracad.occ.topology import box, compound
 
 Array = np.ndarray
 SMALLEST = 1e-6, 0.5
@@ -61,10 +62,10 @@ def triangles(document: Document, chord: float | None = None, angle: float | Non
     fewest = 0
     for algorithm in _ALGORITHMS[:: -1 if _cells(document) > _MANY else 1]:
         found = _meshed(document, range(len(document.faces)), chord or _CHORD * size, angle or _ANGLE, algorithm)
-        folds = _folds(found)
+        folds = _repeated(found, found.sides)
         if best is None or folds < fewest:
             best, fewest = found, folds
-        if not folds:
+        if not folds or folds == _repeated(found, _rims(found)):  # every algorithm divides edges alike
             break
     assert best is not None
     return best
@@ -103,16 +104,23 @@ def _cells(document: Document) -> int:
     return max(((s.NbUKnots() - 1) * (s.NbVKnots() - 1) for s in surfaces if is_nurbs(s)), default=0)
 
 
-def _folds(mesh: Triangles) -> int:
-    """Number of triangle sides that occur more than once in one direction: the kernel's default sometimes folds a mesh
+def _repeated(mesh: Triangles, sides: Array) -> int:
+    """Number of sides that have occurred before in the same direction: the kernel's default sometimes folds a mesh
     over itself."""
-    sides = mesh.sides
-    keys = np.sort(sides[:, 0] * len(mesh.points) + sides[:, 1])
+    keys = np.sort(sides @ [len(mesh.points), 1])
     return int((keys[1:] == keys[:-1]).sum())
+
+
+def _rims(mesh: Triangles) -> Array:
+    """The sides of triangles along edges, as point numbers."""
+    ends = np.sort(mesh.own[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1) @ [len(mesh.points), 1]
+    _, place, counts = np.unique(ends, return_inverse=True, return_counts=True)
+    return np.asarray(mesh.sides[counts[place] == 1])
 
 
 def _collected(document: Document, chosen: Container[int]) -> Triangles:
     """The triangles that the kernel keeps with the chosen faces."""
+    meshes = polygons({i: face for i, face in enumerate(document.faces) if i in chosen})
     points: list[Array] = []
     uv: list[Array] = []
     corners: list[Array] = []
@@ -124,15 +132,15 @@ def _collected(document: Document, chosen: Container[int]) -> Triangles:
         first = count
         own: list[Array] = []
         for index in filter(chosen.__contains__, part.numbers):
-            face, location = document.faces[index], TopLoc_Location()
-            mesh = BRep_Tool.Triangulation_s(face, location)
-            if mesh is None:
+            if index not in meshes:
                 missing.append(index)
                 continue
-            own.append(nodes(mesh, location))
-            uv.append(np.array([mesh.UVNode(i).Coord() for i in range(1, mesh.NbNodes() + 1)]))
-            three = np.array([mesh.Triangle(i).Get() for i in range(1, mesh.NbTriangles() + 1)]) - 1 + count
-            corners.append(three[:, ::-1] if face.Orientation() == TopAbs_REVERSED else three)
+            where, at, three = meshes[index]
+            own.append(where)
+            uv.append(at)
+            three = three + count
+            turned = document.faces[index].Orientation() == TopAbs_REVERSED
+            corners.append(three[:, ::-1] if turned else three)
             owners.append((index, number, len(three)))
             count += len(own[-1])
         if own:
