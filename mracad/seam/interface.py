@@ -18,6 +18,7 @@ from mracad.model.brep import Face, Model, Trim
 from mracad.seam.border import Border
 from mracad.seam.cause import Cause, Still
 from mracad.seam.contact import Contact
+from mracad.seam.cost import costly
 from mracad.seam.guide import Slide
 from mracad.seam.hold import CONTINUITY, meeting, reached
 from mracad.seam.natural import Meeting, Seam, seams
@@ -142,13 +143,15 @@ def joints(model: Model, movable: Collection[int], wishes: Wishes) -> Joints:
                 frozen.pop(twin.index, None)
             else:
                 frozen[index] = found
-    for seam in [seam for seam in exact if seam.loose]:
-        rest = beside(model, seam, wishes)
+    apart = costly([surface.net for surface in model.surfaces], exact)
+    for seam in [seam for seam in exact if seam.loose or seam.edge in apart]:
+        rest = beside(model, seam, wishes, wholly=seam.edge in apart)
         if isinstance(rest, TrimmedSeam):
             loose.append(rest)
-        elif not seam.joint.order:
-            exact.remove(seam)
+        elif seam.edge in apart or not seam.joint.order:
             frozen |= dict.fromkeys((seam.edge, seam.twin), rest)
+        if seam.edge in apart or seam.edge in frozen:
+            exact.remove(seam)
     jumps = wishes.jumps and wishes.keep not in CONTINUITY
     joined = Joints(tuple(exact), tuple(loose), known.closing, frozen, known.meetings, jumps, zones=wishes.zones)
     if wishes.free:

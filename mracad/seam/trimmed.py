@@ -158,10 +158,12 @@ def followed(model: Model, seam: TrimmedSeam) -> TrimmedSeam:
     return replace(seam, b=replace(seam.b, law=(EVENLY, fractions))) if (np.diff(fractions) >= 0).all() else seam
 
 
-def beside(model: Model, seam: Seam, wishes: Wishes) -> TrimmedSeam | Cause:
-    """The seam that keeps, to the tolerance, the continuity that the joint of an exact seam does not keep."""
+def beside(model: Model, seam: Seam, wishes: Wishes, wholly: bool = False) -> TrimmedSeam | Cause:
+    """The seam that keeps, to the tolerance, the continuity that the joint of an exact seam does not keep, or all."""
     found = _judged(model, seam.edge, seam.twin, (along(seam.a), along(seam.b)), wishes)
-    return replace(found, since=seam.joint.order + 1) if isinstance(found, TrimmedSeam) and seam.joint.order else found
+    if wholly or isinstance(found, Cause) or not seam.joint.order:
+        return found
+    return replace(found, since=seam.joint.order + 1)
 
 
 def _judged(model: Model, edge: int, twin: int, traces: tuple[Trace, Trace], wishes: Wishes) -> TrimmedSeam | Cause:

@@ -231,6 +231,18 @@ def test_joints_of_a_panel():
     assert not lone.exact and not lone.moving
 
 
+@pytest.mark.parametrize(("raised", "exact"), [([(0, 1)], 4), ([(0, 1), (1, 0)], 2)])
+def test_seams_that_would_take_too_much_memory_are_kept_to_a_tolerance(raised, exact):
+    patches = panels.cut(panels.whole(6, 0.0)[0], (2, 2))
+    for place in raised:  # high degrees in both directions meet in the first patch
+        net = patches[place].net
+        knots = [k.elevated(14) if k is (net.u, net.v)[place[0]] else k for k in (net.u, net.v)]
+        patches[place] = replace(patches[place], net=net.over(*knots))
+    found = joints(view(panels.document(patches)), {0, 1, 2, 3}, Wishes("g1"))
+    assert (len(found.exact), len(found.loose), len(found.moving)) == (exact, 4 - exact, 4)
+    assert {seam.order for seam in found.loose} <= {1} and {seam.joint.order for seam in found.exact} <= {1}
+
+
 def test_the_first_metric_is_a_plane_of_mean_chords():
     net = graph(lambda x, y: 0.3 * np.sin(5 * x), 8, 3)
     flat = planar(net)
