@@ -148,10 +148,19 @@ class Blocks:
 
 
 def whole(parts: Sequence[Any]) -> Any:
-    """A block-diagonal matrix, ``scipy.sparse.csr_array``."""
-    from scipy.sparse import block_diag
+    """A block-diagonal matrix of square parts, all ``scipy.sparse.csr_array``."""
+    from scipy.sparse import csr_array
 
-    return parts[0] if len(parts) == 1 else block_diag(parts, format="csr")
+    if len(parts) == 1:
+        return parts[0]
+    begins, filled = (
+        np.cumsum([0, *each]) for each in ([part.shape[0] for part in parts], [part.nnz for part in parts])
+    )
+    kind = np.int32 if filled[-1] < np.iinfo(np.int32).max else np.int64
+    indices = np.concatenate([part.indices.astype(kind) + kind(at) for part, at in zip(parts, begins, strict=False)])
+    ends = [part.indptr[1:].astype(kind) + kind(at) for part, at in zip(parts, filled, strict=False)]
+    pointers = np.concatenate([np.zeros(1, kind), *ends])
+    return csr_array((np.concatenate([part.data for part in parts]), indices, pointers), shape=(begins[-1],) * 2)
 
 
 class Cholesky:

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from mracad.seam.constrained import LEAST, MET, MOST, lengths, part, scaled, taken
+from mracad.seam.constrained import LEAST, MOST, lengths, part, scaled, taken
 from mracad.seam.factor import Definite
 from mracad.seam.strips import Division, Layout, coloured
 
@@ -26,6 +26,9 @@ LEFT = 1e-4
 
 SWEEPS = 20
 """Largest number of sweeps; one or two are usually enough."""
+
+MET = 1e-13
+"""Share of the motion to which conditions are met: less is rounding, of which thousands of conditions leave more."""
 
 PENALTY = 1e7
 """Weight of conditions against a form whose diagonal is one; each pass divides their error by about as much."""

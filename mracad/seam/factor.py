@@ -38,8 +38,8 @@ class Definite:
             if bands.width >= BROAD and places is not None:
                 self._solve = Fronts(matrix, places)
                 return
-            if bands.narrow:
-                self._solve = Cholesky(bands, bands.sum([1.0]))
+            if bands.narrow and (lower := bands.lower[0]) is not None:
+                self._solve = Cholesky(bands, lower)
                 return
         self._solve = nested(matrix)
 
