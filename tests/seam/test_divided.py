@@ -111,6 +111,16 @@ def test_what_obeys_already_is_not_made_to():
     assert p.nearest(obeys).tobytes() == p.settled(obeys).tobytes() == obeys.tobytes()
 
 
+def test_rounding_that_thousands_of_conditions_leave_is_not_made_good():
+    p = problem(DIVIDED)
+    obeys = p.nearest(0.1 * np.random.default_rng(3).standard_normal((SIDE**2 * KNOTS.count**2, 3)))
+    off = np.where(p.free[:, None], 1e-14 * size(obeys) * np.random.default_rng(5).uniform(-1, 1, obeys.shape), 0.0)
+    assert 1e-14 * size(obeys) < size(p.rows @ (obeys + off)) < 2e-13 * size(obeys)
+    assert p.nearest(obeys + off).tobytes() == (obeys + off).tobytes()
+    more = obeys + 100 * off
+    assert size(p.rows @ p.nearest(more)) < 0.1 * size(p.rows @ more)
+
+
 def test_conditions_are_mended_by_what_is_asked():
     goal = seams() @ (0.01 * np.random.default_rng(2).standard_normal((SIDE**2 * KNOTS.count**2, 3)))
     p, found, direct = both(lambda p: p.filtered(STIFFNESS), goal=goal, held=False)
