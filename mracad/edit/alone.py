@@ -56,7 +56,7 @@ def _searched(scene: Scene, wish: Wish, i: int) -> Moved:
     """The best result for a surface alone, with more control points beside its rims where they pay."""
     joined, sheet = scene.joints.among({i}), scene.sheets[i]
     plain = attempt(scene, wish, [i], joined)[i]
-    if not plain.amount and not plain.gaining:
+    if not plain.gaining:
         return plain
     count = _points(beside_rims(sheet, joined) if scene.refine else sheet.net)
     size = count / _points(sheet.net)

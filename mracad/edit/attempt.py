@@ -133,7 +133,11 @@ def _explained(trial: Trial, moved: dict[int, Moved], target: Array) -> dict[int
     unheld = trial.unheld(target)
     if len(moved) == 1 and target.any():
         moved = {
-            i: replace(each, held_back=each.amount < LEAST and unheld.allowed, gaining=unheld.gaining[0])
+            i: replace(
+                each,
+                held_back=each.amount < LEAST and unheld.allowed,
+                gaining=each.amount > 0 or unheld.gaining[0],
+            )
             for i, each in moved.items()
         }
     if any(each.amount for each in moved.values()) or not trial.tolerances.fairer:

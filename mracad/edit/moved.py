@@ -48,7 +48,8 @@ class Moved:
     held_back : bool
         Whether only its held rims prevent the wanted change: together with others it may do more.
     gaining : bool
-        Whether some of the wanted change would make it fairer if nothing were held: more control points may help.
+        Whether some of the wanted change is made, or would make it fairer if nothing were held: more control points
+        may help.
     """
 
     sheet: Sheet
