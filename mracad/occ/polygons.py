@@ -21,8 +21,8 @@ _PARTS = ("<f8", "nodes", 3), ("<f8", "nodes", 2), ("<i4", "triangles", 3)
 
 
 def polygons(faces: Mapping[int, TopoDS_Face]) -> dict[int, tuple[Array, Array, Array]]:
-    """Points ``(n, 3)`` in the frame of the part, their parameters ``(n, 2)``, and corners ``(m, 3)`` of the triangles
-    that the kernel keeps with faces; nothing for a face without any."""
+    """Points ``(n, 3)`` in the frame of the part, their parameters ``(n, 2)``, zero where the kernel knows none, and
+    corners ``(m, 3)`` of the triangles that it keeps with faces; nothing for a face without any."""
     kept: dict[int, tuple[Poly_Triangulation, TopLoc_Location]] = {}
     for index, face in faces.items():
         location = TopLoc_Location()
@@ -53,9 +53,9 @@ def _told(meshes: list[Poly_Triangulation]) -> dict[Poly_Triangulation, tuple[Ar
     for mesh in meshes:
         counts = np.frombuffer(data, _COUNTS, 1, at)[0]
         at += _COUNTS.itemsize
-        parts = []
-        for kind, of, width in _PARTS:
-            parts.append(np.frombuffer(data, kind, int(counts[of]) * width, at).reshape(-1, width))
-            at += parts[-1].nbytes
-        found[mesh] = parts[0], parts[1], parts[2].astype(np.int64) - 1
+        points, uv, corners = (np.zeros((int(counts[of]), width), kind) for kind, of, width in _PARTS)
+        for part in (points, uv, corners) if counts["uv"] else (points, corners):
+            part[:] = np.frombuffer(data, part.dtype, part.size, at).reshape(part.shape)
+            at += part.nbytes
+        found[mesh] = points, uv, corners.astype(np.int64) - 1
     return found
