@@ -64,6 +64,13 @@ class Compiled:
             self._loaded = self._load(self._found or self._made())
         return self._loaded
 
+    @cached_property
+    def allowed(self) -> bool:
+        """Whether the system lets new code run; it is compiled if need be."""
+        with contextlib.suppress(OSError):
+            return self.prepare() is not None
+        return False
+
     def __call__(self, *arguments: float) -> None:
         """Call it."""
         self.prepare()(*arguments)

@@ -10,8 +10,10 @@ import mmap
 import platform
 import struct
 import sys
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
+from itertools import takewhile
 from pathlib import Path
 
 ALIGNED = 64
@@ -42,9 +44,10 @@ def processor() -> str:
     """What code for this processor alone depends on; ``""`` where code in one piece is not supported."""
     if not _HERE:
         return ""
-    with Path("/proc/cpuinfo").open() as file:
-        about = (line.partition(":") for line in iter(file.readline, "\n"))
+    with suppress(OSError), Path("/proc/cpuinfo").open() as file:
+        about = (line.partition(":") for line in takewhile(str.strip, file))
         return "|".join(value.strip() for name, _, value in about if name.strip() in ("model name", "flags"))
+    return ""
 
 
 def flat(data: bytes, name: str) -> bytes:

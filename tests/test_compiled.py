@@ -11,6 +11,7 @@ import pytest
 
 from mracad import flat, note
 from mracad.compiled import Compiled
+from mracad.inspect import tally
 
 
 def doubled(count, pointers, scale):
@@ -109,6 +110,19 @@ assert after.tolist() == [0.0, 3.0, 6.0, 9.0, 12.0]
 assert "llvmlite" not in sys.modules
 """
     subprocess.run([sys.executable, "-c", code], cwd=Path(__file__).parent.parent, check=True)
+
+
+def test_arrays_are_used_where_the_system_lets_no_new_code_run(folder, monkeypatch):
+    def refused(code):
+        raise PermissionError(13, "cannot run new code")
+
+    monkeypatch.setattr(sys, "pycache_prefix", str(folder))
+    monkeypatch.setattr(Compiled, "_load", lambda self, code: refused(code))
+    sweep = made()
+    assert sweep.ready and not sweep.allowed
+    monkeypatch.setattr(tally._Work, "done", 0)
+    monkeypatch.setattr(tally, "SWEEP", sweep)
+    assert not tally._compiled(2 * tally.MANY)
 
 
 @pytest.fixture(scope="module")

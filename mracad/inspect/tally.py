@@ -201,6 +201,6 @@ class _Work:
 
 
 def _compiled(points: int) -> bool:
-    """Whether so many more points are a case for compiled code."""
+    """Whether so many more points are a case for compiled code, and it can be had."""
     _Work.done += points
-    return _Work.done >= MANY or (_Work.done >= FEW and SWEEP.ready)
+    return (_Work.done >= MANY or (_Work.done >= FEW and SWEEP.ready)) and SWEEP.allowed
