@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import types
 import typing
 from collections.abc import Callable, Iterable, Mapping
@@ -15,7 +16,7 @@ from msgspec import Meta, Struct, structs
 
 from mracad.errors import UsageError
 from mracad.spec.files import Naming
-from mracad.spec.quantity import LENGTH, Kind
+from mracad.spec.quantity import LENGTH, NUMBER, Kind
 
 _NOUNS = {float: "a number", int: "a whole number", bool: "true or false", str: "a text"}
 
@@ -108,6 +109,8 @@ class Field:
         elif self.choices and value not in self.choices:
             hint = nearest(str(value), self.choices, "use one of " + ", ".join(self.choices))
             raise UsageError(f"{name}: {value!r} is not known", hint)
+        elif self.type is float and isinstance(value, str) and re.fullmatch(NUMBER, value):  # also .5, 5. and +5
+            value = float(value)
         try:
             found = msgspec.convert(value, self.type, strict=False)
         except msgspec.ValidationError as error:

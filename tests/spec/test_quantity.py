@@ -90,3 +90,14 @@ def test_every_field_has_help_and_takes_its_default(use):
         assert field.help and field.owner == use
         if field.default not in (None, msgspec.NODEFAULT):
             assert field.read(field.default) == field.default
+
+
+@pytest.mark.parametrize(("text", "value"), [(".5", 0.5), ("1.", 1.0), ("+1", 1.0), (".05e1", 0.5)])
+def test_numbers_are_read_as_people_write_them(text, value):
+    assert fields(STEPS["sweep"])["amount"].read(text) == value
+
+
+@pytest.mark.parametrize("text", ["", ".", "0,5", "5mm", "half"])
+def test_what_is_no_number_is_named(text):
+    with pytest.raises(UsageError, match=r"amount: .* is not a number"):
+        fields(STEPS["sweep"])["amount"].read(text)
