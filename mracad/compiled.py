@@ -17,13 +17,16 @@ from importlib.metadata import version
 from importlib.util import cache_from_source
 from pathlib import Path
 from types import FunctionType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from mracad import cache, flat, note
 from mracad.errors import MracadError
 from mracad.output import put
 
 _NUMBERS = {"float64": ctypes.c_double, "int64": ctypes.c_int64}
+
+if TYPE_CHECKING:
+    import numpy as np
 
 Function = Any
 _owners: list[Any] = []  # machine code lives as long as they do
@@ -41,6 +44,8 @@ class Compiled:
         a pointer.  It is called with all members one after another, and with pointers as integers.
     helpers, inlined : sequence of callable
         Functions that it calls; those of the latter become part of their callers.
+    work : (int, int)
+        Amounts of work above which it pays to load it, and to compile it.
     """
 
     def __init__(
@@ -49,9 +54,19 @@ class Compiled:
         arguments: Sequence[Sequence[str]],
         helpers: Sequence[Function] = (),
         inlined: Sequence[Function] = (),
+        work: tuple[int, int] = (0, 0),
     ) -> None:
         self._function, self._arguments, self._helpers, self._inlined = function, arguments, helpers, inlined
         self._loaded: Callable[..., None] | None = None
+        self._work, self._done, self._used = work, 0, False
+
+    def pays(self, work: int) -> bool:
+        """Whether so much more work in this process is a case for it, and it can be had."""
+        if not self._used:
+            few, many = self._work
+            self._done += work
+            self._used = (self._done >= many or (self._done >= few and self.ready)) and self.allowed
+        return self._used
 
     @property
     def ready(self) -> bool:
@@ -162,6 +177,11 @@ class Compiled:
 
 
 _NAME = "function"
+
+
+def pointer(array: np.ndarray) -> int:
+    """Where an array is in memory."""
+    return int(array.__array_interface__["data"][0])
 
 
 @contextlib.contextmanager

@@ -13,6 +13,7 @@ from importlib.util import find_spec
 
 import numpy as np
 
+from mracad.bspline.boor import EVALUATE
 from mracad.bspline.knots import KnotVector
 from mracad.inspect.sweep import SWEEP
 from mracad.wavelet.ladder import rungs_by_level
@@ -28,7 +29,8 @@ def warm() -> None:
         found = find_spec(package)
         for folder in (found.submodule_search_locations or ()) if found else ():
             compile_dir(folder, quiet=2)
-    SWEEP.prepare()
+    for code in (EVALUATE, SWEEP):
+        code.prepare()
     rungs = rungs_by_level(KnotVector.clamped(np.arange(COUNT - 2.0), 3))[:3]
     reconstruct(decompose(np.zeros((COUNT, COUNT, 3)), rungs, rungs))
 

@@ -11,7 +11,6 @@ import pytest
 
 from mracad import flat, note
 from mracad.compiled import Compiled
-from mracad.inspect import tally
 
 
 def doubled(count, pointers, scale):
@@ -120,9 +119,7 @@ def test_arrays_are_used_where_the_system_lets_no_new_code_run(folder, monkeypat
     monkeypatch.setattr(Compiled, "_load", lambda self, code: refused(code))
     sweep = made()
     assert sweep.ready and not sweep.allowed
-    monkeypatch.setattr(tally._Work, "done", 0)
-    monkeypatch.setattr(tally, "SWEEP", sweep)
-    assert not tally._compiled(2 * tally.MANY)
+    assert not sweep.pays(1)
 
 
 @pytest.fixture(scope="module")

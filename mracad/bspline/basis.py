@@ -6,7 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from mracad.bspline.boor import EVALUATE
 from mracad.bspline.knots import Array, KnotVector, Side
+from mracad.compiled import pointer
 from mracad.memo import kept
 
 SHORT = 64
@@ -57,8 +59,21 @@ def _remembered(kv: KnotVector, at: bytes, orders: tuple[int, ...], side: Side) 
 
 
 def _computed(kv: KnotVector, at: Array, orders: Sequence[int], side: Side) -> tuple[Array, Array]:
+    if EVALUATE.pays(len(at)):
+        return _compiled(kv, np.ascontiguousarray(kv.wrap(at, side)), orders, side)
     span, offset = kv.locate(at, side)
-    return span - kv.degree, np.stack([values.T for values in _local(kv, span, offset, orders)], axis=1)
+    values = np.stack([values.T for values in _local(kv, span, offset, orders)], axis=1)
+    return span - kv.degree, np.ascontiguousarray(values)
+
+
+def _compiled(kv: KnotVector, at: Array, orders: Sequence[int], side: Side) -> tuple[Array, Array]:
+    wanted, size = np.array(orders), kv.degree + 1
+    first, values, table = np.empty(len(at), int), np.empty((len(at), len(wanted), size)), np.empty(size * size)
+    EVALUATE(
+        *kv.pointers, kv.spans, kv.degree, pointer(at), len(at), side == "right",
+        pointer(wanted), len(wanted), min(orders), pointer(first), pointer(values), pointer(table),
+    )  # fmt: skip
+    return first, values
 
 
 def local_values(kv: KnotVector, span: Array, offset: Array, derivative: int = 0) -> Array:

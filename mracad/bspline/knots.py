@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from mracad.compiled import pointer
 from mracad.errors import UsageError
 
 Array = np.ndarray
@@ -166,6 +167,11 @@ class KnotVector:
     def span_index(self) -> Array:
         """Index ``k`` in ``knots`` of each non-empty span ``[t_k, t_{k+1})`` of the domain, ``(spans,)``."""
         return np.searchsorted(self.knots, self.breaks[:-1], "right") - 1
+
+    @cached_property
+    def pointers(self) -> tuple[int, int, int]:
+        """Where knots, breaks and the spans between them are in memory."""
+        return pointer(self.knots), pointer(self.breaks), pointer(self.span_index)
 
     def greville(self) -> Array:
         """Greville abscissae ``(t_{i+1} + … + t_{i+d}) / d``, ``(count,)``, within a periodic domain; read-only."""

@@ -18,6 +18,9 @@ SUMS, TOPS = 7, 3
 NOISY = 2 * np.sin(np.radians(0.5))
 """If normals turn by more than a degree in the median, noise is being removed; as a chord."""
 
+FEW, MANY = 10_000, 4_000_000
+"""Numbers of points above which it pays to load the compiled code, and to compile it."""
+
 _WIDE = 128
 """Points that the compiled code processes at once."""
 
@@ -298,4 +301,5 @@ SWEEP = Compiled(
     ),
     (_spread, _add_four, _add_eight, _divide, _figure, _tell, _sum, _mark, _move),
     (dot, figures, quotient, told),
+    (FEW, MANY),
 )

@@ -13,14 +13,12 @@ import numpy as np
 from mracad.bspline.jets import ORDERS, Sites
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
+from mracad.compiled import pointer
 from mracad.inspect.curvature import BENT, FORMS, Forms, dot, figures, shapes
 from mracad.inspect.sweep import SCRATCH, SUMS, SWEEP, TOPS, told
 from mracad.model.cells import Quadrature
 
 Array = np.ndarray
-
-FEW, MANY = 10_000, 4_000_000
-"""Numbers of points above which it pays to load compiled code, and to compile it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +69,7 @@ class Marks:
     @cached_property
     def pointers(self) -> tuple[int, ...]:
         """Where the arrays are in memory."""
-        return tuple(map(_pointer, (self.counts, self.rounding, self.base, self.normals, *self.strips)))
+        return tuple(map(pointer, (self.counts, self.rounding, self.base, self.normals, *self.strips)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,7 +126,7 @@ class Sight:
         return self._figures(net, BENT)
 
     def _figures(self, net: Net, rows: slice) -> Array:
-        if not _compiled(self.points):
+        if not SWEEP.pays(self.points):
             return shapes(self.sites.blocks(net, self.centre), rows)
         found = np.empty((rows.stop - rows.start, self.points))
         self._sweep(self.sites.along(net, self.centre), None, (found, found), (rows, found))
@@ -137,7 +135,7 @@ class Sight:
     def tally(self, net: Net, marks: Marks) -> Tally:
         """The figures of the places of a surface over the same knots."""
         found = Tally(np.zeros((SUMS, marks.places)), np.zeros((TOPS, marks.places)))
-        if _compiled(self.points):
+        if SWEEP.pays(self.points):
             both = found.sums, found.tops
             self._sweep(self.sites.along(net, self.centre), marks, both, (slice(0, 0), found.sums))
             return found
@@ -158,7 +156,7 @@ class Sight:
     def moved(self, net: Net, marks: Marks) -> tuple[float, float]:
         """The largest motion along normals, and in any direction, where a surface moves by the points of another."""
         most = np.zeros(2)
-        if _compiled(self.points // len(ORDERS)):
+        if SWEEP.pays(self.points // len(ORDERS)):
             self._sweep(self.sites.along(net, np.zeros(3), 0), marks, (most, most), (slice(0, 0), most))
         else:
             end = 0
@@ -173,14 +171,14 @@ class Sight:
     ) -> None:
         scratch, (sums, tops), (rows, found) = np.zeros(SCRATCH), added, stored
         SWEEP(
-            _pointer(along), *along.shape, *self._pointers, len(self.runs),
+            pointer(along), *along.shape, *self._pointers, len(self.runs),
             marks is not None, self.points, *(marks.pointers if marks else (0,) * 6),
-            sums.shape[-1], _pointer(sums), _pointer(tops), rows.start, rows.stop, _pointer(found), _pointer(scratch),
+            sums.shape[-1], pointer(sums), pointer(tops), rows.start, rows.stop, pointer(found), pointer(scratch),
         )  # fmt: skip
 
     @cached_property
     def _pointers(self) -> tuple[int, ...]:
-        return (*self._taps[0].shape, *map(_pointer, (*self._taps, *self.weights, self.runs)))
+        return (*self._taps[0].shape, *map(pointer, (*self._taps, *self.weights, self.runs)))
 
     @cached_property
     def _taps(self) -> tuple[Array, Array]:
@@ -188,19 +186,3 @@ class Sight:
         columns, in_v = self.sites.columns.astype(np.int32), self.sites.in_v
         spare = -columns.shape[1] % 4
         return np.pad(columns, [(0, 0), (0, spare)]), np.pad(in_v, [(0, 0), (0, 0), (0, spare)])
-
-
-def _pointer(array: Array) -> int:
-    return int(array.__array_interface__["data"][0])
-
-
-class _Work:
-    """Number of points processed so far in this process."""
-
-    done = 0
-
-
-def _compiled(points: int) -> bool:
-    """Whether so many more points are a case for compiled code, and it can be had."""
-    _Work.done += points
-    return (_Work.done >= MANY or (_Work.done >= FEW and SWEEP.ready)) and SWEEP.allowed

@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
-from mracad.bspline.basis import basis, gauss
+from mracad.bspline import boor
+from mracad.bspline.basis import basis, gauss, jet
 from mracad.bspline.gram import gram
 from mracad.bspline.knots import KnotVector
 from mracad.errors import UsageError
@@ -25,6 +26,22 @@ def test_partition_of_unity(kv):
         assert values.min() >= 0
         np.testing.assert_allclose(values.sum(axis=1), 1, atol=1e-14)
         np.testing.assert_allclose(basis(kv, x, 1, side)[1].sum(axis=1), 0, atol=1e-9)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("degree", [1, 3, 22])
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_compiled_code_and_arrays_give_the_same_bits(kind, degree, side, monkeypatch):
+    kv = random_knots(degree, kind, 6, seed=degree)
+    low, high = kv.domain
+    x = np.concatenate([np.linspace(low - 0.3, high + 0.3, 100), kv.breaks])
+    found = []
+    for used in (True, False):
+        monkeypatch.setattr(boor.EVALUATE, "pays", lambda work, used=used: used)
+        found.append(jet(kv, x, (2, 0, 1, degree, degree + 1), side))
+    for compiled, arrays in zip(*found, strict=True):
+        np.testing.assert_array_equal(compiled, arrays)
+        assert compiled.strides == arrays.strides  # sums of products depend on them
 
 
 @pytest.mark.parametrize("degree", [1, 3, 9, 25])
