@@ -269,8 +269,10 @@ def told() -> Iterator[None]:
         raise MracadError("standard output was closed", "", Code.FILE) from error
     except Exception as error:
         from mracad import note
-        from mracad.job.wire import internal
+        from mracad.job.wire import internal, out_of_memory
 
+        if out_of_memory(error):
+            raise MemoryError from error
         if not type(error).__module__.startswith("OCP"):
             raise internal(error) from error
         what = f"{type(error).__name__}: {error}"

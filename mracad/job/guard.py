@@ -13,8 +13,9 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, TypeVar
 
-from mracad.errors import CrashError, LimitError, UsageError
+from mracad.errors import LimitError, UsageError
 from mracad.job import wire
+from mracad.job.loss import Loss
 from mracad.note import Note, set_note
 from mracad.processes import end_with_parent
 
@@ -50,8 +51,8 @@ def run(
     Raises
     ------
     MracadError
-        With the code of a limit when one was exceeded, and of an internal error when the child crashed or raised
-        anything else.
+        With the code of a limit when one was exceeded or the system killed the child, and of an internal error when
+        the child crashed or raised anything else.
     """
     global _memory
     if not hasattr(os, "fork"):
@@ -62,7 +63,7 @@ def run(
     sys.stdout.flush()
     sys.stderr.flush()
     reader, writer = os.pipe()
-    note = Note()
+    note, loss = Note(), Loss()
     child = os.fork()
     if not child:
         set_note(note)
@@ -90,16 +91,7 @@ def run(
         return wire.unpacked(data, returns)
     if memory and _peak(usage.ru_maxrss) > 0.7 * memory:
         raise _out_of_memory(memory)
-    number = os.WTERMSIG(status) if os.WIFSIGNALED(status) else 0
-    what = signal.Signals(number).name if number else f"exit code {os.WEXITSTATUS(status)}"
-    raise CrashError(f"the CAD kernel crashed ({what}){note}", "the model may be damaged: see mracad check")
-
-
-_OUT_OF_MEMORY = (
-    "failed to map segment", "cannot map zero-fill pages", "Cannot allocate memory", "bad_alloc",
-    "error return without exception set", "Unable to create type object",
-)  # fmt: skip
-"""Messages of libraries that ran out of memory."""
+    raise loss.error(os.waitstatus_to_exitcode(status), note, "free memory, or use a machine with more")
 
 
 def _child(work: Callable[[], Any], writer: int, memory: int | None) -> None:
@@ -156,7 +148,7 @@ def _take_buffers() -> None:
 def _starved(error: BaseException) -> bool:
     """Whether an error under a limit means that memory ran out; a library that does not load for it may not say so."""
     unloaded = isinstance(error, ImportError) and not isinstance(error, ModuleNotFoundError)
-    return unloaded or isinstance(error, MemoryError) or any(words in str(error) for words in _OUT_OF_MEMORY)
+    return unloaded or wire.out_of_memory(error)
 
 
 def _terminated(*_: object) -> None:

@@ -24,6 +24,13 @@ _KINDS = {
 }
 
 
+_OUT_OF_MEMORY = (
+    "failed to map segment", "cannot map zero-fill pages", "Cannot allocate memory", "bad_alloc",
+    "error return without exception set", "Unable to create type object",
+)  # fmt: skip
+"""Messages of libraries that ran out of memory."""
+
+
 class Failure(msgspec.Struct, frozen=True, array_like=True):
     """An error in a message; see :class:`mracad.errors.MracadError`."""
 
@@ -50,10 +57,15 @@ def failed(error: BaseException) -> bytes:
 
 def internal(error: BaseException) -> MracadError:
     """The MracadError for an unexpected exception."""
-    if isinstance(error, MemoryError):
+    if out_of_memory(error):
         return LimitError("out of memory", "use a smaller model or a machine with more memory")
     text = " ".join(str(error).split())
     return CrashError(f"internal error: {type(error).__name__}: {text}", "please report it with the output of --debug")
+
+
+def out_of_memory(error: BaseException) -> bool:
+    """Whether an error says that memory ran out."""
+    return isinstance(error, MemoryError) or any(words in str(error) for words in _OUT_OF_MEMORY)
 
 
 def unpacked(data: bytes, kind: type[Value]) -> Value:

@@ -48,7 +48,7 @@ class Kind:
     example: str
     units: Mapping[str, float]
     positive: bool = True
-    most: float = 1e300
+    most: float = 1e12
     folded: bool = False
 
     def read(self, text: str, name: str, percent: float | None = None) -> float:
@@ -72,8 +72,10 @@ class Kind:
         unit = "" if match is None else match[2].lower() if self.folded else match[2]
         hint = f"write {name} as {self.example}"
         value = float(match[1]) * units[unit] if match and unit in units else math.nan
-        if not abs(value) <= self.most:
+        if not math.isfinite(value):
             raise UsageError(f"{name}: {text!r} is not {self.noun}", hint)
+        if abs(value) > self.most:
+            raise UsageError(f"{name}: {text!r} is too large for {self.noun}", hint)
         if self.positive and not value > 0:
             raise UsageError(f"{name}: {text!r} is not greater than zero", hint)
         return value

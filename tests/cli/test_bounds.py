@@ -27,7 +27,8 @@ OTHERS = [
     (("convert", "IN", "-o", "out.stl", "--chord", "1e-9mm"), 2, "chord"),
     (("convert", "IN", "-o", "out.stl", "--angle", "0.001"), 2, "angle"),
     (("convert", "IN", "-o", "out.stl", "--angle", "nan"), 2, "angle"),
-    (("info", "IN", "--time-limit", "1e300"), 2, "not a time"),
+    (("info", "IN", "--time-limit", "1e300"), 2, "too large for a time"),
+    (("smooth", "IN", "--scale", "1e100", "--dry-run"), 2, "too large for a length"),
     (("info", "IN", "--memory-limit", "9" * 400), 2, "not an amount of memory"),
 ]
 

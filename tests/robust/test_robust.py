@@ -153,6 +153,15 @@ def test_too_much_memory_is_an_error():
     assert guard.run(hungry, int, memory=3 * 10**9) == 10**8
 
 
+def test_libraries_have_words_for_memory_that_ran_out():
+    def work():
+        raise ImportError("libz.so: failed to map segment from shared object")
+
+    with pytest.raises(MracadError, match="out of memory") as error:
+        guard.run(work, object)
+    assert error.value.code == Code.LIMIT
+
+
 def unloadable():
     raise ImportError("initialization failed")  # all that pybind11 says when a module runs out of memory
 

@@ -42,12 +42,18 @@ def test_every_unit_of_length_and_the_share_of_a_model(unit):
 
 @pytest.mark.parametrize(
     ("kind", "text"),
-    [(LENGTH, "2%"), (LENGTH, "5s"), (TIME, "5mm"), (TIME, "1e300"), (MEMORY, "9" * 400), (ANGLE, "3mm"), (LENGTH, "")],
+    [(LENGTH, "2%"), (LENGTH, "5s"), (TIME, "5mm"), (TIME, "inf"), (ANGLE, "3mm"), (LENGTH, "")],
 )
 def test_what_is_no_such_quantity_is_refused_with_how_to_write_it(kind, text):
     with pytest.raises(UsageError, match=f"is not {kind.noun}") as error:
         kind.read(text, "x")
     assert kind.example in error.value.hint
+
+
+@pytest.mark.parametrize(("kind", "text"), [(LENGTH, "1e100"), (TIME, "1e300"), (MEMORY, "9" * 300)])
+def test_what_no_computation_could_take_is_too_large(kind, text):
+    with pytest.raises(UsageError, match=f"too large for {kind.noun}"):
+        kind.read(text, "x")
 
 
 @pytest.mark.parametrize("kind", [LENGTH, TIME, MEMORY])

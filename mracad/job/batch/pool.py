@@ -31,6 +31,7 @@ import psutil
 from mracad.errors import CrashError, LimitError, MracadError
 from mracad.job import wire
 from mracad.job.batch.settings import Limits
+from mracad.job.loss import Loss
 from mracad.note import Note, set_note
 from mracad.processes import WORKERS, end_with_parent
 
@@ -172,6 +173,7 @@ class _Worker:
         environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
         for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", WORKERS):
             environment[name] = "1"  # the other cores have workers of their own
+        self._lost = Loss()
         with tempfile.TemporaryFile() as page:
             page.truncate(mmap.PAGESIZE)
             self.note = Note(page.fileno())
@@ -239,12 +241,7 @@ class _Worker:
         code = self.process.wait()
         if self.reason:
             return self.reason
-        if code == -getattr(signal, "SIGKILL", 9):
-            return CrashError(
-                f"the worker was killed (perhaps out of memory){self.note}", "try again with fewer workers"
-            )
-        name = signal.Signals(-code).name if code < 0 else f"exit code {code}"
-        return CrashError(f"the worker crashed ({name}){self.note}", "the file crashes the CAD kernel: export it again")
+        return self._lost.error(code, self.note, "use fewer workers, or a machine with more memory")
 
 
 def _occupied(process: psutil.Process) -> int:

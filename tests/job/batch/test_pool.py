@@ -18,7 +18,7 @@ from tests.job.batch.tasks import MB, made, work
 def test_bad_tasks_cost_themselves_alone():
     bad = {
         "crash": (CrashError, "SIGSEGV"),
-        "kill": (CrashError, "killed"),
+        "kill": (LimitError, "killed, most likely for lack of memory; use fewer workers"),
         "exit": (CrashError, "exit code 3"),
         "hang": (LimitError, "time limit of 2 s"),
         "hang at a stage": (LimitError, "time limit of 2 s while looking 'part.step'"),
