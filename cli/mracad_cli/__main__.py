@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib
 import io
 import os
@@ -12,7 +13,7 @@ from pathlib import Path
 import click
 
 import mracad
-from mracad.errors import Code, MracadError
+from mracad.errors import Code, FileError, MracadError
 from mracad_cli import commands
 from mracad_cli.command import Group, run
 from mracad_cli.say import json_text, printable, say, voice
@@ -103,7 +104,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     if voice.as_json:
         body = {"code": int(failure.code), "message": failure.message, "hint": failure.hint}
-        say(json_text({"error": body}))
+        with contextlib.suppress(FileError):
+            say(json_text({"error": body}))
     print(printable(f"mracad: {' '.join(str(failure).split())}"), file=sys.stderr)
     return int(failure.code)
 

@@ -6,9 +6,7 @@ What only a command that runs needs is imported then: help is to be quick.
 from __future__ import annotations
 
 import contextlib
-import os
 import re
-import sys
 from collections.abc import Collection, Iterable, Iterator
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -155,7 +153,6 @@ class Command(click.Command):
             try:
                 with told(), compiling():
                     code = click.Command.invoke(self, ctx)
-                    sys.stdout.flush()
             finally:
                 journal.leave()
             return Ended(code if isinstance(code, int) else 0, journal.said)
@@ -264,9 +261,6 @@ def told() -> Iterator[None]:
         raise  # the guard reports memory limits
     except (KeyboardInterrupt, click.Abort):
         raise KeyboardInterrupt from None
-    except BrokenPipeError as error:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # discard the rest of the output
-        raise MracadError("standard output was closed", "", Code.FILE) from error
     except Exception as error:
         from mracad import note
         from mracad.job.wire import internal, out_of_memory
@@ -296,7 +290,6 @@ def run(group: click.Group, arguments: list[str], *, guarded: bool) -> int:
     try:
         with told():
             code: Any = group.main(arguments, prog_name="mracad", standalone_mode=False, obj=guarded)
-            sys.stdout.flush()
     except click.exceptions.NoArgsIsHelpError as error:
         click.echo(error.format_message(), err=True)
         return int(Code.USAGE)

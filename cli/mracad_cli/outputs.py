@@ -19,7 +19,7 @@ from mracad.spec.pictures import Scalars
 from mracad.store import Location, Url, is_url, location, missing
 from mracad_cli.options import PAGES, PICTURES, Reading, Reports, Writing, model
 from mracad_cli.params import Declared
-from mracad_cli.say import json_text, say, warn
+from mracad_cli.say import json_text, printing, say, warn
 
 MESHES = {**dict.fromkeys(("chord", "angle"), ("mesh", "stl")), "ascii_stl": ("stl", "stl")}
 OF = {**dict.fromkeys(PICTURES.values(), ("picture", "png")), **MESHES, "schema": ("step", "step")}
@@ -217,9 +217,9 @@ def deliver(files: Mapping[str, str | bytes | None], lines: Iterable[str], *, st
 
     def tell() -> None:
         if stream is not None:
-            sys.stdout.buffer.write(stream)
-        say(*said, file=sys.stdout if stream is None else sys.stderr)
-        sys.stdout.flush()
+            with printing():
+                sys.stdout.buffer.write(stream)
+        say(*said, aside=stream is not None)
 
     contents = {path: content for path, content in files.items() if content is not None}
     put_all({p: c.encode(errors="surrogateescape") if isinstance(c, str) else c for p, c in contents.items()}, tell)

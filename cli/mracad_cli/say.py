@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import re
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any, TextIO
+from typing import Any
+
+from mracad.errors import FileError
 
 _CONTROL = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029]")
 
@@ -44,13 +48,37 @@ voice = Voice()
 """That of this process."""
 
 
-def say(*lines: str, file: TextIO | None = None) -> None:
-    """Print lines of a result, on standard output unless ``file`` is given."""
+def say(*lines: str, aside: bool = False) -> None:
+    """Print lines of a result, on standard output, or on standard error where that holds something else."""
     for line in lines:
         if voice.listener:
             voice.listener(line, False)
-        if not voice.quiet:
-            print(printable(line), file=file)
+        if voice.quiet:
+            continue
+        if aside:
+            print(printable(line), file=sys.stderr)
+        else:
+            with printing():
+                print(printable(line))
+
+
+@contextmanager
+def printing() -> Iterator[None]:
+    """For output in the block, which has left this process at its end.
+
+    Raises
+    ------
+    FileError
+        When standard output does not take it: the rest is discarded.
+    """
+    try:
+        yield
+        sys.stdout.flush()
+    except OSError as error:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        closed = isinstance(error, BrokenPipeError)
+        what = "standard output was closed" if closed else f"cannot write to standard output: {error.strerror}"
+        raise FileError(what, "" if closed else "send it elsewhere") from error
 
 
 def warn(*lines: str) -> None:

@@ -147,6 +147,18 @@ def test_nothing_is_written_when_nobody_reads_the_result(small, tmp_path):
     assert result.returncode == 3 and "standard output was closed" in result.stderr and not list(tmp_path.iterdir())
 
 
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="no /dev/full")
+@pytest.mark.parametrize("words", [["-o", "out.brep"], ["-o", "out.brep", "--json"], ["-o", "-"]])
+def test_nothing_is_written_when_the_result_cannot_be(small, tmp_path, words):
+    words = ["convert", str(small[0]), *words, "-o", "out.stl"]
+    command = [sys.executable, "-m", "mracad_cli", *words]
+    with open("/dev/full", "w") as full:
+        result = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, cwd=tmp_path)
+    assert result.returncode == 3 and not list(tmp_path.iterdir())
+    assert result.stderr.splitlines()[-1].startswith("mracad: cannot write to standard output: No space left")
+    assert "Traceback" not in result.stderr
+
+
 def test_two_files_of_one_name(mracad, samples, tmp_path):
     blade, one = samples / "blade.step", tmp_path / "one.step"
     for words in (["-o", one, "-o", one], ["-o", one, "--report", one], ["-o", one, "--report", "r", "--depfile", "r"]):

@@ -225,7 +225,6 @@ def _outcomes(
                     warn(f"{outcome.file}: {warning}")
                 if as_json and outcome.status != "not tried":
                     say(json_text(plain(outcome)))
-                    sys.stdout.flush()
                 failed += outcome.status == "failed"
                 progress(f"{recipe.name}, {failed} failed" if failed else recipe.name, len(outcomes), len(items))
         except KeyboardInterrupt:

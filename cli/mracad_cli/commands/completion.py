@@ -13,6 +13,7 @@ import click
 from click.shell_completion import get_completion_class
 
 from mracad_cli.command import Plain
+from mracad_cli.say import printing
 
 SHELLS = "bash", "zsh", "fish", "powershell"
 
@@ -36,7 +37,8 @@ def command(shell: str) -> None:
     kind = get_completion_class(shell)
     assert kind is not None
     script = kind.source_template % kind(click.Command(PROGRAM), {}, PROGRAM, VARIABLE).source_vars()
-    click.echo(_with_folders(shell, script), nl=False)
+    with printing():
+        click.echo(_with_folders(shell, script), nl=False)
 
 
 def _with_folders(shell: str, script: str) -> str:

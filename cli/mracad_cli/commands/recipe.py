@@ -6,7 +6,7 @@ import click
 
 from mracad_cli import options, running
 from mracad_cli.command import Group
-from mracad_cli.say import json_text, say
+from mracad_cli.say import json_text, printing, say
 from mracad_cli.steps import plan
 
 
@@ -33,4 +33,5 @@ def schema() -> None:
     """Print the JSON schema of recipes, for editors and validators."""
     from mracad.spec import schema
 
-    print(json_text(schema.schema(), 1))
+    with printing():
+        print(json_text(schema.schema(), 1))
