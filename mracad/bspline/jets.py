@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from math import comb
 
 import numpy as np
@@ -11,12 +12,16 @@ import numpy as np
 from mracad.bspline.basis import jet
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
+from mracad.bspline.tensor import COMBINE
+from mracad.compiled import pointer
 
 Array = np.ndarray
 
 ORDERS = ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2), (3, 0), (2, 1), (1, 2), (0, 3))
 """Orders of the derivatives along u and v, in the order of results."""
 
+_BY_AXIS = np.ascontiguousarray(np.transpose(ORDERS))
+_POINTERS = pointer(_BY_AXIS), pointer(_BY_AXIS[1])
 
 _BLOCK = 8192
 """Points that are processed at once: their figures fit the processor's cache."""
@@ -41,19 +46,8 @@ def jets(net: Net, u: Array, v: Array, mask: Array, centre: Array, most: int = 3
     ndarray (10, 3, q)
         By ``ORDERS`` up to the highest order, coordinate and point, v slowest.
     """
-    sites = Sites.of(net.u, net.v, u, v, mask, most)
-    along, (pieces, wide) = sites.along(net, centre), v.shape
-    columns, in_v = sites.columns[::wide], sites.in_v.reshape(most + 1, pieces, wide, -1)
-    step = max(1, _BLOCK // max(wide * u.size, 1))
-    found = []
-    for begin in range(0, max(pieces, 1), step):
-        part = slice(begin, begin + step)
-        every = np.empty((len(sites.orders), along.shape[1], len(v[part]), wide, u.size))
-        windows = [each[:, columns[part]] for each in along]
-        for one, (r, s) in zip(every, sites.orders, strict=True):
-            np.matmul(in_v[s, part], windows[r], out=one)
-        found.append(sites.chosen(every, slice(begin * wide, (begin + step) * wide), net))
-    return np.concatenate(found, axis=2)
+    found = list(Sites.of(net.u, net.v, u, v, mask, most).blocks(net, centre))
+    return found[0] if len(found) == 1 else np.concatenate(found, axis=2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,12 +106,22 @@ class Sites:
         step = max(1, _BLOCK // max(self.mask.shape[1], 1))
         for begin in range(0, max(len(self.mask), 1), step):
             part = slice(begin, begin + step)
-            found = np.zeros((len(orders), along.shape[1], *self.mask[part].shape))
-            for k, columns in enumerate(self.columns[part].T):
-                curves = along[:, :, columns]
-                for one, (r, s) in zip(found, orders, strict=True):
-                    one += self.in_v[s, part, k, None] * curves[r]
+            shape = len(orders), along.shape[1], *self.mask[part].shape
+            if COMBINE.pays(shape[2] * shape[3]):
+                found = np.empty(shape)
+                across = *self._pointers, *self.columns.shape, begin, begin + shape[2]
+                COMBINE(pointer(along), *along.shape[1:], *across, *_POINTERS, len(orders), pointer(found))
+            else:
+                found = np.zeros(shape)
+                for k, columns in enumerate(self.columns[part].T):
+                    curves = along[:, :, columns]
+                    for one, (r, s) in zip(found, orders, strict=True):
+                        one += self.in_v[s, part, k, None] * curves[r]
             yield self.chosen(found, part, net)
+
+    @cached_property
+    def _pointers(self) -> tuple[int, int]:
+        return pointer(self.columns), pointer(self.in_v)
 
     def chosen(self, stack: Array, rows: slice, net: Net) -> Array:
         """Derivatives at points, from those of homogeneous coordinates at all pairs of parameters of some rows."""

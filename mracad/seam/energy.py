@@ -20,15 +20,25 @@ import numpy as np
 from mracad.bspline.functions import ORDERS
 from mracad.bspline.jets import jets
 from mracad.bspline.surface import Net
+from mracad.compiled import pointer
 from mracad.model.cells import Quadrature
 from mracad.seam.integrals import Order, Sites, integrals, nothing, on_pattern, sites, sparse
 from mracad.seam.kinks import FLATTEST, kinks
+from mracad.seam.points import FRAME, SQUARE, bending, framed, limited, over_weights, product, root, squared
 from mracad.seam.stretch import EVEN, Stretch
 
 Array = np.ndarray
 
 _AT_ONCE = 100_000
 """Points of the quadrature handled at a time."""
+
+_VALUE, _REST = ORDERS[0], ORDERS[1:]
+_MASS = ((_VALUE, _VALUE),)
+_PAIRS: tuple[tuple[Order, Order], ...] = (
+    *((a, b) for i, a in enumerate(_REST) for b in _REST[: i + 1]),
+    *((a, _VALUE) for a in (*_REST, _VALUE)),
+)
+"""Orders of the products in a bending; those with values only if the surface is rational."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,10 +86,9 @@ def forms(
     blocks = list(_blocks(net, quadrature))
     usual = _usual(metric, [along for along, _ in _blocks(net, quadrature, False)]) if len(blocks) > 1 else None
     for along, mask in blocks:
-        frame, area = _frames(metric, along, stretch, usual)
-        density, bend = _squared(net, along, np.where(mask, area, 0.0), frame)
-        integrals(along, {(ORDERS[0], ORDERS[0]): density}, mass)
-        integrals(along, bend, bending)
+        density, bend = _densities(net, metric, along, mask, stretch, usual)
+        integrals(along, _MASS, density[None], mass)
+        integrals(along, _PAIRS[: len(bend)], bend, bending)
     smooth, sharp = kinks(net, metric, quadrature, creases, stretch)
     area, whole = sparse([mass, bending], net)
     return Forms(area, on_pattern(whole + smooth, area) if smooth.nnz else whole, sharp)
@@ -92,11 +101,11 @@ def masses(net: Net, quadrature: Quadrature) -> Forms:
     form = nothing(net.u, net.v)
     for along, mask in _blocks(net, quadrature):
         xu, xv = _jets(net, along, 1)[1:]
-        e, f, g = _dot(xu, xu), _dot(xu, xv), _dot(xv, xv)
+        e, f, g = product(xu, xu), product(xu, xv), product(xv, xv)
         area = np.sqrt(np.maximum(e * g - f * f, 0.0)) * _weights(along)
         if net.weights is not None:
-            area = area / _jets(Net(net.u, net.v, net.weights[..., None]), along)[0, 0] ** 2
-        integrals(along, {(ORDERS[0], ORDERS[0]): np.where(mask, area, 0.0)}, form)
+            area = area / _jets(Net(net.u, net.v, net.weights[..., None]), along, 1)[0, 0] ** 2
+        integrals(along, _MASS, np.where(mask, area, 0.0)[None], form)
     none = csr_array((net.u.count * net.v.count,) * 2)
     return Forms(sparse([form], net)[0], none, none)
 
@@ -105,14 +114,12 @@ def slopes(net: Net, metric: Net, quadrature: Quadrature) -> Any:
     """∫ |∇δ|² dA of displacements, ``scipy.sparse.csr_array``; parameters as for :func:`forms`."""
     along = sites(net.u, quadrature.u, quadrature.wu), sites(net.v, quadrature.v, quadrature.wv)
     xu, xv = _jets(metric, along)[1:3]
-    e, f, g = _dot(xu, xu), _dot(xu, xv), _dot(xv, xv)
-    area = np.sqrt(np.maximum(e * g - f * f, 0.0)) * _weights(along)
-    e, f, g = _floored(e, f, g, (np.median(e), np.median(g)))
-    frame = np.zeros((5, 3, *e.shape))
-    frame[0, 0], frame[1, 1] = 1 / np.sqrt(e), np.sqrt(e / (e * g - f * f))
-    frame[0, 1] = -f / e * frame[1, 1]
-    _, slope = _squared(net, along, np.where(quadrature.mask, area, 0.0), frame)
-    return sparse([integrals(along, slope)], net)[0]
+    area, _, _, _, p, q, r = framed(xu, xv, _least(np.median(product(xu, xu)), np.median(product(xv, xv))))
+    none = np.zeros_like(area)
+    nothing = none, none, none
+    rows = (p, q, none), (none, r, none), nothing, nothing, nothing
+    _, slope = _products(net, along, rows, np.where(quadrature.mask.T, area * _weights(along), 0.0))
+    return sparse([integrals(along, _PAIRS[: len(slope)], slope)], net)[0]
 
 
 def _blocks(net: Net, quadrature: Quadrature, inside: bool = True) -> Iterator[tuple[tuple[Sites, Sites], Array]]:
@@ -122,94 +129,82 @@ def _blocks(net: Net, quadrature: Quadrature, inside: bool = True) -> Iterator[t
     for begin in range(0, pieces, step):
         mask, part = quadrature.mask[begin * points : (begin + step) * points], slice(begin, begin + step)
         if not inside or mask.any():
-            yield (sites(net.u, quadrature.u[part], quadrature.wu[part]), across), np.ascontiguousarray(mask.T).T
-
-
-def _squared(
-    net: Net, along: tuple[Sites, Sites], area: Array, frame: Array
-) -> tuple[Array, dict[tuple[Order, Order], Array]]:
-    """Densities of the mass, and of the square of a form with coefficients ``(5, 3, qu, qv)`` of derivatives, by their
-    orders."""
-    orders: tuple[Order, ...] = ORDERS[1:]
-    mass = area
-    if net.weights is not None:
-        orders = ORDERS
-        mass, frame = _over_weights(net, net.weights, along, area, frame)
-    frame = frame * np.sqrt(area)
-    squares: dict[tuple[Order, Order], Array] = {}
-    for i, a in enumerate(orders):
-        products = (frame[i] * frame[: i + 1]).sum(axis=1)
-        squares |= {(a, b): product for b, product in zip(orders, products, strict=False)}
-    return mass, squares
+            yield (sites(net.u, quadrature.u[part], quadrature.wu[part]), across), np.ascontiguousarray(mask.T)
 
 
 def _usual(metric: Net, blocks: Iterable[tuple[Sites, Sites]]) -> tuple[Any, Any]:
     """Medians of |X_u|² and |X_v|² over all points."""
-    found = [[_dot(x, x).ravel() for x in _jets(metric, along, 1)[1:]] for along in blocks]
+    found = [[product(x, x).ravel() for x in _jets(metric, along, 1)[1:]] for along in blocks]
     e, g = (np.concatenate(each) for each in zip(*found, strict=True))
     return np.median(e, overwrite_input=True), np.median(g, overwrite_input=True)
 
 
-def _frames(
-    metric: Net, along: tuple[Sites, Sites], stretch: Stretch, usual: tuple[Any, Any] | None = None
+def _least(*usual: Any) -> tuple[float, float]:
+    """Floors for |X_u|² and |X_v|² by what is usual."""
+    one, other = (float((FLATTEST**0.5 * np.sqrt(each)) ** 2) for each in usual)
+    return one, other
+
+
+def _densities(
+    net: Net,
+    metric: Net,
+    along: tuple[Sites, Sites],
+    mask: Array,
+    stretch: Stretch,
+    usual: tuple[Any, Any] | None,
 ) -> tuple[Array, Array]:
-    """Coefficients in H̃_11, √2 H̃_12, H̃_22 of ∂_u, ∂_v, ∂_uu, ∂_uv, ∂_vv, ``(5, 3, qu, qv)``; areas ``(qu, qv)``."""
-    _, xu, xv, *seconds = _jets(metric, along)
-    e, f, g = _dot(xu, xu), _dot(xu, xv), _dot(xv, xv)
-    area = np.sqrt(np.maximum(e * g - f * f, 0.0)) * _weights(along)
-    e, f, g = _floored(e, f, g, usual or (np.median(e), np.median(g)))
-    det = e * g - f * f
-    p, r = 1 / np.sqrt(e), np.sqrt(e / det)
-    x, y, skew = (p, -f / e * r), (0.0, r), 2.0**0.5
-    if not stretch.plain:
-        a, b, c = stretch.root(along[0].at, along[1].at, (e, f, g), (p, x[1], r))
-        x, y = (x[0] * a + x[1] * b, x[0] * b + x[1] * c), (r * b, r * c)  # the frame, times R
-    frame = np.empty((5, 3, *p.shape[::-1])).swapaxes(2, 3)
-    for row, (i, j, factor) in enumerate(((0, 0, 1.0), (0, 1, skew), (1, 1, 1.0))):
-        frame[2, row] = factor * x[i] * x[j]
-        frame[3, row] = factor * (x[i] * y[j] + x[j] * y[i])
-        frame[4, row] = factor * y[i] * y[j]
-    dots = [(_dot(second, xu) / det, _dot(second, xv) / det) for second in seconds]
-    for slope, christoffel in zip(
-        frame, ([g * a - f * b for a, b in dots], [e * b - f * a for a, b in dots]), strict=False
-    ):
-        np.multiply(frame[2], -christoffel[0], out=slope)
-        slope -= frame[3] * christoffel[1]
-        slope -= frame[4] * christoffel[2]
-    return frame, area
+    """Densities of the mass ``(qv, qu)``, and of the bending for the first of ``_PAIRS``, ``(pairs, qv, qu)``."""
+    jet = _jets(metric, along)
+    least = _least(*(usual or [np.median(product(x, x)) for x in jet[1:3]]))
+    frame, points = np.empty((7, *mask.shape)), mask.size
+    if FRAME.pays(points):
+        FRAME(pointer(jet), points, *least, pointer(frame))
+    else:
+        frame[:] = framed(jet[1], jet[2], least)
+    limit = stretch.limit
+    bent = frame if limit is None else limit.shape(along[0].at, along[1].at, frame[4:])
+    scale, least_sum = 0.0 if limit is None else limit.scale, max(stretch.lengths) ** -4.0
+    lengths, lead = stretch.lengths[:: 1 - 2 * stretch.lead], float(stretch.lead)
+    if SQUARE.pays(points):
+        wv, wu = (np.ascontiguousarray(each.weight) for each in along[::-1])
+        weights = jet if net.weights is None else _weighted(net, along)
+        mass, found = np.zeros(mask.shape), np.zeros((15 if net.weights is None else 21, *mask.shape))
+        SQUARE(
+            pointer(jet), pointer(frame), pointer(mask), *lengths, lead, pointer(bent), scale, least_sum,
+            limit is not None, pointer(wv), pointer(wu), pointer(weights), net.weights is not None, *mask.shape,
+            pointer(mass), pointer(found),
+        )  # fmt: skip
+        return mass, found
+    own = root(frame[1:4], lengths, lead)
+    if limit is not None:
+        own = limited(own, bent, scale, least_sum)
+    rows = bending(jet[1:], frame[1:4], frame[4:], own)
+    return _products(net, along, rows, np.where(mask, frame[0] * _weights(along), 0.0))
 
 
-def _floored(e: Array, f: Array, g: Array, usual: tuple[Any, Any]) -> tuple[Array, Array, Array]:
-    """A first fundamental form, with floors against division by zero where it is far below its usual e and g."""
-    mean_u, mean_v = np.sqrt(usual)
-    e, g = np.maximum(e, (FLATTEST**0.5 * mean_u) ** 2), np.maximum(g, (FLATTEST**0.5 * mean_v) ** 2)
-    return e, np.clip(f, -0.999 * np.sqrt(e * g), 0.999 * np.sqrt(e * g)), g
+def _products(net: Net, along: tuple[Sites, Sites], rows: Any, area: Array) -> tuple[Array, Array]:
+    """Densities of the mass, and of the square of a form with coefficients of five derivatives."""
+    if net.weights is None:
+        return area, np.stack(squared(rows, area))
+    jet = _weighted(net, along)
+    rows, value = over_weights(rows, jet)
+    more = [product(each, value) * area for each in (*rows, value)]
+    return area / (jet[0] * jet[0]), np.stack([*squared(rows, area), *more])
 
 
-def _over_weights(
-    net: Net, weights: Array, along: tuple[Sites, Sites], area: Array, frame: Array
-) -> tuple[Array, Array]:
-    """Coefficients of mass and frames for w_i B_i / w, in terms of w_i B_i and its derivatives, ``(6, 3, qu, qv)``."""
-    w, wu, wv, wuu, wuv, wvv = _jets(Net(net.u, net.v, weights[..., None]), along)[:, 0]
-    fu, fv, fuu, fuv, fvv = frame / w
-    lu, lv = wu / w, wv / w
-    slope_u, slope_v = fu - 2 * fuu * lu - fuv * lv, fv - fuv * lu - 2 * fvv * lv
-    value = -(slope_u * lu + slope_v * lv) - (fuu * wuu + fuv * wuv + fvv * wvv) / w
-    return area / w**2, np.stack([value, slope_u, slope_v, fuu, fuv, fvv])
+def _weighted(net: Net, along: tuple[Sites, Sites]) -> Array:
+    """The weight of a net and its derivatives, ``(6, qv, qu)``."""
+    assert net.weights is not None
+    return _jets(Net(net.u, net.v, net.weights[..., None]), along)[:, 0]
 
 
 def _jets(net: Net, along: tuple[Sites, Sites], most: int = 2) -> Array:
-    """Points and derivatives ``(6, k, qu, qv)`` by ``ORDERS``, up to an order; in memory u is fastest, as integrals
-    want it."""
+    """Points and derivatives ``(6, k, qv, qu)`` by ``ORDERS``, up to an order."""
     shape = along[0].at.size, along[1].at.size
     found = jets(net, along[0].at, along[1].at, np.ones(shape, bool), np.zeros(net.poles.shape[2]), most)
-    return found.reshape(*found.shape[:2], *shape[::-1]).swapaxes(2, 3)
+    return np.ascontiguousarray(found).reshape(*found.shape[:2], *shape[::-1])
 
 
 def _weights(along: tuple[Sites, Sites]) -> Array:
-    """Weights of pairs of parameters, ``(qu, qv)``."""
-    return np.asarray((along[1].weight.reshape(-1, 1) * along[0].weight.ravel()).T)
-
-
-def _dot(a: Array, b: Array) -> Array:
-    return np.asarray(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
+    """Weights of pairs of parameters, ``(qv, qu)``."""
+    return np.asarray(along[1].weight.reshape(-1, 1) * along[0].weight.ravel())

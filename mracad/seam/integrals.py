@@ -8,7 +8,7 @@ products of all functions would take (p + 1)³ (q + 1)³.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -92,14 +92,16 @@ def _sites(knots: KnotVector, at: bytes, weight: bytes, shape: tuple[int, int]) 
 
 
 def integrals(
-    along: tuple[Sites, Sites], coefficients: Mapping[tuple[Order, Order], Array], form: Array | None = None
+    along: tuple[Sites, Sites], orders: Sequence[tuple[Order, Order]], coefficients: Array, form: Array | None = None
 ) -> Array:
     """The form of given coefficients.
 
     Parameters
     ----------
     along : pair of Sites
-    coefficients : mapping of pairs of orders to ndarray (points_u, points_v)
+    orders : sequence of pairs of orders
+        α and β.
+    coefficients : ndarray (pairs, points_v, points_u)
         c_αβ times the weights of the points, for one of (α, β) and (β, α).
     form : ndarray (nu, nv, 2p + 1, 2q + 1), optional
         A form of these functions, to which the result is added.
@@ -112,7 +114,7 @@ def integrals(
     u, v = along
     (su, gu), p, q = u.at.shape, u.knots.degree, v.knots.degree
     pairs: dict[Order, list[tuple[int, int, Array]]] = {}
-    for both, values in coefficients.items():
+    for both, values in zip(orders, coefficients, strict=True):
         low, high = sorted(both)
         pairs.setdefault((low[0], high[0]), []).append((low[1], high[1], values))
     form = nothing(u.knots, v.knots) if form is None else form
@@ -126,7 +128,7 @@ def integrals(
     for begin in range(0, su, rows):
         part = slice(begin, begin + rows)
         lines = slice(begin * gu, min(begin + rows, su) * gu)
-        groups = [[(k, m, c[lines]) for k, m, c in each] for each in pairs.values()]
+        groups = [[(k, m, c[:, lines]) for k, m, c in each] for each in pairs.values()]
         found = inner(v, groups, [i == j for i, j in pairs])
         along_v = found.reshape(stencil.shape[2], len(pairs), -1, gu).transpose(2, 1, 3, 0)
         count = len(along_v)
@@ -146,20 +148,20 @@ def nothing(u: KnotVector, v: KnotVector) -> Array:
 
 
 def inner(v: Sites, groups: Sequence[Sequence[tuple[int, int, Array]]], mirrored: Sequence[bool]) -> Array:
-    """``Σ ∫ c D^k N_b D^m N_b' dv`` on lines u = const, for groups of k, m and c ``(lines, points)``.
+    """``Σ ∫ c D^k N_b D^m N_b' dv`` on lines u = const, for groups of k, m and c ``(points, lines)``.
 
     Returns
     -------
     ndarray (nv, 2q + 1, groups, lines)
         With their mirror images where asked.
     """
-    (sv, gv), q, lines = v.at.shape, v.knots.degree, len(groups[0][0][2])
+    (sv, gv), q, lines = v.at.shape, v.knots.degree, groups[0][0][2].shape[1]
     cells = np.empty((sv, v.width, len(groups), lines))
     for number, (group, both) in enumerate(zip(groups, mirrored, strict=True)):
         table = v.products(tuple((k, m) for k, m, _ in group), both)
         values = np.empty((sv, len(group), gv, lines))
         for place, (_, _, c) in enumerate(group):
-            values[:, place] = c.T.reshape(sv, gv, lines)
+            values[:, place] = c.reshape(sv, gv, lines)
         np.matmul(table.swapaxes(1, 2), values.reshape(sv, -1, lines), out=cells[:, :, number])
     found = np.zeros((v.knots.count, 2 * q + 1, len(groups), lines))
     _added(found, v, slice(None), cells.reshape(sv, q + 1, q + 1, len(groups), lines))

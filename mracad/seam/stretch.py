@@ -14,7 +14,7 @@ w / 4 …; the first of these that hardly turns within w / 2π shows the shape a
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
 
@@ -22,12 +22,12 @@ import numpy as np
 
 from mracad.bspline.jets import jets
 from mracad.bspline.surface import Net
+from mracad.compiled import pointer
 from mracad.memo import kept
+from mracad.seam.points import CURVE, LOOK, curved, shaped
 from mracad.wavelet.project import at_scale
 
 Array = np.ndarray
-Form = tuple[Array, Array, Array]
-"""Components 11, 12 and 22 of a symmetric form at points."""
 
 THETA = 0.3
 """Largest turn of the normal within a length, radians."""
@@ -93,36 +93,40 @@ class Limit:
         """By how much lengths along u and v (mm) exceed 2 θ r in each span, r the smallest radius, where ℓ exceeds half
         of θ r; elsewhere 1."""
         us, vs = (((knots.breaks[:-1] + knots.breaks[1:]) / 2)[:, None] for knots in (net.u, net.v))
-        p, q, r = orthonormal(net, us, vs)
-        a, b, c = self.shape(us, vs, (p, q, r))
-        skew = q / p
+        frame = orthonormal(net, us, vs)
+        a, b, c = self.shape(us, vs, frame)
+        skew = frame[1] / frame[0]
         along_v = (c - 2 * skew * b + skew * skew * a) / (1 + skew * skew)
-        bent = np.abs(a).max(axis=1), np.abs(along_v).max(axis=0)
+        bent = np.abs(a).max(axis=0), np.abs(along_v).max(axis=1)
         one, other = (
             np.where(2 * self.length * each > THETA, np.maximum(size * each / (2 * THETA), 1.0), 1.0)
             for size, each in zip(lengths, bent, strict=True)
         )
         return one, other
 
-    def shape(self, u: Array, v: Array, frame: Form) -> Form:
-        """The shape operator in the frame (p, q, r: p ∂_u and q ∂_u + r ∂_v are orthonormal), ``(qu, qv)`` each."""
-        p, q, r = frame
-        found: Form | None = None
-        left = np.zeros(())
+    @property
+    def scale(self) -> float:
+        """ℓ / θ, mm."""
+        return self.length / THETA
+
+    def shape(self, u: Array, v: Array, frame: Array) -> Array:
+        """The shape operator, components 11, 12 and 22 ``(3, qv, qu)``, in the frame p, q and r ``(3, qv, qu)``: p ∂_u
+        and q ∂_u + r ∂_v are orthonormal."""
+        found, left = np.empty(frame.shape), np.ones(frame.shape[1:], bool)
+        count = np.empty(1, int)
         for length, net in self.looks:
-            a, b, c = _bent(net, (u.tobytes(), v.tobytes()), (u.shape, v.shape))
-            across = q * a + r * b
-            now = p * p * a, p * across, q * (across + r * b) + r * r * c
-            mean, half = _halves(now)
-            turns = (np.abs(mean) + half) * length > THETA
-            if found is not None:
-                turns &= left
-                for old, new in zip(found, now, strict=True):
-                    np.copyto(old, new, where=left)
-            found, left = found or now, turns
-            if not left.any():
+            most = THETA / max(length, 1e-300)
+            forms = _bent(net, (u.tobytes(), v.tobytes()), (u.shape, v.shape))
+            if LOOK.pays(left.size):
+                several = pointer(found), pointer(left), pointer(count)
+                LOOK(pointer(frame), pointer(forms), left.size, most, *several)
+            else:
+                *now, size = shaped(frame, forms)
+                np.copyto(found, now, where=left)
+                left &= size > most
+                count[0] = np.count_nonzero(left)
+            if not count[0]:
                 break
-        assert found is not None
         return found
 
 
@@ -158,77 +162,29 @@ class Stretch:
         """A length along u and along v, multiplied by those of the directions."""
         return self.lengths[0] * length, self.lengths[1] * length
 
-    def root(self, u: Array, v: Array, first: Form, frame: Form) -> Form:
-        """R at pairs of parameters, in the frame, ``(qu, qv)`` each.
-
-        Parameters
-        ----------
-        u, v : ndarray (pieces, points)
-            Parameters; each piece lies in one knot span.
-        first : tuple of ndarray (qu, qv)
-            The first fundamental form.
-        frame : tuple of ndarray (qu, qv)
-            p, q and r: p ∂_u and q ∂_u + r ∂_v are orthonormal.
-        """
-        e, f, g = first
-        along, across = self.lengths[:: 1 - 2 * self.lead]
-        cos = f / np.sqrt(e * g) if self.lead else np.ones_like(e)
-        square, both = cos * cos, cos * np.sqrt(1.0 - cos * cos)
-        root = across + (along - across) * square, (along - across) * both, along + (across - along) * square
-        if self.limit is None:
-            return root
-        bent = self.limit.shape(u, v, frame)
-        scale = self.limit.length / THETA
-        inverse = root if self.even else _power(root, lambda x: 1.0 / _fourth(x))
-        limit = _power(bent, lambda x: _fourth(scale * x))
-        a, b, c = (one + other for one, other in zip(inverse, limit, strict=True))
-        least = max(self.lengths) ** -4.0  # rounding must not make a large sum smaller than its first term
-        return _power((a, b, c), lambda x: 1.0 / np.sqrt(np.sqrt(np.maximum(x, least))))
-
 
 EVEN = Stretch()
 
 
-def orthonormal(net: Net, us: Array, vs: Array) -> Form:
-    """p, q and r at pairs of parameters, ``(qu, qv)`` each: p ∂_u and q ∂_u + r ∂_v are orthonormal on a surface."""
+def orthonormal(net: Net, us: Array, vs: Array) -> Array:
+    """p, q and r at pairs of parameters, ``(3, qv, qu)``: p ∂_u and q ∂_u + r ∂_v are orthonormal on a surface."""
     xu, xv = (net.tangents(us.ravel(), vs.ravel(), axis) for axis in (0, 1))
-    e, f, g = ((a * b).sum(axis=-1) for a, b in ((xu, xu), (xu, xv), (xv, xv)))
+    e, f, g = ((a * b).sum(axis=-1).T for a, b in ((xu, xu), (xu, xv), (xv, xv)))
     e = np.maximum(e, 1e-300)
     rest = np.sqrt(np.maximum(g - f * f / e, 1e-12 * g + 1e-300))
-    return 1 / np.sqrt(e), -f / e / rest, 1 / rest
+    return np.stack([1 / np.sqrt(e), -f / e / rest, 1 / rest])
 
 
 @kept(8)
-def _bent(net: Net, places: tuple[bytes, bytes], shapes: tuple[tuple[int, ...], tuple[int, ...]]) -> Form:
-    """The second fundamental form at pairs of parameters; kept, because it is needed in different metrics."""
+def _bent(net: Net, places: tuple[bytes, bytes], shapes: tuple[tuple[int, ...], tuple[int, ...]]) -> Array:
+    """The second fundamental form at pairs of parameters, ``(3, qv, qu)``; kept, because it is needed in different
+    metrics."""
     at_u, at_v = (np.frombuffer(at).reshape(shape) for at, shape in zip(places, shapes, strict=True))
-    every = jets(net, at_u, at_v, np.ones((at_u.size, at_v.size), bool), net.poles.mean(axis=(0, 1)), 2)
-    xu, xv, *second = every.reshape(6, 3, at_v.size, at_u.size)[1:]
-    normal = xu[1] * xv[2] - xu[2] * xv[1], xu[2] * xv[0] - xu[0] * xv[2], xu[0] * xv[1] - xu[1] * xv[0]
-    size = np.maximum(np.sqrt(_dot(normal, normal)), 1e-300)
-    a, b, c = ((_dot(normal, each) / size).T for each in second)
-    return a, b, c
-
-
-def _halves(form: Form) -> tuple[Array, Array]:
-    """Half the sum and half the difference of the eigenvalues of a form."""
-    a, b, c = form
-    return (a + c) / 2, np.hypot((a - c) / 2, b)
-
-
-def _dot(a: Sequence[Array] | Array, b: Sequence[Array] | Array) -> Array:
-    return np.asarray(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
-
-
-def _fourth(x: Array) -> Array:
-    return np.asarray((x * x) * (x * x))
-
-
-def _power(form: Form, of: Callable[[Array], Array]) -> Form:
-    """A symmetric form with a function applied to its eigenvalues."""
-    a, b, c = form
-    mean, half = _halves(form)
-    high, low = of(mean + half), of(mean - half)
-    middle = (high + low) / 2
-    slope = np.where(half > 0, (high - low) / np.maximum(2 * half, 1e-300), 0.0)
-    return middle + slope * (a - mean), slope * b, middle + slope * (c - mean)
+    every = np.ones((at_u.size, at_v.size), bool)
+    jet = np.ascontiguousarray(jets(net, at_u, at_v, every, net.poles.mean(axis=(0, 1)), 2))
+    found = np.empty((3, at_v.size, at_u.size))
+    if CURVE.pays(jet.shape[2]):
+        CURVE(pointer(jet), jet.shape[2], pointer(found))
+    else:
+        found.reshape(3, -1)[:] = curved(jet[1], jet[2], jet[3:])
+    return found

@@ -74,7 +74,7 @@ class Zoned:
         """The largest curvature at the points, 1/mm."""
         us, vs = self._parameters
         a, b, c = self.look.shape(us, vs, orthonormal(self.net, us, vs))
-        return np.asarray(np.abs(a + c) / 2 + np.sqrt(((a - c) / 2) ** 2 + b * b))
+        return np.asarray((np.abs(a + c) / 2 + np.sqrt(((a - c) / 2) ** 2 + b * b)).T)
 
     def _apart(self, zone: Disc | Box, points: Array) -> Array:
         """Distance of points ``(…, 3)`` from a ball or a box, the least over all instances of the surface, mm."""

@@ -3,13 +3,16 @@
 import numpy as np
 import pytest
 
+from mracad import memo
 from mracad.bspline.crease import crease_lines
 from mracad.bspline.fit import interpolated, through
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
+from mracad.compiled import Compiled
 from mracad.model.cells import quadrature
 from mracad.seam.energy import forms, slopes
 from mracad.seam.kinks import KINK_WEIGHT
+from mracad.seam.stretch import Limit, Stretch
 from tests.edit.models import rotation
 from tests.model.shapes import circle, cylinder, face, graph, plane, rectangle, sphere, torus
 
@@ -200,3 +203,16 @@ def test_pieces_of_one_span_add_up():
     assert found.mass.sum() == pytest.approx(4e-4, rel=1e-10)
     c = fitted(net, lambda x, y: x**2)
     assert c @ found.bending @ c == pytest.approx(4 * 4e-4, rel=1e-9)
+
+
+@pytest.mark.parametrize("net", [sphere(2.0), cylinder(2.0, 3.0), plane(8)])
+@pytest.mark.parametrize("lead", [0, 1])
+def test_compiled_code_and_arrays_give_the_same_bits(net, lead, monkeypatch):
+    rule, found = quadrature(net, [face(rectangle(0.1, 0.2, 0.6, 0.9))]), []
+    for used in (True, False):
+        monkeypatch.setattr(Compiled, "pays", lambda self, work, used=used: used)
+        memo.clear()
+        limit = Limit.of(net, (1.5, 1.5), (frozenset(), frozenset()))
+        form = forms(net, net, rule, ((), ()), Stretch((1.0, 0.3), lead, limit))
+        found.append(np.concatenate([form.mass.data, form.bending.data]))
+    np.testing.assert_array_equal(*found)

@@ -8,6 +8,7 @@ from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
 from mracad.model.cells import quadrature
 from mracad.seam.energy import forms
+from mracad.seam.points import limited
 from mracad.seam.stretch import THETA, Limit, Stretch, orthonormal
 from tests.model.shapes import face
 
@@ -78,8 +79,8 @@ def test_the_shape_is_seen_without_the_ripples_on_it(wavelength):
     height = 3 / RADIUS / (2 * np.pi * waves / 40) ** 2
     limit = Limit.of(tube(height, waves), (wavelength, wavelength), (frozenset(), frozenset()))
     u, v = np.linspace(0.3, 2.8, 40)[:, None], np.linspace(10.0, 30.0, 50)[:, None]
-    one = np.ones((40, 50))
-    around, both, along = limit.shape(u, v, (one / RADIUS, 0 * one, one))
+    one = np.ones((50, 40))
+    around, both, along = limit.shape(u, v, np.stack([one / RADIUS, 0 * one, one]))
     assert np.abs(np.abs(around) * RADIUS - 1).max() < 0.1
     assert np.abs(both).max() < 0.01 and np.abs(along).max() < 0.25 * 3 / RADIUS
 
@@ -89,8 +90,8 @@ def test_a_limit_never_makes_a_length_longer():
     radius = 1e-4
     net = surface(lambda u, v: (radius * np.cos(u + 0.3 * v), radius * np.sin(u + 0.3 * v), v))
     us, vs = np.full((1, 1), 0.4), np.full((1, 1), 0.5)
-    one = np.ones((1, 1))
-    root = Stretch(limit=Limit(10.0, ((1e-6, net),))).root(us, vs, (one, 0 * one, one), orthonormal(net, us, vs))
-    a, b, c = (float(each[0, 0]) for each in root)
+    limit, one = Limit(10.0, ((1e-6, net),)), np.ones((1, 1))
+    found = limited((one, 0 * one, one), limit.shape(us, vs, orthonormal(net, us, vs)), limit.scale, 1.0)
+    a, b, c = (float(each[0, 0]) for each in found)
     lengths = np.linalg.eigvalsh([[a, b], [b, c]])
     assert 0.0 < lengths[0] < 1e-3 and lengths[1] == pytest.approx(1.0, abs=1e-6)
