@@ -16,6 +16,7 @@ import numpy as np
 from mracad.bspline.boor import EVALUATE
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.tensor import COMBINE
+from mracad.inspect.spread import COMPARE
 from mracad.inspect.sweep import SWEEP
 from mracad.seam.points import CURVE, FRAME, LOOK, SQUARE
 from mracad.wavelet.ladder import rungs_by_level
@@ -31,7 +32,7 @@ def warm() -> None:
         found = find_spec(package)
         for folder in (found.submodule_search_locations or ()) if found else ():
             compile_dir(folder, quiet=2)
-    for code in (EVALUATE, COMBINE, FRAME, CURVE, LOOK, SQUARE, SWEEP):
+    for code in (EVALUATE, COMBINE, FRAME, CURVE, LOOK, SQUARE, COMPARE, SWEEP):
         code.prepare()
     rungs = rungs_by_level(KnotVector.clamped(np.arange(COUNT - 2.0), 3))[:3]
     reconstruct(decompose(np.zeros((COUNT, COUNT, 3)), rungs, rungs))

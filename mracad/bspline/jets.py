@@ -46,7 +46,8 @@ def jets(net: Net, u: Array, v: Array, mask: Array, centre: Array, most: int = 3
     ndarray (10, 3, q)
         By ``ORDERS`` up to the highest order, coordinate and point, v slowest.
     """
-    found = list(Sites.of(net.u, net.v, u, v, mask, most).blocks(net, centre))
+    sites = Sites.of(net.u, net.v, u, v, mask, most)
+    found = list(sites.blocks(sites.along(net, centre), net.weights is not None))
     return found[0] if len(found) == 1 else np.concatenate(found, axis=2)
 
 
@@ -98,10 +99,9 @@ class Sites:
         found = found.reshape(pieces * points, orders, *poles.shape[1:])
         return np.ascontiguousarray(found.transpose(1, 3, 2, 0))
 
-    def blocks(self, net: Net, centre: Array, most: int | None = None) -> Iterator[Array]:
-        """The results of :func:`jets`, up to an order, in blocks of points; products are added up in the order of
-        control points, as compiled code does."""
-        along = self.along(net, centre, most)
+    def blocks(self, along: Array, rational: bool) -> Iterator[Array]:
+        """The results of :func:`jets` from derivatives along u, in blocks of points; products are added up in the order
+        of control points, as compiled code does."""
         orders = [order for order in self.orders if sum(order) < len(along)]
         step = max(1, _BLOCK // max(self.mask.shape[1], 1))
         for begin in range(0, max(len(self.mask), 1), step):
@@ -117,18 +117,18 @@ class Sites:
                     curves = along[:, :, columns]
                     for one, (r, s) in zip(found, orders, strict=True):
                         one += self.in_v[s, part, k, None] * curves[r]
-            yield self.chosen(found, part, net)
+            yield self.chosen(found, part, rational)
 
     @cached_property
     def _pointers(self) -> tuple[int, int]:
         return pointer(self.columns), pointer(self.in_v)
 
-    def chosen(self, stack: Array, rows: slice, net: Net) -> Array:
+    def chosen(self, stack: Array, rows: slice, rational: bool) -> Array:
         """Derivatives at points, from those of homogeneous coordinates at all pairs of parameters of some rows."""
         stack, inside = stack.reshape(*stack.shape[:2], -1), self.mask[rows]
         if not inside.all():
             stack = stack[:, :, np.flatnonzero(inside)]
-        return stack if net.weights is None else _quotient(stack)
+        return _quotient(stack) if rational else stack
 
 
 def _local(kv: KnotVector, x: Array, most: int) -> tuple[Array, Array]:

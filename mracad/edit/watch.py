@@ -6,7 +6,7 @@ from bisect import bisect_left
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 
@@ -158,9 +158,15 @@ def amounts(
         return search.low.tolist(), search.best, search.why
     search.measure(np.maximum(floor, PART * ceiling))
     for _ in range(MEASURED - 2):
-        choices = (most * np.unique([*LEAST, *np.arange(1, steps) / steps]) for most in ceiling)
+        choices = (most * _choices(steps) for most in ceiling)
         search.measure(np.array([search.likely(i, each[each > floor[i]]) for i, each in enumerate(choices)]))
     return search.low.tolist(), search.best, search.why
+
+
+@cache
+def _choices(steps: int) -> Array:
+    """Shares of a ceiling from which an amount is chosen."""
+    return np.unique([*LEAST, *np.arange(1, steps) / steps])
 
 
 class _Search:

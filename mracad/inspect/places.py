@@ -10,10 +10,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
+from mracad.compiled import pointer
 from mracad.inspect.creases import Crossing
+from mracad.inspect.spread import COMPARE
 from mracad.inspect.tally import Tally
 from mracad.model.cells import Quadrature
 
@@ -139,19 +142,31 @@ class Places:
         opened : iterable of ndarray
             Growth of angles at the points where tangents may jump, radians.
         """
+        found = np.zeros((8, *self.area.shape))
+        if COMPARE.pays(self.area.size):
+            COMPARE(self.area.size, pointer(tally.sums), *self._pointers, pointer(found))
+        else:
+            self._compare(tally, found)
+        found[2], found[3], found[5] = (each.reshape(self.area.shape) for each in (tally.tops[0], turned, unsettled))
+        for at, each in zip(self.crossed, opened, strict=True):
+            np.fmax.at(found[4], at, each)
+        return Placed(found, self.area, self.ends)
+
+    def _compare(self, tally: Tally, found: Array) -> None:
+        """All that depends on sums, by arrays."""
         shape, counts = self.area.shape, self.area > 0
         means, beyond = _means(tally, shape)
         fell = self.before - means
-        found = np.zeros((8, *shape))
         for figure, (bending, variation) in zip(found, (beyond / self.around - 1, fell / self.most), strict=False):
             np.maximum(bending, variation, out=figure)
         found[:2, ~counts] = 0.0
-        found[2], found[3], found[5] = (each.reshape(shape) for each in (tally.tops[0], turned, unsettled))
-        for at, each in zip(self.crossed, opened, strict=True):
-            np.fmax.at(found[4], at, each)
         rise = np.maximum(-fell * self.area, 0.0, out=found[6:])
-        rise /= np.maximum(rise.mean(axis=(1, 2), keepdims=True), 1e-300)
-        return Placed(found, self.area, self.ends)
+        totals = np.cumsum(rise.reshape(2, -1), axis=1)[:, -1]  # one after another, as compiled code adds up
+        rise /= np.maximum(totals / self.area.size, 1e-300)[:, None, None]
+
+    @cached_property
+    def _pointers(self) -> tuple[int, ...]:
+        return tuple(map(pointer, (self.area, self.before, self.most, self.around)))
 
 
 def strips(rule: Quadrature, column: Array, speeds: Array, axis: int, side: float) -> tuple[Array, Array]:

@@ -56,6 +56,8 @@ class _Slope:
     ----------
     offset : ndarray (nu, nv, 3)
         The displacement, mm.
+    along : ndarray
+        What is added to derivatives along u.
     deviation, motion : float
         Largest motion along the normal, and in any direction, mm.
     tangents : list of Tangents
@@ -63,6 +65,7 @@ class _Slope:
     """
 
     offset: Array
+    along: Array
     deviation: float
     motion: float
     tangents: Sequence[Tangents]
@@ -71,14 +74,15 @@ class _Slope:
     def of(cls, survey: Survey, offset: Array) -> _Slope:
         net = survey.net.with_poles(offset)
         tangents = [each.crossing.tangents(net) for each in survey.crossed]
-        return cls(offset, *survey.sight.moved(net, survey.marks), tangents)
+        return cls(offset, *survey.sight.added(net, survey.marks), tangents)
 
 
 def _change(survey: Survey, slope: _Slope, amount: float) -> Change:
     """The change of a face after an amount of a displacement."""
     net = survey.net.with_poles(survey.net.poles + amount * slope.offset)
-    tally, places = survey.sight.tally(net, survey.marks) if amount else survey.tally, survey.places
-    turned, unsettled = _normals(survey, net, tally)
+    along, places = survey.along + amount * slope.along, survey.places
+    tally = survey.sight.tally(along, survey.marks) if amount else survey.tally
+    turned, unsettled = _normals(survey, along, tally)
     now = list(_angles(survey, slope, net, amount))
     opened = [angles - each.angles for each, angles in zip(survey.crossed, now, strict=True)]
     return Change(
@@ -94,11 +98,11 @@ def _change(survey: Survey, slope: _Slope, amount: float) -> Change:
     )
 
 
-def _normals(survey: Survey, net: Net, tally: Tally) -> tuple[Array, Array]:
+def _normals(survey: Survey, along: Array, tally: Tally) -> tuple[Array, Array]:
     """Turns of normals, radians, and changes of singular points: the largest of each place."""
     chords, unsettled = tally.tops[2], np.zeros(survey.marks.places)
-    if survey.singular or (tally.sums[6].sum() >= 0 and (chords > _STEEP).any()):
-        form = survey.sight.forms(net)
+    if survey.singular or (chords.max(initial=0.0) > _STEEP and tally.sums[6].sum() >= 0):
+        form = survey.sight.forms(along)
         place = survey.sight.pairs(*survey.marks.strips, np.add)
         np.maximum.at(unsettled, place, _unsettled(survey, form))
         chords = np.zeros(survey.marks.places)

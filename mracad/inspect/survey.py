@@ -51,6 +51,8 @@ class Survey:
     rule : Quadrature
     sight : Sight
         Its points.
+    along : ndarray
+        Derivatives along u of the curves of control points.
     marks : Marks
         What is known there: curvature counts where the surface is neither degenerate nor singular and knots lie apart.
     sharp : ndarray (q,)
@@ -67,6 +69,7 @@ class Survey:
     faces: tuple[Face, ...]
     rule: Quadrature
     sight: Sight
+    along: Array
     marks: Marks
     sharp: Array
     tally: Tally
@@ -118,7 +121,8 @@ def _survey(
 ) -> Survey:
     rule = quadrature(net, faces, points, FEWEST, ends=True)
     sight = Sight.of(net, rule)
-    form = sight.forms(net)
+    along = sight.along(net)
+    form = sight.forms(along)
     sides = form.speeds * _spans(rule, (net.u, net.v))
     least = max(CLUSTER[0], CLUSTER[1] * float(np.linalg.norm(np.ptp(net.poles, axis=(0, 1)))))
     regular = form.regular & (sides.min(axis=0) >= least)
@@ -133,9 +137,9 @@ def _survey(
         len(ends[0]) * len(ends[1]),
     )  # fmt: skip
     areas = sight.pairs(*sight.weights, np.multiply) * form.density * regular
-    tally, crossed = sight.tally(net, marks), _crossed(net, faces, rule)
+    tally, crossed = sight.tally(along, marks), _crossed(net, faces, rule)
     return Survey(
-        net, faces, rule, sight, marks, sharp, tally, crossed,
+        net, faces, rule, sight, along, marks, sharp, tally, crossed,
         roughness(tally, largest(each.angles for each in crossed)), _noise(areas, sides, rounding),
         Places.of(ends, tally, reach, [each.crossing for each in crossed]) if reach else None,
     )  # fmt: skip

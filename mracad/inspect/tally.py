@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from threading import local
 
 import numpy as np
 
@@ -117,31 +118,35 @@ class Sight:
         """A function of numbers along u and along v at the points, ``(q,)``."""
         return np.asarray(how(along_u, along_v[:, None])[self.sites.mask])
 
-    def forms(self, net: Net) -> Forms:
-        """The forms of a surface over the same knots."""
-        return Forms(self._figures(net, FORMS))
+    def along(self, net: Net) -> Array:
+        """Derivatives along u of the curves of control points of a surface over the same knots."""
+        return self.sites.along(net, self.centre)
+
+    def forms(self, along: Array) -> Forms:
+        """The forms of a surface, from its derivatives along u."""
+        return Forms(self._figures(along, FORMS))
 
     def bent(self, net: Net) -> Array:
         """Shape operator and gradient of the mean curvature of a surface over the same knots, ``(5, q)``."""
-        return self._figures(net, BENT)
+        return self._figures(self.along(net), BENT)
 
-    def _figures(self, net: Net, rows: slice) -> Array:
+    def _figures(self, along: Array, rows: slice) -> Array:
         if not SWEEP.pays(self.points):
-            return shapes(self.sites.blocks(net, self.centre), rows)
+            return shapes(self.sites.blocks(along, along.shape[1] > 3), rows)
         found = np.empty((rows.stop - rows.start, self.points))
-        self._sweep(self.sites.along(net, self.centre), None, (found, found), (rows, found))
+        self._sweep(along, None, (found, found), (rows, found))
         return found
 
-    def tally(self, net: Net, marks: Marks) -> Tally:
-        """The figures of the places of a surface over the same knots."""
-        found = Tally(np.zeros((SUMS, marks.places)), np.zeros((TOPS, marks.places)))
+    def tally(self, along: Array, marks: Marks) -> Tally:
+        """The figures of the places of a surface, from its derivatives along u."""
+        every = np.zeros((SUMS + TOPS, marks.places))
+        found = Tally(every[:SUMS], every[SUMS:])
         if SWEEP.pays(self.points):
-            both = found.sums, found.tops
-            self._sweep(self.sites.along(net, self.centre), marks, both, (slice(0, 0), found.sums))
+            self._sweep(along, marks, (found.sums, found.tops), (slice(0, 0), every))
             return found
         weights, places = self.pairs(*self.weights, np.multiply), self.pairs(*marks.strips, np.add)
         end = 0
-        for block in self.sites.blocks(net, self.centre):
+        for block in self.sites.blocks(along, along.shape[1] > 3):
             begin, end = end, end + block.shape[2]
             part = slice(begin, end)
             seen = weights[part], 1.0 * marks.counts[part], marks.rounding[part]
@@ -153,27 +158,29 @@ class Sight:
                 np.maximum.at(top, places[part], each.astype(float))
         return found
 
-    def moved(self, net: Net, marks: Marks) -> tuple[float, float]:
-        """The largest motion along normals, and in any direction, where a surface moves by the points of another."""
-        most = np.zeros(2)
+    def added(self, net: Net, marks: Marks) -> tuple[Array, float, float]:
+        """What a net of offsets adds to derivatives along u, and how far points of another surface move by it: the
+        largest motion along normals, and in any direction."""
+        along, most = self.sites.along(net, np.zeros(3)), np.zeros(2)
         if SWEEP.pays(self.points // len(ORDERS)):
-            self._sweep(self.sites.along(net, np.zeros(3), 0), marks, (most, most), (slice(0, 0), most))
+            self._sweep(along[:1], marks, (most, most), (slice(0, 0), most))
         else:
             end = 0
-            for (part,) in self.sites.blocks(net, np.zeros(3), 0):
+            for (part,) in self.sites.blocks(along[:1], net.weights is not None):
                 begin, end = end, end + part.shape[1]
-                along, square = np.abs(dot(part, marks.normals[:, begin:end])), dot(part, part)
-                most = np.maximum(most, [along.max(initial=0.0), square.max(initial=0.0)])
-        return float(most[0]), float(np.sqrt(most[1]))
+                normal, square = np.abs(dot(part, marks.normals[:, begin:end])), dot(part, part)
+                most = np.maximum(most, [normal.max(initial=0.0), square.max(initial=0.0)])
+        along[:, 3:] = 0.0  # weights stay
+        return along, float(most[0]), float(np.sqrt(most[1]))
 
     def _sweep(
         self, along: Array, marks: Marks | None, added: tuple[Array, Array], stored: tuple[slice, Array]
     ) -> None:
-        scratch, (sums, tops), (rows, found) = np.zeros(SCRATCH), added, stored
+        (sums, tops), (rows, found) = added, stored
         SWEEP(
             pointer(along), *along.shape, *self._pointers, len(self.runs),
             marks is not None, self.points, *(marks.pointers if marks else (0,) * 6),
-            sums.shape[-1], pointer(sums), pointer(tops), rows.start, rows.stop, pointer(found), pointer(scratch),
+            sums.shape[-1], pointer(sums), pointer(tops), rows.start, rows.stop, pointer(found), _OWN.pointer,
         )  # fmt: skip
 
     @cached_property
@@ -186,3 +193,14 @@ class Sight:
         columns, in_v = self.sites.columns.astype(np.int32), self.sites.in_v
         spare = -columns.shape[1] % 4
         return np.pad(columns, [(0, 0), (0, spare)]), np.pad(in_v, [(0, 0), (0, 0), (0, spare)])
+
+
+class _Own(local):
+    """The scratch memory of a thread."""
+
+    def __init__(self) -> None:
+        self.memory = np.zeros(SCRATCH)
+        self.pointer = pointer(self.memory)
+
+
+_OWN = _Own()

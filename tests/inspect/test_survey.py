@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
-from mracad.inspect import tally
+from mracad.compiled import Compiled
 from mracad.inspect.curvature import BENT, FORMS, Forms, shapes
 from mracad.inspect.ramp import STEEP
 from mracad.inspect.roughness import Change, Growth, Rougher, Roughness, worse
@@ -76,14 +76,14 @@ def test_many_points_have_the_same_figures_as_few(degree, rational, monkeypatch)
     before = Net(u, v, poles, random.uniform(0.5, 1.5, poles.shape[:2]) if rational else None)
     holed = face([*rectangle(1.0, 0.0, 9.0, 7.0), circle((4.5, 3.5), 1.7)])
     found = []
-    for most in (1 << 60, 0):
-        monkeypatch.setattr(tally, "FEW", most)
-        monkeypatch.setattr(tally, "MANY", most)
+    for used in (False, True):
+        monkeypatch.setattr(Compiled, "pays", lambda self, work, used=used: used)
         (seen,) = surveys([(before, [holed])], singular=3.0, reaches=[(2.0, 2.0)])
         now = moved(before, poles * [1.0, 1.0, 1.2])
-        told = seen.sight.tally(now, seen.marks)
-        motion = seen.sight.moved(now, seen.marks)
-        found.append([seen.marks.counts, seen.marks.normals, seen.sharp, told.sums, told.tops, motion])
+        told = seen.sight.tally(seen.sight.along(now), seen.marks)
+        added, *motion = seen.sight.added(now, seen.marks)
+        places = seen.places.compared(told, told.tops[2], told.tops[2], ()).figures
+        found.append([seen.marks.counts, seen.marks.normals, seen.sharp, told.sums, told.tops, added, motion, places])
     assert 0 < found[0][0].sum() < len(found[0][0]) and len(seen.sight.runs) > len(seen.rule.v.ravel())
     for one, other in zip(*found, strict=True):
         np.testing.assert_array_equal(one, other)
