@@ -70,13 +70,25 @@ def _tried(
     target = wish.target(trial.problem, members, joined)
     if wish.fades and trial.pose.share is not None:
         target = trial.pose.share * target
+    if trial.tolerances.whole and np.isfinite(trial.tolerances.growth.bending):
+        trial.watch = replace(trial.watch, targets=list(trial.problem.split(target).values()))
     wished = float(trial.gains(target, target).of(1.0).sum())
     found, left = _ways(trial, wish, target, trial.nothing(least * wished))
     moved = _best(trial, members, found, target)
     if left and not through(moved):
         _judge(trial, left, found)
         moved = _best(trial, members, found, target)
+    if trial.tolerances.whole:
+        moved = _limited(moved, found)
     return _explained(trial, moved, target)
+
+
+def _limited(moved: Mapping[int, Moved], found: Sequence[Verdict]) -> dict[int, Moved]:
+    """Results, with what the judge said against the displacements of surfaces that stay."""
+    every = zip(*(each.limits for each in found), strict=True)
+    said = (next(filter(None, limits), ()) for limits in every)
+    both = zip(moved.items(), said, strict=True)
+    return {i: each if each.amount else replace(each, limits=each.limits or limits) for (i, each), limits in both}
 
 
 def _best(trial: Trial, members: Mapping[int, Sheet], found: list[Verdict], target: Array) -> dict[int, Moved]:
@@ -151,14 +163,17 @@ def _confirmed(trial: Trial, members: Mapping[int, Sheet], found: Sequence[Verdi
     best: dict[int, Moved] = {}
     most, wanted = (-1.0, 0.0), float(trial.gains(target, target).of(1.0).sum())
     nets = {i: space.net for i, space in trial.problem.spaces.items()}
+    targets = trial.watch.targets
+    own = [[each] for each in targets] if targets else [[] for _ in nets]
+    both = list(zip(nets.items(), own, strict=True))
     lasting = trial.problem.free.size <= LASTING
-    looks = [closely(members[i], net) for i, net in nets.items()]
+    looks = [closely(members[i], net, targets) for (i, net), targets in both]
     for verdict in sorted(found, key=rank, reverse=True)[:CANDIDATES]:
         if rank(verdict) <= most:
             break
         verdict = trial.settled(verdict)
         moved = []
-        fresh = (closely(members[i], net) for i, net in nets.items())
+        fresh = (closely(members[i], net, targets) for (i, net), targets in both)
         for each in _moved(trial, members, verdict, looks if lasting else fresh):
             each = each.confirmed(trial.tolerances)
             moved.append(each if lasting else each.done())

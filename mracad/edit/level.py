@@ -28,7 +28,7 @@ from mracad.bspline.refine import refinement
 from mracad.bspline.surface import Net
 from mracad.edit.result import Edit
 from mracad.edit.target import Sheet, Wish, stiffness
-from mracad.edit.tolerances import COARSE, GROWTH
+from mracad.edit.tolerances import CALM, GROWTH
 from mracad.edit.whole import edited
 from mracad.inspect.roughness import Growth
 from mracad.model.brep import Face, Model
@@ -86,8 +86,8 @@ class Coarser(Wish):
 
     @property
     def growth(self) -> Growth:
-        """A coarse shape may be rougher anywhere, but must not fold."""
-        return GROWTH if self.fairs else COARSE
+        """What is held must not make a coarse shape rougher."""
+        return GROWTH if self.fairs else CALM
 
     def wavelength(self, net: Net, faces: Sequence[Face], creases: Creases) -> float:
         """The scale, or √2 spacings of the coarse knots, in the direction that gets coarser where they are closest."""
@@ -126,7 +126,10 @@ class Coarser(Wish):
         """The displacement nearest to the target, and smoother transitions from it to what is held."""
         yield [problem.nearest(target, stiff) for stiff in ((0.0, stiffness(width / 4)) if problem.rimmed else (0.0,))]
         if problem.rimmed:
-            yield problem.nearest(target, stiffness(width / 2)), problem.nearest(problem.fading(width) * target)
+            smooth = stiffness(width / 2)
+            yield problem.nearest(target, smooth), problem.nearest(target, stiffness(width))
+            yield [problem.nearest(problem.fading(share * width) * target, smooth) for share in (0.25, 0.5, 1.0)]
+            yield [problem.nearest(problem.fading(width) * target)]
 
     def _steps(self) -> list[tuple[float, int]]:
         """Weights and levels to blend."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -120,7 +120,7 @@ class Moved:
 
     def done(self) -> Moved:
         """The same change, without the measurements made for it."""
-        return replace(self, tried=Tried(closely(self.sheet, self.net), self.tried.nets, self.tried.parts))
+        return replace(self, tried=Tried(replace(self.tried.watch), self.tried.nets, self.tried.parts))
 
     def confirmed(self, tolerances: Tolerances) -> Moved:
         """The part of the change that is allowed when judged at more points; none if no face gains from that part."""
@@ -152,6 +152,6 @@ class Result:
         return Displacement(offsets, {s.edge: s.trace.face for s in self.joints.slides if s.trace.surface in offsets})
 
 
-def closely(sheet: Sheet, net: Net) -> Watch:
-    """A closer look at the faces of a surface, in the space of a displacement."""
-    return Watch([(net, sheet.base, sheet.faces)], sheet.wavelength, [sheet.reach], CLOSER)
+def closely(sheet: Sheet, net: Net, targets: Sequence[Array] = ()) -> Watch:
+    """A closer look at the faces of a surface, in the space of a displacement, of which a target may be wanted."""
+    return Watch([(net, sheet.base, sheet.faces)], sheet.wavelength, [sheet.reach], CLOSER, targets)

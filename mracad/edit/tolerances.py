@@ -30,6 +30,9 @@ COARSE = replace(RESHAPED, fold=135.0)
 """Growth that the judge allows if the coarse shape of faces is wanted: it must not fold, which turns normals over, but
 where it leaves a nose out they turn by a right angle and more."""
 
+CALM = replace(GROWTH, fold=135.0, singular=np.inf, each=False, spread=np.inf)
+"""The same if what is held must not make it rougher than the face or the coarse shape."""
+
 RESTORED = replace(RESHAPED, fold=np.inf)
 """Growth that the judge allows if what was there before comes back: any."""
 
@@ -57,6 +60,8 @@ class Tolerances:
         Largest deviation along the normal, mm.
     fairer : bool
         Whether faces must get fairer to be touched.
+    whole : bool
+        Whether a change is made in full or not at all.
     """
 
     gap: float = 1e-4
@@ -67,6 +72,7 @@ class Tolerances:
     growth: Growth = GROWTH
     deviation: float = np.inf
     fairer: bool = True
+    whole: bool = False
 
     __repr__ = line
 

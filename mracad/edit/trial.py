@@ -227,7 +227,7 @@ class Trial:
     def eased(self, verdict: Verdict, target: Array, others: Sequence[Verdict] = ()) -> Verdict:
         """The best verdict on a displacement that is scaled back at places that allow less of it."""
         found = [verdict]
-        while found[-1].least <= ENOUGH and len(found) <= EASINGS:
+        while found[-1].least <= ENOUGH and len(found) <= EASINGS and not self.tolerances.whole:
             if np.isinf(self._floor(found[-1].nearer, others)).all():
                 break
             share = self._shares(found[-1].tried)

@@ -5,15 +5,20 @@ from __future__ import annotations
 from bisect import bisect_left
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
+<<<<<<< HEAD
 from dataclasses import dataclass, field
 from functools import cache, cached_property
+=======
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+>>>>>>> 9604d87 (Let no held rim make a coarse shape rougher: judge levels against their target)
 
 import numpy as np
 
 from mracad.bspline.surface import Net
 from mracad.edit.tolerances import Tolerances
 from mracad.inspect.ramp import Ramp
-from mracad.inspect.roughness import Change, Worse, between, worse
+from mracad.inspect.roughness import Change, Roughness, Worse, between, worse
 from mracad.inspect.survey import POINTS, Survey, surveys
 from mracad.model.brep import Face
 
@@ -46,12 +51,15 @@ class Watch:
         Distances within which the edit spreads changes of each surface along u and v, mm.
     points : int
         Points per span.
+    targets : sequence of ndarray (nu, nv, 3), optional
+        For each surface the displacement that is wanted if nothing is held, mm: faces may become as rough as that.
     """
 
     surfaces: Sequence[tuple[Net, Net, Sequence[Face]]]
     width: float
     reaches: Sequence[tuple[float, float]]
     points: int = POINTS
+    targets: Sequence[Array] = ()
 
     @cached_property
     def owners(self) -> list[tuple[int, int]]:
@@ -71,6 +79,14 @@ class Watch:
     def at_rest(self) -> dict[int, Mapping[int, Change]]:
         """The changes of the faces of each surface after none of a displacement, with those of places, once known."""
         return {}
+
+    @cached_property
+    def goals(self) -> dict[int, Roughness]:
+        """The figures of faces after the wanted displacements, by face; none if these do not matter."""
+        if not len(self.targets):
+            return {}
+        reached = self.ramp(self.targets).changes(dict.fromkeys(range(len(self.owners)), 1.0))
+        return {self.owners[k][1]: change.after for k, change in reached.items()}
 
     def ramp(self, parts: Sequence[Array]) -> Ramp:
         """The faces along displacements of the surfaces."""
@@ -113,7 +129,7 @@ class Tried:
         found: dict[int, dict[int, Change]] = {i: {} for i in new}
         for k, change in self.ramp.changes({k: amounts[self.watch.owners[k][0]] for k in those}).items():
             place, face = self.watch.owners[k]
-            found[place][face] = change
+            found[place][face] = replace(change, goal=self.watch.goals.get(face))
         for i, faces in found.items():
             self._seen[i][amounts[i]] = faces
         return {i: self._seen[i][amount] for i, amount in amounts.items()}
@@ -154,7 +170,7 @@ def amounts(
     for i, most in enumerate(ceiling):
         search.recall(i, float(most))
     search.measure(ceiling)
-    if not steps:
+    if not steps or tolerances.whole:
         return search.low.tolist(), search.best, search.why
     search.measure(np.maximum(floor, PART * ceiling))
     for _ in range(MEASURED - 2):

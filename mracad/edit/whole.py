@@ -13,7 +13,7 @@ from mracad.edit.result import Edit, FaceOutcome, Reason, Status, untouched
 from mracad.edit.slid import cannot_slide, settled
 from mracad.edit.target import Wish
 from mracad.edit.tolerances import tolerances
-from mracad.inspect.roughness import Worse
+from mracad.inspect.roughness import Rougher, Worse
 from mracad.model.brep import Face, Model
 from mracad.seam.cause import Cause, Still
 from mracad.seam.natural import Treatment
@@ -67,7 +67,7 @@ def edited(
             movable,
             wish,
             replace(wishes, slide=wishes.slide - lost.keys()),
-            replace(allowed, growth=wish.growth, fairer=wish.fairs),
+            replace(allowed, growth=wish.growth, fairer=wish.fairs, whole=wish.whole),
             refine=options.refine == "auto",
             progress=progress,
         )
@@ -141,24 +141,24 @@ def _outcome(face: Face, result: Result, scope: Scope, options: Fitting, wish: W
             amount=moved.amount,
         )
         return edited.grown(known.points, moved.displacement())
-    status, reason, said = _left(moved, options, math.isfinite(wish.growth.curvature))
+    status, reason, said = _left(moved, options, wish.fairs)
     return replace(known, status=status, reason=reason, said=said)
 
 
-def _left(moved: Moved, options: Fitting, smooths: bool) -> tuple[Status, Reason, str]:
-    """Status, reason and details of a face that has detail and stays, for an edit that must not make it rougher or one
-    that may."""
+def _left(moved: Moved, options: Fitting, fairs: bool) -> tuple[Status, Reason, str]:
+    """Status, reason and details of a face that has detail and stays, for an edit that must make it fairer or one that
+    need not."""
     if options.amount == 0:
         return "unchanged", Reason.AMOUNT, ""
     if not moved.rough or not moved.wanted:
         return "unchanged", Reason.FAIR, ""
     if not moved.free:
         return "left", Reason.NO_FREE, ""
-    if not smooths:
-        return "left", Reason.FOLDED if moved.limits else Reason.STUCK, ""
+    if not fairs and any(limit.what is Rougher.FOLD for limit in moved.limits):
+        return "left", Reason.FOLDED, ""
     if moved.limits:
         return "left", Reason.ROUGHER, _figures(moved.limits)
-    return "left", Reason.RIM, ""
+    return "left", Reason.RIM if fairs else Reason.STUCK, ""
 
 
 def _figures(limits: Collection[Worse]) -> str:

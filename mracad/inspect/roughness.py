@@ -81,6 +81,8 @@ class Change:
         Largest relative change of the curvature at singular points that stay singular.
     placed : Placed, optional
         Changes of its places.
+    goal : Roughness, optional
+        The figures of what was asked for, which it may reach however smooth the face was.
     """
 
     before: Roughness
@@ -92,6 +94,11 @@ class Change:
     motion: float = 0.0
     unsettled: float = 0.0
     placed: Placed | None = None
+    goal: Roughness | None = None
+
+    def start(self, figure: str) -> float:
+        """A figure before, or of what was asked for if that is larger."""
+        return max(float(getattr(each, figure)) for each in (self.before, self.goal) if each)
 
     @property
     def spread(self) -> float:
@@ -164,9 +171,9 @@ def worse(change: Change, allowed: Growth) -> tuple[Worse, ...]:
         for what in SUMS
         if _grown(change, what, allowed)
     ]
-    if after.curvature > _most(before.curvature, allowed.curvature) + noise.curvature:
+    if after.curvature > _most(change.start("curvature"), allowed.curvature) + noise.curvature:
         found.append(Worse(Rougher.CURVATURE, before.curvature, after.curvature))
-    opened = change.opened if allowed.each else after.kink - before.kink
+    opened = change.opened if allowed.each else after.kink - change.start("kink")
     if opened > allowed.kink + noise.kink:
         found.append(Worse(Rougher.KINK, before.kink, after.kink))
     if change.turn > allowed.fold:
@@ -181,10 +188,8 @@ def worse(change: Change, allowed: Growth) -> tuple[Worse, ...]:
 def _grown(change: Change, what: Rougher, allowed: Growth) -> bool:
     """Whether total bending or curvature variation grew by more than allowed."""
     name = what.name.lower()
-    old, new, ripple, share = (
-        float(getattr(each, name)) for each in (change.before, change.after, change.noise, allowed)
-    )
-    return new > max(_most(old, share), ripple)
+    new, ripple, share = (float(getattr(each, name)) for each in (change.after, change.noise, allowed))
+    return new > max(_most(change.start(name), share), ripple)
 
 
 def _most(old: float, share: float) -> float:
@@ -196,7 +201,7 @@ def places(change: Change, allowed: Growth) -> Array:
     """Mask ``(nu, nv)`` of the places of a face that got worse than allowed, or that made the whole face worse."""
     found = change.placed
     assert found is not None
-    most = _most(change.before.curvature, allowed.curvature) + change.noise.curvature
+    most = _most(change.start("curvature"), allowed.curvature) + change.noise.curvature
     opened = np.radians(allowed.kink + change.noise.kink) if allowed.each else np.inf
     steep = (found.turn > np.radians(allowed.fold)) | (found.opened > opened)
     rough = (found.spread > allowed.spread) | (found.curvature > most)
@@ -233,7 +238,7 @@ def between(known: Mapping[float, Change], amount: float) -> Change:
     sums = (mixed(each) for each in zip(*map(_AFTER, after), strict=True))
     return Change(
         first.before, Roughness(first.after.area, *sums), first.noise,
-        mixed(opened), mixed(turn), mixed(deviation), mixed(motion), mixed(unsettled), placed,
+        mixed(opened), mixed(turn), mixed(deviation), mixed(motion), mixed(unsettled), placed, first.goal,
     )  # fmt: skip
 
 

@@ -8,6 +8,7 @@ from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
 from mracad.edit.fair import faired
 from mracad.edit.level import Coarser, level
+from mracad.edit.result import Reason
 from mracad.edit.target import sheets
 from mracad.edit.tolerances import Tolerances
 from mracad.inspect.seams import seams
@@ -26,6 +27,8 @@ from tests.edit.test_fair import beside, rough
 from tests.edit.test_seams import other_degrees, other_knots, other_senses, skewed
 
 SPANS, NOISE = 16, 0.3
+
+EVERY_EDGE = tuple(f"edge#{i}" for i in range(1, 5))
 
 
 def rung(net, level):
@@ -123,6 +126,19 @@ def test_held_rims_make_it_the_nearest_surface_that_keeps_them():
     dense[free] = np.linalg.solve(mass[np.ix_(free, free)], (mass @ target)[free])
     assert np.abs(dense).max() > 0.05
     np.testing.assert_allclose(moved.offset.reshape(-1, 3), dense, atol=1e-6)
+
+
+@pytest.mark.parametrize("options", [{"level": 2}, {"scale": "60mm"}])
+def test_rims_that_stay_make_no_face_rougher_than_it_was_or_its_coarse_shape_is(options):
+    """That is off at the rims, and a short step back to them would be rough: of all ways one is taken that is not."""
+    knots = KnotVector.clamped(np.linspace(0.0, 60.0, 13), 3)
+    x, y = np.meshgrid(knots.greville(), knots.greville(), indexing="ij")
+    model = sheet(Net(knots, knots, np.stack([x, y, 4 * np.sin(x / 9) * np.cos(y / 11)], axis=-1)))
+    free, held = (level(model, Level(**options, hold=hold)).outcomes[0] for hold in ((), EVERY_EDGE))
+    (before, coarse), (_, after) = free.roughness, held.roughness
+    assert free.moved > 0.1 and (held.status == "edited" or held.reason is Reason.ROUGHER)
+    for figure in ("bending", "variation", "curvature"):
+        assert getattr(after, figure) <= 1.005 * max(getattr(each, figure) for each in (before, coarse))
 
 
 def figures(shape, keep, change=lambda patches: patches):

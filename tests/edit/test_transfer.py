@@ -14,7 +14,6 @@ from mracad.edit.details import Details
 from mracad.edit.level import level
 from mracad.edit.mra import save
 from mracad.edit.result import Reason
-from mracad.edit.tolerances import COARSE, GROWTH
 from mracad.edit.transfer import transfer
 from mracad.edit.whole import _left
 from mracad.errors import Code, EditError, FileError, UsageError
@@ -281,11 +280,16 @@ def test_files_that_hold_no_details(two, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("growth", "limits", "reason"),
-    [(COARSE, (), "STUCK"), (COARSE, (Worse(Rougher.FOLD, 0.0, 170.0),), "FOLDED"), (GROWTH, (), "RIM")],
+    ("fairs", "limits", "reason"),
+    [
+        (False, (), "STUCK"),
+        (False, (Worse(Rougher.FOLD, 0.0, 170.0),), "FOLDED"),
+        (False, (Worse(Rougher.VARIATION, 0.1, 0.2),), "ROUGHER"),
+        (True, (), "RIM"),
+    ],
 )
-def test_why_a_face_stays_depends_on_what_is_asked(growth, limits, reason):
+def test_why_a_face_stays_depends_on_what_is_asked(fairs, limits, reason):
     """An edit that need not make faces fairer does not say that one cannot get fairer."""
     moved = SimpleNamespace(rough=True, wanted=1.0, free=3, limits=limits)
     options = Transfer(source="x.step", map=("place",), band=":9mm")
-    assert _left(moved, options, np.isfinite(growth.curvature))[:2] == ("left", Reason[reason])
+    assert _left(moved, options, fairs)[:2] == ("left", Reason[reason])
