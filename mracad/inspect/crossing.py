@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from itertools import pairwise, product
-
 import numpy as np
 
 from mracad.bspline.vectors import cross
 
 Array = np.ndarray
-_BLOCK = 200_000  # pairs of triangles tested at once
 _ROUNDING = 1e-11  # of a volume; beyond, its sign is certain, and so is that of every test that follows
 
 
@@ -25,10 +21,14 @@ def unpaired(sides: Array) -> Array:
     return np.column_stack([there[bad], back[bad]])
 
 
-def crossings(points: Array, corners: Array, parts: Array) -> tuple[Array, Array]:
-    """Pairs of triangles of one part that cross, and a point of each crossing.
+def crossings(spots: Array, pairs: Array) -> tuple[Array, Array]:
+    """Those of some pairs ``(k, 2)`` of triangles that cross, and a point of each crossing; not those that only touch.
 
-    Triangles that share a corner, and triangles that only touch, are left out.
+    Parameters
+    ----------
+    spots : ndarray (m, 3, 3)
+        The corners of all triangles.
+    pairs : ndarray of int (k, 2)
 
     Returns
     -------
@@ -36,21 +36,15 @@ def crossings(points: Array, corners: Array, parts: Array) -> tuple[Array, Array
     where : ndarray (k, 3)
     """
     found, where = [np.empty((0, 2), int)], [np.empty((0, 3))]
-    spots, corners = points[corners], np.asfortranarray(corners)
     planes = _Planes(spots)
-    for pairs in _near(spots, parts):
-        shared = np.zeros(len(pairs), bool)
-        for one, other in product(corners.T, repeat=2):
-            shared |= one[pairs[:, 0]] == other[pairs[:, 1]]
-        pairs = pairs[~shared]
-        for one, other in ((0, 1), (1, 0)):
-            across = pairs[planes.across(spots, pairs[:, one], pairs[:, other])]
-            for side in range(3):
-                start, end = spots[across[:, one], side], spots[across[:, one], (side + 1) % 3]
-                share = _pierced(start, end, spots[across[:, other]])
-                hit = ~np.isnan(share)
-                found.append(across[hit])
-                where.append(start[hit] + share[hit, None] * (end - start)[hit])
+    for one, other in ((0, 1), (1, 0)):
+        across = pairs[planes.across(spots, pairs[:, one], pairs[:, other])]
+        for side in range(3):
+            start, end = spots[across[:, one], side], spots[across[:, one], (side + 1) % 3]
+            share = _pierced(start, end, spots[across[:, other]])
+            hit = ~np.isnan(share)
+            found.append(across[hit])
+            where.append(start[hit] + share[hit, None] * (end - start)[hit])
     pairs, first = np.unique(np.concatenate(found), axis=0, return_index=True)
     return pairs, np.concatenate(where)[first]
 
@@ -86,45 +80,41 @@ def _pierced(start: Array, end: Array, triangle: Array) -> Array:
         return np.where(inside & (t > 1e-6) & (t < 1 - 1e-6), t, np.nan)
 
 
-def _near(spots: Array, parts: Array) -> Iterable[Array]:
-    """Pairs of triangles of one part whose boxes meet, in blocks, found by a grid of cells."""
-    low, high = (np.asfortranarray(found(axis=1)) for found in (spots.min, spots.max))
-    if not len(spots):
-        return
-    cell = max(float(np.median((high - low).max(axis=1))), 1e-12)
-    origin = low.min(axis=0)
-    while True:
-        first, last = ((x - origin) // cell for x in (low, high))
-        cells = (last - first + 1).prod(axis=1)
-        if cells.sum() <= 20 * len(spots) + 1000:
-            break
-        cell *= 1.5
-    first, span, cells = first.astype(int), (last - first + 1).astype(int), cells.astype(int)
-    which = np.repeat(np.arange(len(spots)), cells)
-    step = np.arange(cells.sum()) - np.repeat(np.cumsum(cells) - cells, cells)
-    i, rest = np.divmod(step, (span[:, 1] * span[:, 2])[which])
-    j, k = np.divmod(rest, span[which, 2])
-    grid = (first + span).max(axis=0)
+def near(low: Array, high: Array) -> Array:
+    """Pairs ``(k, 2)`` of boxes, with lowest and highest corners ``(m, d)``, that meet.
 
-    def numbered(at: Array, part: Array) -> Array:
-        """One number for each cell of a part."""
-        return np.asarray(((part * grid[0] + at[..., 0]) * grid[1] + at[..., 1]) * grid[2] + at[..., 2])
+    Boxes are taken along a curve that fills space, and each two of them, four, eight … have one around all.
+    """
+    if len(low) < 2:
+        return np.empty((0, 2), int)
+    order = np.argsort(_along_curve((low + high) / 2), kind="stable")
+    levels = [(low[order], high[order])]
+    while len(levels[-1][0]) > 1:
+        least, most = levels[-1]
+        starts = np.arange(0, len(least), 2)
+        levels.append((np.minimum.reduceat(least, starts), np.maximum.reduceat(most, starts)))
+    a = b = np.zeros(1, int)
+    for least, most in reversed(levels[:-1]):
+        one, other = (np.asfortranarray(each).T for each in (least, most))
+        a, b = (
+            np.concatenate([2 * a, 2 * a + 1, 2 * a, 2 * a + 1]),
+            np.concatenate([2 * b, 2 * b + 1, 2 * b + 1, 2 * b]),
+        )
+        once = (a <= b) & (b < len(least))
+        a, b = a[once], b[once]
+        for begin, end in zip(one, other, strict=True):
+            meet = (begin[a] <= end[b]) & (begin[b] <= end[a])
+            a, b = a[meet], b[meet]
+    return np.sort(order[np.column_stack([a, b])[a != b]], axis=1)
 
-    place = numbered(first[which] + np.stack([i, j, k], axis=1), parts[which].astype(np.int64))
-    order = np.argsort(place, kind="stable")
-    place, which = place[order], which[order]
-    breaks = np.flatnonzero(np.diff(place)) + 1
-    starts, ends = np.concatenate([[0], breaks]), np.concatenate([breaks, [len(which)]])
-    position = np.arange(len(which))
-    partners = np.repeat(ends, ends - starts) - position - 1  # members of the cell after this one
-    limits = np.searchsorted(np.cumsum(partners), np.arange(0, partners.sum(), _BLOCK))
-    for begin, end in pairwise([*limits.tolist(), len(which)]):
-        count = partners[begin:end]
-        a = np.repeat(position[begin:end], count)
-        b = a + 1 + np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
-        cells, a, b = place[a], which[a], which[b]
-        for least, most in zip(low.T, high.T, strict=True):
-            meet = (least[a] <= most[b]) & (least[b] <= most[a])
-            cells, a, b = cells[meet], a[meet], b[meet]
-        once = cells == numbered(np.maximum(first[a], first[b]), parts[a].astype(np.int64))  # of several shared cells
-        yield np.column_stack([np.minimum(a, b), np.maximum(a, b)])[once]
+
+def _along_curve(points: Array) -> Array:
+    """The place of points along a curve that fills space (Morton's)."""
+    span = np.maximum(np.ptp(points, axis=0), 1e-300)
+    bits = 60 // points.shape[1]
+    cells = ((points - points.min(axis=0)) / span * (2**bits - 1)).astype(np.int64)
+    place = np.zeros(len(points), np.int64)
+    for bit in range(bits):
+        for axis, cell in enumerate(cells.T):
+            place |= (cell >> bit & 1) << (bit * points.shape[1] + axis)
+    return place

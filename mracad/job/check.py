@@ -14,8 +14,8 @@ import numpy as np
 from mracad.errors import CrashError, FileError
 from mracad.formats import by_content
 from mracad.inspect import check as layers
+from mracad.inspect.approach import crossing_faces
 from mracad.inspect.check import SeamLimits
-from mracad.inspect.crossing import crossings
 from mracad.inspect.seams import seams
 from mracad.inspect.verdict import Finding, Layer, Verdict
 from mracad.job import guard
@@ -105,6 +105,7 @@ def _smooth(report: object) -> tuple[int, bool] | None:
 
 
 _DECISIVE = ("load", "brep", "shells")  # what makes a model invalid
+_CHORD = 2e-4  # of the diagonal: distance of meshes from surfaces
 _BEYOND = {"gap", "angle", "smooth-seams", "edge-tolerance", "vertex-tolerance", "thin-wall"}  # against given limits
 
 
@@ -141,7 +142,7 @@ def _layered(
     from mracad.occ.check import check as kernel_check
     from mracad.occ.check import looks
     from mracad.occ.stated import stated, unloaded
-    from mracad.occ.triangles import triangles
+    from mracad.occ.triangles import facets
 
     name = document.name
     is_step = text is not None and by_content(text, name).name == "step"
@@ -157,7 +158,8 @@ def _layered(
     validity = limited("brep", lambda: kernel_check(document), allowed, returns=Validity)
     brep = validity if isinstance(validity, Layer) else layers.brep(validity, inward)
     validity = kernel_check(document, faces=()) if isinstance(validity, Layer) else validity
-    mesh = cache(partial(triangles, document))
+    chord = _CHORD * model.diagonal
+    mesh = cache(partial(facets, document, chord))
     open_faces = {edge.sides[0].face for edge in model.edges if edge.free}
     found = [
         _file(file, document) if file else Layer("file", "skipped", why),
@@ -167,7 +169,7 @@ def _layered(
         brep,
         layers.shells(model, validity, known | layers.turned(looks(document))),
         layers.seams(model, measures, allowed.seams),
-        limited("self-intersection", lambda: _crossed(document, mesh, measures, model.diagonal), allowed, slow),
+        limited("self-intersection", lambda: _crossed(document, model, mesh, measures), allowed, slow),
         layers.tolerances(model, validity, allowed.tolerance),
         limited("walls", lambda: _walls(document, allowed.wall), allowed),
         limited("mesh", lambda: layers.mesh(mesh(), open_faces), allowed, slow),
@@ -256,25 +258,17 @@ def _load(faces: int, stated: int, unseen: str, unloaded: Callable[[], list[str]
     return Layer("load", "fail" if lost else "pass", text, lost, {"faces": faces, "stated": stated})
 
 
-def _crossed(
-    document: Document, meshed: Callable[[], Triangles], measures: list[SeamMeasure], diagonal: float
-) -> Layer:
+def _crossed(document: Document, model: Model, meshed: Callable[[], Triangles], measures: list[SeamMeasure]) -> Layer:
     """Faces that cross, on a mesh and again on a finer one: crossings on the coarser one alone are its own error."""
-    from mracad.occ.triangles import some_triangles
+    from mracad.occ.triangles import facets
 
-    touching = {frozenset(m.faces) for m in measures if not m.sewn}
-
-    def crossing(mesh: Triangles) -> dict[tuple[int, int], tuple[float, float, float]]:
-        pairs, places = crossings(mesh.points, mesh.corners, mesh.parts)
-        found: dict[tuple[int, int], tuple[float, float, float]] = {}
-        for (a, b), (x, y, z) in zip(np.sort(mesh.faces[pairs], axis=1).tolist(), places.tolist(), strict=True):
-            if frozenset((a, b)) not in touching:
-                found.setdefault((a, b), (x, y, z))
-        return found
-
-    first = crossing(meshed())
+    touching = {tuple(sorted(m.faces)) for m in measures if not m.sewn}
+    chord = _CHORD * model.diagonal
+    first = crossing_faces(meshed(), model, chord)
+    first = {faces: where for faces, where in first.items() if faces not in touching}
     if first:
-        again = crossing(some_triangles(document, {face for pair in first for face in pair}, 1e-4 * diagonal))
+        fine = facets(document, chord / 2, {face for pair in first for face in pair})
+        again = crossing_faces(fine, model, chord / 2)
         first = {faces: where for faces, where in first.items() if faces in again}
     findings = [Finding("crossing", faces, where=where) for faces, where in sorted(first.items())]
     text = f"{len(findings)} crossings" if findings else "none found"

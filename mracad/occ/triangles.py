@@ -2,12 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Container, Sequence
+from collections.abc import Container, Iterable, Mapping
 
 import numpy as np
 from OCP.BRep import BRep_Tool
 from OCP.BRepMesh import BRepMesh_IncrementalMesh
 from OCP.BRepTools import BRepTools
+from OCP.Geom import (
+    Geom_BezierSurface,
+    Geom_BSplineSurface,
+    Geom_ConicalSurface,
+    Geom_CylindricalSurface,
+    Geom_Plane,
+    Geom_SphericalSurface,
+    Geom_ToroidalSurface,
+)
 from OCP.IMeshTools import IMeshTools_MeshAlgoType, IMeshTools_Parameters
 from OCP.TopAbs import TopAbs_REVERSED
 from OCP.TopLoc import TopLoc_Location
@@ -30,6 +39,15 @@ _ALGORITHMS = (
     IMeshTools_MeshAlgoType.IMeshTools_MeshAlgoType_Watson,
     IMeshTools_MeshAlgoType.IMeshTools_MeshAlgoType_Delabella,
 )
+_LAID = (
+    Geom_Plane,
+    Geom_CylindricalSurface,
+    Geom_ConicalSurface,
+    Geom_SphericalSurface,
+    Geom_ToroidalSurface,
+    Geom_BSplineSurface,
+    Geom_BezierSurface,
+)  # on which it lays a grid
 _MANY = 5_000  # knot cells of a surface, beyond which the first is slow: it takes the square of their number
 _WELD = 2e-7  # of a part's diagonal: about the resolution of 32-bit numbers
 
@@ -61,7 +79,7 @@ def triangles(document: Document, chord: float | None = None, angle: float | Non
     best: Triangles | None = None
     fewest = 0
     for algorithm in _ALGORITHMS[:: -1 if _cells(document) > _MANY else 1]:
-        found = _meshed(document, range(len(document.faces)), chord or _CHORD * size, angle or _ANGLE, algorithm)
+        found = _meshed(document, chord or _CHORD * size, angle or _ANGLE, algorithm)
         folds = _repeated(found, found.sides)
         if best is None or folds < fewest:
             best, fewest = found, folds
@@ -71,31 +89,63 @@ def triangles(document: Document, chord: float | None = None, angle: float | Non
     return best
 
 
-def some_triangles(document: Document, faces: Collection[int], chord: float) -> Triangles:
-    """Mesh some faces, each well: the whole may be folded over itself where they meet.
+def facets(document: Document, chord: float, faces: Iterable[int] | None = None) -> Triangles:
+    """Few triangles, which follow edges, and surfaces other than NURBS, within the chord.
 
     Parameters
     ----------
     document : Document
-    faces : collection of int
     chord : float
-        As for :func:`triangles`.
+        mm.
+    faces : iterable of int, optional
+        By default all.
     """
-    return _meshed(document, sorted(faces), chord, _ANGLE, _ALGORITHMS[-1])
+    chosen = range(len(document.faces)) if faces is None else sorted(set(faces))
+    shapes = {i: document.faces[i] for i in chosen}
+    laid = (isinstance(basis(BRep_Tool.Surface_s(face, TopLoc_Location())), _LAID) for face in shapes.values())
+    swept = [face for face, is_laid in zip(shapes.values(), laid, strict=True) if not is_laid]
+    best: dict[int, tuple[Array, Array, Array]] = {}
+    bad = 0
+    with quiet():
+        whole = compound(shapes.values())
+        for algorithm in reversed(_ALGORITHMS):  # the second is faster, but fails on extrusions
+            BRepTools.Clean_s(whole)
+            if swept:
+                BRepMesh_IncrementalMesh(compound(swept), _settings(chord, _ANGLE, _ALGORITHMS[0], follow=True))
+            BRepMesh_IncrementalMesh(whole, _settings(chord, _ANGLE, algorithm, follow=False))
+            found = polygons(shapes)
+            BRepTools.Clean_s(whole)
+            lacking = len(shapes) - len(found) + sum(map(_folds, found.values()))
+            if not best or lacking < bad:
+                best, bad = found, lacking
+            if not bad:
+                break
+    return _collected(document, chosen, best)
 
 
-def _meshed(document: Document, faces: Sequence[int], chord: float, angle: float, algorithm: object) -> Triangles:
-    """A mesh of some faces by one of the kernel's algorithms."""
+def _folds(mesh: tuple[Array, Array, Array]) -> int:
+    """Number of sides of the triangles of a face that have occurred before in the same direction."""
+    points, _, corners = mesh
+    return _again(corners[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), len(points))
+
+
+def _meshed(document: Document, chord: float, angle: float, algorithm: object) -> Triangles:
+    """A mesh by one of the kernel's algorithms."""
+    with quiet():
+        whole = compound(part.shape for part in document.parts)
+        BRepTools.Clean_s(whole)
+        BRepMesh_IncrementalMesh(whole, _settings(chord, angle, algorithm, follow=True))
+        found = polygons(dict(enumerate(document.faces)))
+        BRepTools.Clean_s(whole)
+    return _collected(document, range(len(document.faces)), found)
+
+
+def _settings(chord: float, angle: float, algorithm: object, follow: bool) -> IMeshTools_Parameters:
+    """Settings of the kernel, which may ``follow`` curved surfaces between edges that it does not lay a grid on."""
     settings = IMeshTools_Parameters()
     settings.Deflection, settings.Angle, settings.MeshAlgo = chord, float(np.radians(angle)), algorithm
-    every = len(faces) == len(document.faces)
-    with quiet():
-        whole = compound(part.shape for part in document.parts) if every else compound(document.faces[i] for i in faces)
-        BRepTools.Clean_s(whole)
-        BRepMesh_IncrementalMesh(whole, settings)
-        found = _collected(document, frozenset(faces))
-        BRepTools.Clean_s(whole)
-    return found
+    settings.ControlSurfaceDeflection = follow
+    return settings
 
 
 def _cells(document: Document) -> int:
@@ -107,7 +157,12 @@ def _cells(document: Document) -> int:
 def _repeated(mesh: Triangles, sides: Array) -> int:
     """Number of sides that have occurred before in the same direction: the kernel's default sometimes folds a mesh
     over itself."""
-    keys = np.sort(sides @ [len(mesh.points), 1])
+    return _again(sides, len(mesh.points))
+
+
+def _again(sides: Array, points: int) -> int:
+    """Number of sides that have occurred before in the same direction, among some points."""
+    keys = np.sort(sides @ [points, 1])
     return int((keys[1:] == keys[:-1]).sum())
 
 
@@ -118,9 +173,10 @@ def _rims(mesh: Triangles) -> Array:
     return np.asarray(mesh.sides[counts[place] == 1])
 
 
-def _collected(document: Document, chosen: Container[int]) -> Triangles:
-    """The triangles that the kernel keeps with the chosen faces."""
-    meshes = polygons({i: face for i, face in enumerate(document.faces) if i in chosen})
+def _collected(
+    document: Document, chosen: Container[int], meshes: Mapping[int, tuple[Array, Array, Array]]
+) -> Triangles:
+    """The triangles of the chosen faces, given their :func:`mracad.occ.polygons.polygons`."""
     points: list[Array] = []
     uv: list[Array] = []
     corners: list[Array] = []
