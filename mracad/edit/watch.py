@@ -5,13 +5,8 @@ from __future__ import annotations
 from bisect import bisect_left
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
-<<<<<<< HEAD
-from dataclasses import dataclass, field
-from functools import cache, cached_property
-=======
 from dataclasses import dataclass, field, replace
-from functools import cached_property
->>>>>>> 9604d87 (Let no held rim make a coarse shape rougher: judge levels against their target)
+from functools import cache, cached_property
 
 import numpy as np
 
