@@ -19,6 +19,7 @@ from mracad.bspline.tensor import COMBINE
 from mracad.inspect.spread import COMPARE
 from mracad.inspect.sweep import SWEEP
 from mracad.seam.points import CURVE, FRAME, LOOK, SQUARE
+from mracad.seam.stencil import MIRROR, PLACE
 from mracad.wavelet.ladder import rungs_by_level
 from mracad.wavelet.transform import decompose, reconstruct
 
@@ -32,7 +33,7 @@ def warm() -> None:
         found = find_spec(package)
         for folder in (found.submodule_search_locations or ()) if found else ():
             compile_dir(folder, quiet=2)
-    for code in (EVALUATE, COMBINE, FRAME, CURVE, LOOK, SQUARE, COMPARE, SWEEP):
+    for code in (EVALUATE, COMBINE, FRAME, CURVE, LOOK, SQUARE, PLACE, MIRROR, COMPARE, SWEEP):
         code.prepare()
     rungs = rungs_by_level(KnotVector.clamped(np.arange(COUNT - 2.0), 3))[:3]
     reconstruct(decompose(np.zeros((COUNT, COUNT, 3)), rungs, rungs))

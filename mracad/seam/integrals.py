@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -18,7 +17,9 @@ import numpy as np
 from mracad.bspline.basis import jet
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
+from mracad.compiled import pointer
 from mracad.memo import kept
+from mracad.seam.stencil import MIRROR, PLACE
 
 Array = np.ndarray
 
@@ -50,26 +51,17 @@ class Sites:
     table: Array
     _products: dict[tuple[Any, ...], Array] = field(default_factory=dict)
 
-    @cached_property
-    def fresh(self) -> Array:
-        """Whether each piece lies in another span than the one before, ``(s,)``."""
-        return np.asarray(np.diff(self.first, prepend=self.first[0] - 1) != 0)
-
-    @cached_property
-    def straight(self) -> bool:
-        """Whether the spans' functions begin one after the other, without wrapping around."""
-        first, n = self.first[self.fresh], self.knots.count
-        return bool((np.diff(first) == 1).all()) and first[-1] + self.knots.degree < n
-
-    def products(self, orders: tuple[Order, ...], mirrored: bool = False) -> Array:
-        """Products of derivatives of functions, ``(s, len(orders) g, (d + 1)²)``; with mirror images where asked."""
-        if (orders, mirrored) not in self._products:
+    def products(self, orders: tuple[Order, ...], factors: Sequence[float], mirrored: bool = False) -> Array:
+        """Products of derivatives of functions, times factors, ``(s, len(orders) g, (d + 1)²)``; with mirror images
+        where asked."""
+        key = orders, tuple(factors), mirrored
+        if key not in self._products:
             tables = []
-            for k, m in orders:
-                product = self.table[:, :, k, :, None] * self.table[:, :, m, None]
+            for (k, m), factor in zip(orders, factors, strict=True):
+                product = factor * self.table[:, :, k, :, None] * self.table[:, :, m, None]
                 tables.append(product + product.swapaxes(2, 3) if mirrored and k != m else product)
-            self._products[orders, mirrored] = np.concatenate(tables, axis=1).reshape(len(self.first), -1, self.width)
-        return self._products[orders, mirrored]
+            self._products[key] = np.concatenate(tables, axis=1).reshape(len(self.first), -1, self.width)
+        return self._products[key]
 
     @property
     def width(self) -> int:
@@ -88,7 +80,13 @@ def _sites(knots: KnotVector, at: bytes, weight: bytes, shape: tuple[int, int]) 
     places = np.frombuffer(at)
     first, table = jet(knots, places, range(3))
     table = table.reshape(*shape, 3, knots.degree + 1)
-    return Sites(knots, first.reshape(shape)[:, 0], places.reshape(shape), np.frombuffer(weight).reshape(shape), table)
+    return Sites(
+        knots,
+        np.ascontiguousarray(first.reshape(shape)[:, 0]),
+        places.reshape(shape),
+        np.frombuffer(weight).reshape(shape),
+        table,
+    )
 
 
 def integrals(
@@ -112,72 +110,72 @@ def integrals(
         ``[i, j, p + k, q + l]`` belongs to the functions (i, j) and (i + k, j + l).
     """
     u, v = along
-    (su, gu), p, q = u.at.shape, u.knots.degree, v.knots.degree
+    su, gu = u.at.shape
     pairs: dict[Order, list[tuple[int, int, Array]]] = {}
     for both, values in zip(orders, coefficients, strict=True):
         low, high = sorted(both)
         pairs.setdefault((low[0], high[0]), []).append((low[1], high[1], values))
     form = nothing(u.knots, v.knots) if form is None else form
-    lopsided = any(
-        i != j for i, j in pairs
-    )  # then half of the form is added up, and its mirror image is the other half
-    half = nothing(u.knots, v.knots) if lopsided else form
-    stencil = half.swapaxes(1, 2).reshape(u.knots.count, 2 * p + 1, v.knots.count * (2 * q + 1))
-    outer = u.products(tuple(pairs)).swapaxes(1, 2)
-    rows = max(1, _BLOCK // (len(pairs) * gu * stencil.shape[2] * 2))
+    half = np.zeros((u.knots.count, 2 * u.knots.degree + 1, v.knots.count, 2 * v.knots.degree + 1))
+    width = half.shape[2] * half.shape[3]
+    outer = u.products(tuple(pairs), [0.5 if i == j else 1.0 for i, j in pairs]).swapaxes(1, 2)
+    rows = max(1, _BLOCK // (len(pairs) * gu * width * 2))
     for begin in range(0, su, rows):
         part = slice(begin, begin + rows)
         lines = slice(begin * gu, min(begin + rows, su) * gu)
         groups = [[(k, m, c[:, lines]) for k, m, c in each] for each in pairs.values()]
-        found = inner(v, groups, [i == j for i, j in pairs])
-        along_v = found.reshape(stencil.shape[2], len(pairs), -1, gu).transpose(2, 1, 3, 0)
-        count = len(along_v)
-        if lopsided:
-            along_v = along_v * np.array([[[0.5 if i == j else 1.0]] for i, j in pairs])
-        cells = np.matmul(outer[part], along_v.reshape(count, len(pairs) * gu, -1))
-        _added(stencil, u, part, cells.reshape(count, p + 1, p + 1, -1))
-    if lopsided:
-        form += half
-        form += _mirrored(half)
+        along_v = inner(v, groups, [i == j for i, j in pairs], gu)
+        cells = np.matmul(outer[part], along_v)
+        _added(half, u, u.first[part], cells.reshape(len(cells), 1, 1, 1, -1))
+    if MIRROR.pays(half.size):
+        MIRROR(pointer(half), *half.shape, pointer(form))
+    else:
+        half = half.swapaxes(1, 2)
+        form += half + _mirrored(half)
     return form
 
 
 def nothing(u: KnotVector, v: KnotVector) -> Array:
     """The form that is zero, ``(nu, nv, 2p + 1, 2q + 1)``."""
-    return np.zeros((u.count, 2 * u.degree + 1, v.count, 2 * v.degree + 1)).swapaxes(1, 2)
+    return np.zeros((u.count, v.count, 2 * u.degree + 1, 2 * v.degree + 1))
 
 
-def inner(v: Sites, groups: Sequence[Sequence[tuple[int, int, Array]]], mirrored: Sequence[bool]) -> Array:
+def inner(
+    v: Sites, groups: Sequence[Sequence[tuple[int, int, Array]]], mirrored: Sequence[bool], points: int = 1
+) -> Array:
     """``Σ ∫ c D^k N_b D^m N_b' dv`` on lines u = const, for groups of k, m and c ``(points, lines)``.
 
     Returns
     -------
-    ndarray (nv, 2q + 1, groups, lines)
-        With their mirror images where asked.
+    ndarray (lines / points, groups · points, nv (2q + 1))
+        With their mirror images where asked; lines in bundles of a number of points.
     """
-    (sv, gv), q, lines = v.at.shape, v.knots.degree, groups[0][0][2].shape[1]
-    cells = np.empty((sv, v.width, len(groups), lines))
+    (sv, gv), lines = v.at.shape, groups[0][0][2].shape[1]
+    cells = np.empty((sv, len(groups), lines, v.width))
     for number, (group, both) in enumerate(zip(groups, mirrored, strict=True)):
-        table = v.products(tuple((k, m) for k, m, _ in group), both)
+        table = v.products(tuple((k, m) for k, m, _ in group), [1.0] * len(group), both)
         values = np.empty((sv, len(group), gv, lines))
         for place, (_, _, c) in enumerate(group):
             values[:, place] = c.reshape(sv, gv, lines)
-        np.matmul(table.swapaxes(1, 2), values.reshape(sv, -1, lines), out=cells[:, :, number])
-    found = np.zeros((v.knots.count, 2 * q + 1, len(groups), lines))
-    _added(found, v, slice(None), cells.reshape(sv, q + 1, q + 1, len(groups), lines))
+        np.matmul(values.reshape(sv, -1, lines).swapaxes(1, 2), table, out=cells[:, number])
+    found = np.zeros((lines // points, len(groups) * points, v.knots.count * (2 * v.knots.degree + 1)))
+    _added(found, v, v.first, cells.reshape(sv, len(groups), -1, points, v.width))
     return found
 
 
-def _added(form: Array, along: Sites, part: slice, cells: Array) -> None:
-    """Add the parts ``(s, d + 1, d + 1, …)`` that pieces give to pairs of functions to a stencil ``(n, 2d + 1, …)``."""
+def _added(found: Array, along: Sites, first: Array, cells: Array) -> None:
+    """Add what pieces give to pairs of functions, ``(pieces, groups, lines, points, (d + 1)² k)``, piece by piece to
+    stencils, ``(lines, groups, points, n, 2d + 1, k)``."""
     n, d = along.knots.count, along.knots.degree
-    first, fresh = along.first[part], along.fresh[part]
-    if not fresh[1:].all():  # pieces of one span
-        new = np.append(0, 1 + np.flatnonzero(fresh[1:]))
-        first, cells = first[new], np.add.reduceat(cells, new, axis=0)
-    for a in range(d + 1):
-        place = slice(first[0] + a, first[-1] + a + 1) if along.straight else (first + a) % n
-        form[place, d - a : 2 * d + 1 - a] += cells[:, a]
+    pieces, groups, lines, points, width = cells.shape
+    width //= along.width
+    if PLACE.pays(cells.size):
+        PLACE(pointer(cells), pieces, groups, lines, points, width, pointer(first), n, d, pointer(found))
+        return
+    stencils = found.reshape(lines, groups, points, n, 2 * d + 1, width).swapaxes(0, 1)
+    for cell, start in zip(cells.reshape(pieces, groups, lines, points, d + 1, d + 1, width), first, strict=True):
+        for a in range(d + 1):
+            stencils[:, :, :, (start + a) % n, d - a : 2 * d + 1 - a] += cell[:, :, :, a]
 
 
 def _mirrored(form: Array) -> Array:

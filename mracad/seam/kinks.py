@@ -76,8 +76,7 @@ def _kink(net: Net, metric: Net, quadrature: Quadrature, axis: int, lines: Array
     width, n, wide = numbers.shape[3], along.count, 2 * along.degree + 1
     outer = np.stack([x[:, :, None] * y[:, None] for x, _, _ in terms for y, _, _ in terms], axis=1)
     groups = [[(i, j, (a * b).T)] for _, i, a in terms for _, j, b in terms]
-    inside = inner(where, groups, [False] * len(groups))
-    products = inside.transpose(3, 2, 0, 1).reshape(len(lines), len(groups), -1)
+    products = inner(where, groups, [False] * len(groups))
     places = (start[:, None] + np.arange(width)) % knots.count
     rows, place = np.unique(places, return_inverse=True)
     form = np.zeros((len(rows), n, 2 * width - 1, wide))

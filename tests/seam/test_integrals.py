@@ -5,6 +5,7 @@ import pytest
 
 from mracad.bspline.gram import gram
 from mracad.bspline.knots import KnotVector
+from mracad.compiled import Compiled
 from mracad.seam.integrals import integrals, sites
 
 ORDERS = ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))
@@ -57,6 +58,18 @@ def test_integrals_are_sums_over_products_of_functions(u, v):
         wanted = wanted + (part if a == b else part + part.T)
     found = whole(integrals(sides, tuple(coefficients), np.array([c.T for c in coefficients.values()])))
     assert np.abs(found - wanted).max() <= 1e-12 * np.abs(wanted).max()
+
+
+@pytest.mark.parametrize(("u", "v"), [("cubic", "double"), ("ring", "line")])
+def test_compiled_code_and_arrays_give_the_same_bits(u, v, monkeypatch):
+    sides = gauss(KNOTS[u], [0.1, 0.2]), gauss(KNOTS[v], [0.7])
+    pairs = tuple((a, b) for i, a in enumerate(ORDERS) for b in ORDERS[: i + 1])
+    values = np.random.default_rng(0).standard_normal((len(pairs), sides[1].at.size, sides[0].at.size))
+    found = []
+    for used in (True, False):
+        monkeypatch.setattr(Compiled, "pays", lambda self, work, used=used: used)
+        found.append(integrals(sides, pairs, values))
+    np.testing.assert_array_equal(*found)
 
 
 def test_large_nets_are_products_of_their_directions():
