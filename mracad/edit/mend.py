@@ -17,6 +17,7 @@ from mracad.edit.driver import groups
 from mracad.edit.moved import Moved, Result
 from mracad.edit.pose import Pose, Scene, pose
 from mracad.edit.target import Sheet, stiffness
+from mracad.edit.tolerances import Tolerances
 from mracad.model.brep import Model
 from mracad.model.displacement import lifted
 from mracad.seam.interface import Joints
@@ -25,11 +26,11 @@ from mracad.seam.trimmed import TrimmedSeam
 
 Array = np.ndarray
 
-OPEN = 1e-10
-"""Smallest gap (mm) or angle (radians) that is mended."""
-
 HALVINGS = 4
 """How often spans beside a trim curve are halved at most until its seam holds."""
+
+PAYS = 0.5
+"""Share to which halving must bring what a mending leaves open: ends that stay hold seams open with any spans."""
 
 PASSES = 4
 """How often the remainder of a mending is mended again."""
@@ -71,11 +72,11 @@ def mended(scene: Scene) -> Mended:
     edges: set[int] = set()
     for group in groups(scene.sheets, scene.joints):
         joined = scene.joints.among(group)
-        wide = _widest(joined)
-        if wide <= OPEN:
+        wide, bent = _widest(joined)
+        if wide <= scene.tolerances.gap and bent <= scene.tolerances.angle:
             continue
         members = {i: scene.sheets[i] for i in group}
-        parts = _moved(members, *_shut(scene, members, _yielding(joined), wide))
+        parts = _moved(members, *_shut(scene, members, _yielding(joined, scene.tolerances), max(wide, bent)))
         turned = max(change.turn for each in parts.values() for change in each.changes.values())
         if turned <= scene.tolerances.growth.fold:
             moved |= parts
@@ -84,19 +85,24 @@ def mended(scene: Scene) -> Mended:
     return Mended(result.displacement().applied(scene.model), moved, frozenset(edges))
 
 
-def _widest(joined: Joints) -> float:
-    """The largest gap (mm) or angle (radians) that is to be mended."""
+def _widest(joined: Joints) -> tuple[float, float]:
+    """The largest gap (mm) and the largest angle (radians) that are to be mended."""
     exact = [(s.joint.close * s.gap, s.joint.fit * s.angle) for s in joined.exact]
     loose = [(s.close * s.opening[0], s.fit * s.opening[1]) for s in joined.loose]
-    return float(max((max(each) for each in [*exact, *loose]), default=0.0))
+    wide, bent = np.max([(0.0, 0.0), *exact, *loose], axis=0)
+    return float(wide), float(bent)
 
 
-def _yielding(joined: Joints) -> Joints:
-    """The joints; those to be mended keep their position exactly and the rest to the tolerance.
+def _yielding(joined: Joints, tolerances: Tolerances) -> Joints:
+    """The joints; those to be mended keep their position exactly and the rest to the tolerance, and those along trim
+    curves that are within it stay as they are.
 
     Where four patches meet, the slopes of closed gaps constrain the angles, and the other way round.
     """
-    exact, loose = [], list(joined.loose)
+    exact, loose = [], []
+    for each in joined.loose:
+        gap, angle = each.close and each.opening[0] > tolerances.gap, each.fit and each.opening[1] > tolerances.angle
+        loose.append(replace(each, close=bool(gap), fit=bool(angle)))
     for seam in joined.exact:
         joint = seam.joint
         if joint.order and (joint.close or joint.fit):
@@ -110,16 +116,23 @@ def _yielding(joined: Joints) -> Joints:
 def _shut(scene: Scene, members: Mapping[int, Sheet], joined: Joints, wide: float) -> tuple[Pose, Array]:
     """The problem of surfaces, and the displacement that closes their joints."""
     width = max(sheet.wavelength for sheet in members.values())
-    longest, finer = np.inf, members if scene.refine else ()
+    spans: dict[int, float] = {}
+    best, least = None, np.inf
     for halving in range(HALVINGS + 1):
-        found = pose(scene, members, joined, width, DETAIL * wide, finer=finer, longest=longest)
+        found = pose(scene, members, joined, width, DETAIL * wide, finer=members if scene.refine else (), spans=spans)
         delta = found.problem.nearest(np.zeros_like(found.problem.f), stiffness(width))
         for _ in range(PASSES):  # rows that depend on each other leave something of what they ask
             delta = found.problem.settled(delta, stiffness(width))
-        if not scene.refine or not found.open(delta):
+        opened, share = found.open(delta)
+        if best and share > PAYS * least:
             break
-        longest = width / 2 ** (halving + 3)
-    return found, delta
+        best, least = (found, delta), share
+        if not scene.refine or not opened:
+            break
+        seams = (joined.loose[k] for k in opened)
+        spans |= {edge: width / 2 ** (halving + 3) for seam in seams for edge in (seam.edge, seam.twin)}
+    assert best
+    return best
 
 
 def _moved(members: Mapping[int, Sheet], found: Pose, delta: Array) -> dict[int, Moved]:

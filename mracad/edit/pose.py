@@ -107,10 +107,12 @@ class Pose:
         """A displacement, faded out within a wavelength of regions where nothing may move."""
         return delta if self.share is None else self.problem.nearest(self.share * delta)
 
-    def open(self, delta: Array) -> bool:
-        """Whether seams along trim curves that should be mended stay open after a displacement."""
+    def open(self, delta: Array) -> tuple[set[int], float]:
+        """The seams along trim curves that should be mended and stay open after a displacement, and the share of their
+        conditions that does."""
         lacked = np.linalg.norm(self.opened + self.contacts.matrix @ delta, axis=1)
-        return bool((lacked > self.limits)[self.trimmed].any())
+        which = (lacked > self.limits) & self.trimmed
+        return set(self.contacts.owner[which].tolist()), float(which.sum() / max(self.trimmed.sum(), 1))
 
 
 def pose(
@@ -121,7 +123,7 @@ def pose(
     detail: float,
     *,
     finer: Collection[int] = (),
-    longest: float = np.inf,
+    spans: Mapping[int, float] | None = None,
 ) -> Pose:
     """The problem of surfaces that move together.
 
@@ -136,13 +138,13 @@ def pose(
         Size of the wanted displacements, mm: contacts weigh more where it is larger.
     finer : collection of int
         Surfaces that get control points beside rims if they have few.
-    longest : float
-        Longest knot spans beside seams along trim curves, mm.
+    spans : mapping of int to float, optional
+        Longest knot spans beside edges, mm.
     """
     movable = {face for sheet in members.values() for face in sheet.movable}
     nets = {i: beside_rims(sheet, joined) if i in finer else sheet.net for i, sheet in members.items()}
-    if np.isfinite(longest):
-        nets = {i: _beside_seams(net, members[i], joined, longest) for i, net in nets.items()}
+    if spans:
+        nets = {i: _beside(net, members[i], spans) for i, net in nets.items()}
     nets = matched(nets, joined.exact)
     nets = matched(doubled(nets, joined.exact), joined.exact)
     shares: list[Array] = []
@@ -207,8 +209,10 @@ def beside_rims(sheet: Sheet, joined: Joints) -> Net:
     return refined(sheet.net, held, sheet.stretch.times(sheet.wavelength / 4))
 
 
-def _beside_seams(net: Net, sheet: Sheet, joined: Joints, longest: float) -> Net:
-    """A surface with knot spans of at most a length (mm) beside seams along trim curves."""
-    loose = {edge for seam in joined.loose if not seam.since for edge in (seam.edge, seam.twin)}
-    held = tuple(trim.curve for face in sheet.faces for trim in face.trims if trim.edge in loose)
-    return refined(net, held, sheet.stretch.times(longest))
+def _beside(net: Net, sheet: Sheet, spans: Mapping[int, float]) -> Net:
+    """A surface with knot spans of at most a length (mm) beside edges."""
+    for longest in sorted(set(spans.values()), reverse=True):
+        trims = (trim for face in sheet.faces for trim in face.trims)
+        curves = tuple(trim.curve for trim in trims if spans.get(trim.edge) == longest)
+        net = refined(net, curves, sheet.stretch.times(longest))
+    return net

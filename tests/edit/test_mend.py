@@ -8,7 +8,7 @@ import pytest
 from mracad.bspline.surface import Net
 from mracad.edit.fair import Filter, faired
 from mracad.edit.mend import mended
-from mracad.edit.pose import Scene
+from mracad.edit.pose import Pose, Scene
 from mracad.edit.target import sheets
 from mracad.edit.tolerances import Tolerances
 from mracad.inspect.seams import seams
@@ -88,3 +88,31 @@ def test_seams_along_trim_curves_are_shut_to_the_tolerance_on_finer_spans():
         )
         found[refine] = new.gap
     assert old.gap > 1e-2 and found[True] <= 2e-4 and found[True] < found[False]
+
+
+def half(opening):
+    _, left, right = halves.surfaces(opening, (15, 30))
+    model = view(halves.document(left, right))
+    return Scene(
+        model, sheets(model, {0, 1}, Filter(45.0)), joints(model, {0, 1}, Wishes("g1", 0.1, True)), Tolerances()
+    )
+
+
+def test_what_is_within_the_tolerances_is_no_defect():
+    """Its seam moves no point, and gets no knots."""
+    scene = half(0.2)
+    assert mended(scene).moved
+    assert not mended(replace(scene, tolerances=Tolerances(1.0, angle=0.1))).moved
+
+
+def test_spans_are_halved_only_as_long_as_that_closes_seams(monkeypatch):
+    scene, asked = half(0.2), []
+
+    def stays(pose, delta):
+        asked.append(sum(space.net.poles[..., 0].size for space in pose.problem.spaces.values()))
+        return {0}, 0.5
+
+    monkeypatch.setattr(Pose, "open", stays)
+    found = mended(scene).moved
+    assert len(asked) == 2 and asked[0] < asked[1]
+    assert sum(each.net.poles[..., 0].size for each in found.values()) == asked[0]
