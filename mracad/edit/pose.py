@@ -15,6 +15,7 @@ from mracad.seam.conditions import doubled, matched
 from mracad.seam.conditions import rows as seam_rows
 from mracad.seam.contact import Contact, Rows
 from mracad.seam.contact import rows as contact_rows
+from mracad.seam.domains import problem
 from mracad.seam.guide import Led, led
 from mracad.seam.interface import Joints, away, contact, mended_ends, rims, twists
 from mracad.seam.solve import Problem, Soft, Space, faded
@@ -183,10 +184,10 @@ def pose(
     sliding = [each for each in joined.slides if each.trace.surface in nets]
     slid = led(nets, sliding, WITHIN * scene.tolerances.gap, weight)
     guides = slid.guides(scene.model, nets) if slid else None
-    problem = Problem(spaces, rows, np.where(goal[:, None], -(rows @ f), 0.0), soft, guides=guides)
+    posed = problem(spaces, rows, np.where(goal[:, None], -(rows @ f), 0.0), soft, guides=guides)
     owners = [each.surfaces for each in contacts]
     share = np.concatenate(shares)[:, None] if joined.zones else None
-    return Pose(problem, found, owners, opened, limits, trimmed, share, slid)
+    return Pose(posed, found, owners, opened, limits, trimmed, share, slid)
 
 
 def _zoned(sheet: Sheet, net: Net, joined: Joints, width: float) -> Zoned:

@@ -16,7 +16,7 @@ so one factorisation serves all.  p is expanded in Chebyshev polynomials (:mod:`
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
@@ -86,10 +86,13 @@ class Effort:
         Largest number of control points that are solved at once.
     left : float
         For larger problems, see :class:`mracad.seam.divided.Divided`.
+    domain : int
+        Number of control points of a domain, see :mod:`mracad.seam.domains`.
     """
 
     direct: int = 12_000
     left: float = LEFT
+    domain: int = 200_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,6 +158,7 @@ class Problem:
         self.f = f - f[self.seen].mean(axis=0)
         self._solvers: dict[tuple[float, bytes, bool], Solver] = {}
         self._pull: tuple[Array, Array] | None = None
+        self._last: tuple[Array, tuple[float, bool], Array] | None = None
         trends = (np.zeros_like(s.net.poles) if s.trend is None else s.trend for s in spaces.values())
         above = f - np.concatenate([each.reshape(-1, 3) for each in trends])
         self.above = above - above[self.seen].mean(axis=0)
@@ -197,6 +201,11 @@ class Problem:
         The distance is ‖δ − w‖²_M + a |δ − w|²_K, with ``stiffness`` a (mm⁴): δ − w is then smooth.
         ``beyond``: control points that the faces hardly depend on also move as wanted; otherwise they stay.
         """
+        if self._last is None or self._last[0] is not wanted or self._last[1] != (stiffness, beyond):
+            self._last = wanted, (stiffness, beyond), self._nearest(wanted, stiffness, beyond)
+        return self._last[2]
+
+    def _nearest(self, wanted: Array, stiffness: float, beyond: bool) -> Array:
         kept = np.where((self.free | ~self.seen if beyond else self.free)[:, None], wanted, 0.0)
         held = wanted - kept
         pull = np.zeros_like(held)
@@ -242,6 +251,7 @@ class Problem:
         """Drop the factors of a large problem, which will hardly be solved again."""
         if len(self.free) > KEPT:
             self._solvers.clear()
+            self._last = None
 
     def _solver(self, stiffness: float, free: Array) -> Solver:
         """The solver of the form M + stiffness · K and the contacts, with sliding edges unless all rims are free."""
@@ -259,20 +269,23 @@ class Problem:
             others = [float(each is soft) for each in (self.soft, self.between) if each is not None]
             with suppress(np.linalg.LinAlgError):
                 return Banded(self.bands[0], [1.0, stiffness, stiffness, *others], free)
-        parts = (_sum(space.forms, stiffness) for space in self.spaces.values())
         if len(self.spaces) > 1 and free.sum() > self.effort.direct:
             layout = self._layout(stiffness)
             joined = joints(layout, self.rows, soft, free)
             along = strips(layout, joined, free, OVERLAP * free.sum())
             if along is not None:
-                diagonals = [each.diagonal() for each in (self.mass, self.bending, self.creases)]
-                diagonal = diagonals[0] + stiffness * (diagonals[1] + diagonals[2])
-                division = Division(layout, joined, along)
-                return Divided(parts, diagonal, soft, self.rows, free, division, self.effort.left)
-        form = whole(list(parts))
+                whole_form = self._form(stiffness)
+                return Divided(*whole_form, soft, self.rows, free, Division(layout, joined, along), self.effort.left)
+        form = whole([_sum(space.forms, stiffness) for space in self.spaces.values()])
         alone = [np.indices(space.free.shape).reshape(2, -1).T for space in self.spaces.values()]
         places = alone[0] if len(alone) == 1 else None
         return Constrained(form if soft is None else form + soft, self.rows, free, places=places)
+
+    def _form(self, stiffness: float) -> tuple[Callable[[int], Any], Array]:
+        """M + stiffness · K of the surface of a number, and its diagonal over all."""
+        spaces = list(self.spaces.values())
+        mass, bending, creases = (each.diagonal() for each in (self.mass, self.bending, self.creases))
+        return lambda i: _sum(spaces[i].forms, stiffness), mass + stiffness * (bending + creases)
 
     def _layout(self, stiffness: float) -> Layout:
         """The layout of control points, and how far the effect of a joint reaches among them."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -75,15 +75,21 @@ def joints(layout: Layout, rows: Any, soft: Any, free: Array) -> dict[tuple[int,
     return {divmod(key, len(layout.reach)): np.unique(own) for key, own in zip(keys.tolist(), each, strict=False)}
 
 
-def strips(layout: Layout, joined: dict[tuple[int, int], Array], free: Array, most: float) -> list[Array] | None:
-    """The free points near the points of each joint, on its surfaces and on their joined neighbours.
+def strips(
+    layout: Layout,
+    joined: Mapping[tuple[int, int], Array],
+    free: Array,
+    most: float = np.inf,
+    those: Collection[tuple[int, int]] | None = None,
+) -> list[Array] | None:
+    """The free points near the points of each joint, or of some joints, on its surfaces and on their joined neighbours.
 
     None if there are more than ``most`` in all.
     """
     boxes = [_box(layout.places[begin:end]) for begin, end in pairwise(layout.ends.tolist())]
     size = np.array([np.linalg.norm(high - low) for low, high in boxes])
-    points = np.add.reduceat(free, layout.ends[:-1], dtype=int) * np.minimum(layout.reach / (size + 1e-300), 1.0)
-    if sum(points[i] for pair in joined for i in set(pair)) > most:  # without those of other surfaces
+    about = np.add.reduceat(free, layout.ends[:-1], dtype=int) * np.minimum(layout.reach / (size + 1e-300), 1.0)
+    if sum(about[i] for pair in joined for i in set(pair)) > most:  # without those of other surfaces
         return None
     from scipy.spatial import cKDTree
 
@@ -93,7 +99,8 @@ def strips(layout: Layout, joined: dict[tuple[int, int], Array], free: Array, mo
         beside.setdefault(b, {b}).add(a)
     found: list[Array] = []
     total = 0
-    for (a, b), points in joined.items():
+    for a, b in joined if those is None else those:
+        points = joined[a, b]
         near, (low, high) = [], _box(layout.places[points])
         for surface in sorted(beside[a] | beside[b]):
             own = slice(layout.ends[surface], layout.ends[surface + 1])
