@@ -1,18 +1,17 @@
 """Problems of more surfaces than are solved at once: overlapping domains, so that memory does not grow with the number.
 
-What lies w away from a control point counts for its displacement by a filter of length ℓ and gain 1 / (1 + xⁿ) only like
-e^(−w sin(π / 4n) / ℓ), the slowest of the waves ω⁴ⁿ = −ℓ⁻⁴ⁿ.  So surfaces are divided into domains, and each domain is
-solved together with the surfaces around it, whose displacements are then left to their own domains.  Conditions within a
-domain are met; those between domains are missed by what was left out, and are met by the least correction in strips
+What lies w away from a control point counts for its displacement, by a filter of length ℓ and gain 1 / (1 + xⁿ), only
+like e^(−w sin(π / 4n) / ℓ), the slowest of the waves ω⁴ⁿ = −ℓ⁻⁴ⁿ.  So surfaces are divided into domains, and each is
+solved together with the surfaces around it, whose displacements are then left to their own domains.  Conditions within
+a domain are met; those between domains are missed by what was left out, and are met by the least correction in strips
 along these joints.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -37,10 +36,11 @@ def problem(
     rows: Any = None,
     goal: Array | None = None,
     soft: Soft | None = None,
-    effort: Effort = Effort(),
+    effort: Effort | None = None,
     guides: Guides | None = None,
 ) -> Problem:
     """The problem of surfaces; domain by domain if they are more than two domains.  Edges that slide need it whole."""
+    effort = effort or Effort()
     large = sum(int(space.free.sum()) for space in spaces.values()) > 2 * effort.domain
     return (Partitioned if large and guides is None else Problem)(spaces, rows, goal, soft, effort, guides)
 
@@ -186,8 +186,7 @@ class Partitioned(Problem):
         within = np.flatnonzero(~_any(self.rows, place < 0))
         rows = self.rows[within]
         rows = taken(rows, np.ones(rows.nnz, bool), place[rows.indices], len(points))
-        forms = (None if each is None else part(each, points) for each in (self.soft, self.between))
-        form, between = forms
+        form, between = (None if each is None else part(each, points) for each in (self.soft, self.between))
         pull = None if self.pull is None else self.pull[points]
         goal = None if self.goal is None else self.goal[within]
         soft = None if form is None else Soft(form, pull, between)
