@@ -25,8 +25,19 @@ def distances(net: Net, points: Array) -> Array:
     us, vs = _places(net, 0), _places(net, 1)
     grid = net.grid(us, vs).reshape(-1, 3)
     _, seeds = cKDTree(grid).query(points, k=_SEEDS)
-    starts = np.stack([us[seeds // len(vs)], vs[seeds % len(vs)]], axis=-1)
-    return np.asarray(np.min([_descend(net, points, starts[:, k])[1] for k in range(_SEEDS)], axis=0))
+    places = np.stack(np.divmod(seeds, len(vs)), axis=-1)
+    starts = np.stack([us[places[..., 0]], vs[places[..., 1]]], axis=-1)
+    uv, best = _descend(net, points, starts[:, 0])
+    # seeds side by side lead to the same foot, unless that is beyond them
+    first = places[:, 0].T
+    around = [
+        (at[np.maximum(k - 1, 0)], at[np.minimum(k + 1, len(at) - 1)]) for at, k in zip((us, vs), first, strict=True)
+    ]
+    beyond = np.any([(x < low) | (x > high) for x, (low, high) in zip(uv.T, around, strict=True)], axis=0)
+    more = beyond[:, None] | (np.abs(places[:, 1:] - places[:, :1]) > 1).any(axis=-1)
+    point, seed = np.nonzero(more)
+    np.minimum.at(best, point, _descend(net, points[point], starts[point, seed + 1])[1])
+    return best
 
 
 def _places(net: Net, axis: int) -> Array:

@@ -58,17 +58,27 @@ def moments(net: Net, boundary: Sequence[tuple[Curve, int]]) -> Array:
     total = np.zeros(_WIDTH)
     column, x, turns = _located(net.u, uv[..., 0])
     row, y, _ = _located(net.v, uv[..., 1])
+    order = np.lexsort((column, row))
+    order = order[np.abs(dv[order]).max(axis=1) > 0]
+    column, row, turns = column[order], row[order], turns[order]
+    across = _interpolating(y[order], points) * dv[order][..., None]
+    whole = across.sum(axis=1)
+    shares = (
+        np.matmul(_integrating(x[order], points).swapaxes(1, 2), across) * np.diff(net.u.breaks)[column, None, None]
+    )
     for rows in _blocks(net, points):
-        here = np.flatnonzero((row >= rows[0]) & (row <= rows[-1]))
-        if len(here):
+        here = slice(*np.searchsorted(row, [rows[0], rows[-1] + 1]))
+        if len(row[here]):
             cells, before = _columns(net, rows, points)
             place = column[here], row[here] - rows[0]
-            inner = _integrating(x[here], points) @ cells[place].reshape(len(here), points, -1)
-            inner = (
-                inner.reshape(*x[here].shape, points, _WIDTH) * np.diff(net.u.breaks)[column[here], None, None, None]
+            first = np.flatnonzero(np.diff(place[0] * len(rows) + place[1], prepend=-1))
+            own = np.add.reduceat(shares[here], first, axis=0)
+            total += np.einsum("qhg,qhgc->c", own, cells[place[0][first], place[1][first]])
+            total += np.einsum(
+                "qg,qgc->c", np.add.reduceat(whole[here], first, axis=0), before[place[0][first], place[1][first]]
             )
-            inner += (before[place] + turns[here, None, None] * before[-1, place[1]])[:, None]
-            total += np.einsum("qbgc,qbg,qb->c", inner, _interpolating(y[here], points), dv[here])
+            if turns.any():
+                total += np.einsum("qg,qgc->c", turns[here, None] * whole[here], before[-1, place[1]])
     return total
 
 
