@@ -86,7 +86,7 @@ class Congruent:
             return None
         tried = Tried(closely(sheet, net), [net], [between.offset(known.tried.parts[0])])
         if not known.amount:
-            return replace(known, sheet=sheet, tried=tried, changes=tried.watch.still()[0])
+            return replace(known, sheet=sheet, tried=tried, changes=tried.watch.still[0])
         moved = replace(known, sheet=sheet, tried=tried).confirmed(self.scene.tolerances)
         jumps = Jumps(self.scene, {sheet.index: net}, self.scene.joints.among({sheet.index}), sheet.wavelength)
         room = jumps.room({sheet.index: displaced(net, moved.offset)})

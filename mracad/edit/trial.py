@@ -186,7 +186,7 @@ class Trial:
         """The verdict on no change, with a gain that others have to exceed."""
         still = Tried(self.watch, self.nets, [np.zeros(net.poles.shape) for net in self.nets])
         none = np.zeros(len(self.nets))
-        return Verdict(still, none.tolist(), self.watch.still(), [()] * len(none), Gains(none, none), least)
+        return Verdict(still, none.tolist(), self.watch.still, [()] * len(none), Gains(none, none), least)
 
     def judged(self, delta: Array, target: Array, others: Sequence[Verdict] = (), *, wholly: bool = False) -> Verdict:
         """The share of a displacement allowed for each surface; 0 where it could not do better than ``others``, or with

@@ -7,6 +7,7 @@ from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
+from typing import Any
 
 import numpy as np
 
@@ -27,6 +28,9 @@ LEAST = 1 / 32, 1 / 16
 
 PART, MEASURED = 0.25, 5
 """The part of a displacement that is measured where the whole is too much; how many amounts are measured at most."""
+
+MANY = 400_000
+"""Number of control points above which faces are surveyed again for every look: surveys take 1 kB for each."""
 
 SINGULAR = 1e5
 """Curvature over the wavelength above which a face is singular."""
@@ -62,13 +66,15 @@ class Watch:
         return [(place, face.index) for place, (*_, faces) in enumerate(self.surfaces) for face in faces]
 
     @cached_property
+    def lasting(self) -> bool:
+        """Whether what is known of faces is kept."""
+        return sum(net.poles[..., 0].size for net, *_ in self.surfaces) <= MANY
+
+    @cached_property
     def surveys(self) -> Sequence[Survey]:
         """The faces before the edit."""
-        both = zip(self.surfaces, self.reaches, strict=True)
-        every = [(net, base, face, reach) for (net, base, faces), reach in both for face in faces]
-        looked = [(net, (face,)) for net, _, face, _ in every]
-        bases = [base for _, base, *_ in every] if np.isfinite(self.reaches).all() else ()
-        return surveys(looked, self.points, SINGULAR / self.width, [reach for *_, reach in every], bases)
+        made = _Surveyed(self.surfaces, self.points, SINGULAR / self.width, self.reaches)
+        return [*made] if self.lasting else made
 
     @cached_property
     def at_rest(self) -> dict[int, Mapping[int, Change]]:
@@ -85,13 +91,42 @@ class Watch:
 
     def ramp(self, parts: Sequence[Array]) -> Ramp:
         """The faces along displacements of the surfaces."""
-        return Ramp(self.surveys, [parts[place] for place, _ in self.owners])
+        return Ramp(self.surveys, [parts[place] for place, _ in self.owners], self.lasting)
 
-    def still(self) -> list[dict[int, Change]]:
+    @cached_property
+    def still(self) -> list[Mapping[int, Change]]:
         """The changes of the faces of each surface if nothing moves, by position of the surface."""
         found: list[dict[int, Change]] = [{} for _ in self.surfaces]
         for (place, face), survey in zip(self.owners, self.surveys, strict=True):
             found[place][face] = Change(survey.roughness, survey.roughness, survey.noise)
+        return [*found]
+
+
+@dataclass(frozen=True, eq=False)
+class _Surveyed(Sequence[Survey]):
+    """The faces of surfaces, each surveyed when asked for; attributes as for :class:`Watch`."""
+
+    surfaces: Sequence[tuple[Net, Net, Sequence[Face]]]
+    points: int
+    singular: float
+    reaches: Sequence[tuple[float, float]]
+
+    @cached_property
+    def _every(self) -> list[tuple[int, Face]]:
+        return [(place, face) for place, (*_, faces) in enumerate(self.surfaces) for face in faces]
+
+    @cached_property
+    def _based(self) -> bool:
+        return bool(np.isfinite(self.reaches).all())
+
+    def __len__(self) -> int:
+        return len(self._every)
+
+    def __getitem__(self, k: Any) -> Any:
+        place, face = self._every[k]
+        net, base, _ = self.surfaces[place]
+        bases = [base] if self._based else ()
+        (found,) = surveys([(net, (face,))], self.points, self.singular, [self.reaches[place]], bases)
         return found
 
 
@@ -187,7 +222,7 @@ class _Search:
         self._tried = tried
         self._tolerances = tolerances
         self.low, self.high = np.zeros(len(high)), high
-        self.best: list[Mapping[int, Change]] = [*tried.watch.still()]
+        self.best: list[Mapping[int, Change]] = [*tried.watch.still]
         self.why: list[tuple[Worse, ...]] = [()] * len(high)
 
     def measure(self, amounts: Array) -> None:

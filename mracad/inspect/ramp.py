@@ -35,17 +35,25 @@ class Ramp:
     surveyed : sequence of Survey
     offsets : sequence of ndarray (nu, nv, 3)
         The whole displacement of the surface of each, mm.
+    lasting : bool
+        Whether what the whole displacements add is kept for other amounts.
     """
 
     surveyed: Sequence[Survey]
     offsets: Sequence[Array]
+    lasting: bool = True
     _slopes: dict[int, _Slope] = field(default_factory=dict)
 
     def changes(self, amounts: Mapping[int, float]) -> dict[int, Change]:
         """The changes of some of the faces, by position, each after the given amount of its displacement."""
-        for i in amounts.keys() - self._slopes.keys():
-            self._slopes[i] = _Slope.of(self.surveyed[i], self.offsets[i])
-        return {i: _change(self.surveyed[i], self._slopes[i], amount) for i, amount in amounts.items()}
+        return {i: self._change(i, amount) for i, amount in amounts.items()}
+
+    def _change(self, i: int, amount: float) -> Change:
+        survey = self.surveyed[i]
+        slope = self._slopes.get(i) or _Slope.of(survey, self.offsets[i])
+        if self.lasting:
+            self._slopes[i] = slope
+        return _change(survey, slope, amount)
 
 
 @dataclass(frozen=True, eq=False)

@@ -34,6 +34,7 @@ class Parabolas:
     most: list
     asked: list = field(default_factory=list)
 
+    @property
     def still(self):
         return [{7: Change(BEFORE, BEFORE, Roughness())} for _ in self.most]
 

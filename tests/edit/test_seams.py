@@ -8,6 +8,7 @@ import pytest
 
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
+from mracad.edit import watch
 from mracad.edit.smooth import smooth
 from mracad.inspect.seams import key, remeasured, seams
 from mracad.job.document import run
@@ -234,3 +235,19 @@ def test_only_the_position_is_kept_where_that_is_asked(edges):
     model, report = edited(panels.cut(noisy, (1, 2)), level=3, keep="g0", edges=edges)
     gap, angle = holds(model)
     assert len(report.edit.faces("edited")) == 2 and gap <= 1e-9 and angle > 0.01
+
+
+def test_surveys_of_very_many_control_points_are_made_again_for_every_look(monkeypatch):
+    """The verdict is the same."""
+    _, net = panels.whole(9, 0.05, patches=(2, 1))
+    model = view(panels.document(panels.cut(net, (2, 1))))
+    found, surveyed = [], []
+    item = watch._Surveyed.__getitem__
+    monkeypatch.setattr(watch._Surveyed, "__getitem__", lambda each, k: surveyed.append(k) or item(each, k))
+    for most in (watch.MANY, 0):
+        monkeypatch.setattr(watch, "MANY", most)
+        surveyed.clear()
+        offsets = smooth(model, Smooth(scale="40mm")).displacement.offsets
+        found.append((len(surveyed), {i: offset.poles.tobytes() for i, offset in offsets.items()}))
+    (few, kept), (many, again) = found
+    assert kept == again and kept.keys() == {0, 1} and many > 2 * few
