@@ -38,6 +38,8 @@ BEYOND = 0.125
 NEWTON, SETTLED = 4, 1e-13
 """Newton steps to the nearest point of a curve, and the change of its fraction after which no more follow."""
 
+_BLOCK, _MANY = 256, 1_000_000  # pairs of edges, and of edges and boxes, that are looked at at once
+
 COARSE = 0.1
 """Distance from an edge, over the step between its samples, beyond which it is certainly not its seam: arcs between
 samples miss bumps that are narrower than a few steps."""
@@ -58,13 +60,12 @@ def coinciding(model: Model, gap: float = GAP) -> list[tuple[Edge, Edge, tuple[S
     free = [e for e in model.edges if e.free and len(e.points) > 1]
     found: dict[tuple[int, int], tuple[Edge, Edge, tuple[Side, Side]]] = {}
     space = np.array([model.spaces[e.part] if model.spaces else 0 for e in free])
-    for i, j in _candidates(model, free, gap, lambda those, i: space[those] == space[i]):
-        edge, other = free[i], free[j]
-        if (j, i) in found:
+    for edge, other, laid in _carried(free, _candidates(model, free, gap, lambda i, j: space[j] == space[i])):
+        if (other.index, edge.index) in found:
             continue
-        side, off = _laid(model, edge, other)
-        if off <= gap * reach(model, edge, other):
-            found[i, j] = (edge, other, (edge.sides[0], side))
+        side = _laid(model, edge, other, gap * reach(model, edge, other), *laid)
+        if side:
+            found[edge.index, other.index] = (edge, other, (edge.sides[0], side))
     return list(found.values())
 
 
@@ -81,11 +82,10 @@ def touching(model: Model) -> frozenset[int]:
     stands = np.array([(model.spaces[edge.part], number) for edge, number, _ in free]).reshape(-1, 2)
     placed = [edge for _, _, edge in free]
     found: set[int] = set()
-    for i, j in _candidates(model, placed, GAP, lambda those, i: (stands[those] != stands[i]).any(axis=1), alike=True):
-        if placed[i].index not in found or placed[j].index not in found:
-            off, _ = _carried(placed[i].points, placed[j])
-            if np.linalg.norm(off, axis=1).max() <= reach(model, placed[i], placed[j]):
-                found |= {placed[i].index, placed[j].index}
+    apart = _candidates(model, placed, GAP, lambda i, j: (stands[j] != stands[i]).any(axis=1), alike=True)
+    for one, other, (off, _) in _carried(placed, apart):
+        if np.linalg.norm(off, axis=1).max() <= reach(model, one, other):
+            found |= {one.index, other.index}
     return frozenset(found)
 
 
@@ -96,52 +96,56 @@ def _placed(edge: Edge, frame: Array) -> Edge:
 
 
 def _candidates(
-    model: Model, free: list[Edge], gap: float, eligible: Callable[[Array, int], Array], alike: bool = False
-) -> Iterator[tuple[int, int]]:
-    """Pairs (i, j) of edges where j is among those ``eligible`` for i, of different faces (or ``alike``), and ends and
-    middle of i are near points of j."""
+    model: Model, free: list[Edge], gap: float, eligible: Callable[[Array, Array], Array], alike: bool = False
+) -> Array:
+    """Pairs ``(k, 2)`` of edges, in order, where the second is ``eligible`` for the first, of different faces (or
+    ``alike``), and ends and middle of the first are near points of the second."""
     if len(free) < 2:
-        return
-    lines = [hermite(e.points, slopes(e.points, e.tangents), *between(len(e.points))) for e in free]
+        return np.empty((0, 2), int)
+    sizes = np.array([len(e.points) for e in free])
+    lines = np.empty((len(free), 8 * (sizes.max() - 1) + 1, 3))
+    for size in np.unique(sizes):
+        own = np.flatnonzero(sizes == size)
+        points, tangents = (np.stack([getattr(free[i], name) for i in own]) for name in ("points", "tangents"))
+        fine = hermite(points, slopes(points, tangents), *between(size))
+        lines[own, : fine.shape[1]], lines[own, fine.shape[1] :] = fine, fine[:, -1:]
     share = [max(OF_MODEL * model.diagonal, 2 * e.tolerance, PRECISION * model.diagonal) * gap for e in free]
-    steps = np.array([np.linalg.norm(np.diff(line, axis=0), axis=1).max() for line in lines]) + np.max(share)
-    low = np.array([line.min(axis=0) for line in lines]) - steps[:, None]
-    high = np.array([line.max(axis=0) for line in lines]) + steps[:, None]
+    steps = np.linalg.norm(np.diff(lines, axis=1), axis=2).max(axis=1) + np.max(share)
     face = np.array([e.sides[0].face for e in free])
-    boxes = _Boxes(low, high)
-    for i, line in enumerate(lines):
-        probes = line[[0, len(line) // 2, -1]]
-        inside = boxes.around(probes)
-        inside = inside[eligible(inside, i)]
-        for j in inside if alike else inside[face[inside] != face[i]]:
-            apart = np.linalg.norm(probes[:, None] - lines[j], axis=2).min(axis=1)
-            if (apart <= steps[j]).all():
-                yield i, int(j)
+    probes = lines[np.arange(len(free))[:, None], np.stack([0 * sizes, 4 * (sizes - 1), 8 * (sizes - 1)], axis=1)]
+    found = [np.empty((0, 2), int)]
+    for i, j in _around(probes, lines.min(axis=1) - steps[:, None], lines.max(axis=1) + steps[:, None]):
+        meant = eligible(i, j) & (alike | (face[i] != face[j]))
+        i, j = i[meant], j[meant]
+        for first in range(0, len(i), _BLOCK):
+            a, b = i[first : first + _BLOCK], j[first : first + _BLOCK]
+            off = np.linalg.norm(probes[a][:, :, None] - lines[b][:, None], axis=3).min(axis=2)
+            found.append(np.stack([a, b], axis=1)[(off <= steps[b, None]).all(axis=1)])
+    pairs = np.concatenate(found)
+    return np.asarray(pairs[np.lexsort(pairs.T[::-1])])
 
 
-class _Boxes:
-    """Boxes, from which those around points are found: sorted by their lower ends, those of a size together."""
-
-    def __init__(self, low: Array, high: Array) -> None:
-        self.low, self.high = low, high
-        self.axis = int(np.ptp(low, axis=0).argmax())
-        size = (high - low)[:, self.axis]
-        kind = np.ceil(np.log2(np.maximum(size / size.max(initial=1e-300), 1e-9)))
-        self.kinds: list[tuple[float, Array, Array]] = []
-        for each in np.unique(kind):
-            of = np.flatnonzero(kind == each)
-            of = of[np.argsort(low[of, self.axis], kind="stable")]
-            self.kinds.append((float(size[of].max()) * (1 + 1e-9), of, low[of, self.axis]))
-
-    def around(self, points: Array) -> Array:
-        """Indices of the boxes with all of some points inside, ascending."""
-        at, found = points[:, self.axis], []
-        first, last = float(at.min()), float(at.max())
-        for size, order, low in self.kinds:
-            begin = np.searchsorted(low, last - size - 1e-9 * abs(last))
-            near = order[begin : np.searchsorted(low, first, side="right")]
-            found.append(near[((points >= self.low[near][:, None]) & (points <= self.high[near][:, None])).all((1, 2))])
-        return np.sort(np.concatenate(found))
+def _around(points: Array, low: Array, high: Array) -> Iterator[tuple[Array, Array]]:
+    """Numbers of groups of points ``(n, p, 3)``, and of boxes with all points of a group inside; boxes of a size are
+    looked for together, sorted by their lower ends."""
+    axis = int(np.ptp(low, axis=0).argmax())
+    size = (high - low)[:, axis]
+    kind = np.ceil(np.log2(np.maximum(size / size.max(initial=1e-300), 1e-9)))
+    first, last = points.min(axis=1), points.max(axis=1)
+    for each in np.unique(kind):
+        of = np.flatnonzero(kind == each)
+        of = of[np.argsort(low[of, axis], kind="stable")]
+        least, most = low[of, axis], float(size[of].max()) * (1 + 1e-9)
+        begin = np.searchsorted(least, last[:, axis] - most - 1e-9 * np.abs(last[:, axis]))
+        counts = np.maximum(np.searchsorted(least, first[:, axis], side="right") - begin, 0)
+        for part in np.split(np.arange(len(points)), np.flatnonzero(np.diff(np.cumsum(counts) // _MANY)) + 1):
+            i = np.repeat(part, counts[part])
+            step = np.arange(len(i)) - np.repeat(np.cumsum(counts[part]) - counts[part], counts[part])
+            j = of[begin[i] + step]
+            for k in range(3):
+                inside = (low[j, k] <= first[i, k]) & (last[i, k] <= high[j, k])
+                i, j = i[inside], j[inside]
+            yield i, j
 
 
 def length(edge: Edge) -> float:
@@ -149,43 +153,71 @@ def length(edge: Edge) -> float:
     return polygon(edge.points)
 
 
+@kept(4096)
 def apart(model: Model, edge: Edge, other: Edge) -> float:
     """Largest distance of an edge's samples from another edge, mm."""
-    return _laid(model, edge, other)[1]
-
-
-@kept(4096)
-def _laid(model: Model, edge: Edge, other: Edge) -> tuple[Side, float]:
-    """The side of another edge at the samples of an edge, and their largest distance from it, mm."""
-    off, at = _carried(edge.points, other)
+    ((_, _, (off, at)),) = _carried([edge, other], np.array([[0, 1]]))
     far = float(np.linalg.norm(off, axis=1).max())
-    if other.sides[0].uv is None:
-        return _baked(edge.points - off, other), far
-    if far > COARSE * np.linalg.norm(np.diff(other.points, axis=0), axis=1).max():
-        return other.sides[0], far
-    return _sided(model, _seen(model, edge), other, at)
+    return _sided(model, _seen(model, edge), other, at)[1] if _close(other, far) else far
 
 
-def _carried(points: Array, edge: Edge) -> tuple[Array, Array]:
-    """Offsets of ``points`` (k, 3) from an edge, and where they lie among its samples, as fractional indices."""
-    start, chord = edge.points[:-1], np.diff(edge.points, axis=0)
-    square = np.maximum((chord**2).sum(axis=1), np.finfo(float).tiny)
-    low, high = np.zeros(len(chord)), np.ones(len(chord))
-    away = points.T[:, :, None] - start.T[:, None]
-    along = sum(one * step for one, step in zip(away, chord.T, strict=True)) / square
-    middle = along[len(points) // 2]
-    if middle[0] > 0 and middle[-1] < 1:
-        low[0], high[-1] = -BEYOND, 1.0 + BEYOND
-    along = np.clip(along, low, high)
-    off = sum((one - along * step) ** 2 for one, step in zip(away, chord.T, strict=True))
-    segment = off.argmin(axis=1)
-    s = along[np.arange(len(points)), segment][:, None]
-    on = hermite(edge.points, slopes(edge.points, edge.tangents), segment, s)
-    apart = points - on
-    tangent = chord[segment] / np.sqrt(square[segment])[:, None]
-    shift = (apart * tangent).sum(axis=1, keepdims=True)
-    inner = ((s > low[segment][:, None]) & (s < high[segment][:, None])).astype(float)
-    return apart - inner * shift * tangent, segment + s[:, 0]
+def _laid(model: Model, edge: Edge, other: Edge, gap: float, off: Array, at: Array) -> Side | None:
+    """The side of another edge at the samples of an edge, given their offsets and places among its samples; None if
+    they are farther away than a gap."""
+    far = float(np.linalg.norm(off, axis=1).max())
+    if _close(other, far):
+        side, far = _sided(model, _seen(model, edge), other, at)
+        return side if far <= gap else None
+    if far > gap:
+        return None
+    return _baked(edge.points - off, other) if other.sides[0].uv is None else other.sides[0]
+
+
+def _close(edge: Edge, far: float) -> bool:
+    """Whether samples of another edge are so close that the surface of this one's face tells how far they are."""
+    if edge.sides[0].uv is None:
+        return False
+    return bool(far <= COARSE * np.linalg.norm(np.diff(edge.points, axis=0), axis=1).max())
+
+
+def _carried(edges: list[Edge], pairs: Array) -> Iterator[tuple[Edge, Edge, tuple[Array, Array]]]:
+    """For pairs of edges, in order: both, the offsets of the samples of the first from the second, ``(k, 3)``, and where
+    they lie among its samples, as fractional indices."""
+    for block in np.split(pairs, np.arange(_BLOCK, len(pairs), _BLOCK)):
+        members = [(edges[i], edges[j]) for i, j in block.tolist()]
+        laid: list[tuple[Array, Array]] = [(np.empty(0), np.empty(0))] * len(members)
+        sizes = np.array([(len(one.points), len(other.points)) for one, other in members]).reshape(-1, 2)
+        for size in np.unique(sizes, axis=0):
+            own = np.flatnonzero((sizes == size).all(axis=1)).tolist()
+            points = np.stack([members[k][0].points for k in own])
+            onto = (np.stack([getattr(members[k][1], name) for k in own]) for name in ("points", "tangents"))
+            for k, *found in zip(own, *_offsets(points, *onto), strict=True):
+                laid[k] = found[0], found[1]
+        yield from ((one, other, found) for (one, other), found in zip(members, laid, strict=True))
+
+
+def _offsets(points: Array, lines: Array, tangents: Array) -> tuple[Array, Array]:
+    """Offsets ``(p, k, 3)`` of points from sampled curves ``(p, m, 3)``, and where they lie among their samples."""
+    start, chord = lines[:, :-1], np.diff(lines, axis=1)
+    square = np.maximum((chord**2).sum(axis=2), np.finfo(float).tiny)
+    low, high = np.zeros(square.shape), np.ones(square.shape)
+    away = np.moveaxis(points, 2, 0)[..., None] - np.moveaxis(start, 2, 0)[:, :, None]
+    steps = np.moveaxis(chord, 2, 0)[:, :, None]
+    along = (away * steps).sum(axis=0) / square[:, None]
+    middle = along[:, points.shape[1] // 2]
+    open_ones = (middle[:, 0] > 0) & (middle[:, -1] < 1)
+    low[open_ones, 0], high[open_ones, -1] = -BEYOND, 1.0 + BEYOND
+    along = np.clip(along, low[:, None], high[:, None])
+    segment = ((away - along * steps) ** 2).sum(axis=0).argmin(axis=2)
+    row = np.arange(len(points))[:, None]
+    s = np.take_along_axis(along, segment[..., None], axis=2)
+    flat = (segment + row * lines.shape[1]).ravel()
+    on = hermite(lines.reshape(-1, 3), slopes(lines, tangents).reshape(-1, 3), flat, s.reshape(-1, 1))
+    off = points - on.reshape(points.shape)
+    tangent = chord[row, segment] / np.sqrt(square[row, segment])[..., None]
+    shift = (off * tangent).sum(axis=2, keepdims=True)
+    inner = ((s > low[row, segment][..., None]) & (s < high[row, segment][..., None])).astype(float)
+    return off - inner * shift * tangent, segment + s[..., 0]
 
 
 def _seen(model: Model, edge: Edge) -> Array:
