@@ -63,8 +63,7 @@ class Curve:
         poles = homogeneous(self.poles, self.weights)
         first, values = jet(self.knots, t, range(derivatives + 1), side)
         index = (first[:, None] + np.arange(self.knots.degree + 1)) % self.knots.count
-        near = poles[index]
-        stack = np.array([np.einsum("qa,qak->qk", values[:, r], near) for r in range(derivatives + 1)])
+        stack = np.ascontiguousarray(np.matmul(values, poles[index]).swapaxes(0, 1))
         return stack if self.weights is None else _curve_quotient(stack)
 
     def refined(self, extra_knots: Array | Sequence[float]) -> Curve:

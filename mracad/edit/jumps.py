@@ -33,15 +33,16 @@ class Jumps:
     def __init__(self, scene: Scene, nets: Mapping[int, Net], joined: Joints, width: float) -> None:
         self.seams, self.surfaces = [], []
         uses: list[tuple[Edge, Side]] = []
-        for edge, meeting in joined.meetings.items():
+        for edge in scene.meeting(nets):
+            meeting = joined.meetings[edge]
             beside = {scene.model.faces[face].surface for face in meeting.faces}
             if meeting.order == 1 and meeting.sides and joined.jumps and beside.intersection(nets):
                 allowed = scene.tolerances.jump / width + MORE * meeting.bend
-                apart = len(beside & set(scene.sheets)) if edge not in joined.moving else 1
+                apart = len(beside & scene.sheets.keys()) if edge not in joined.moving else 1
                 uses += [(scene.model.edges[edge], side) for side in meeting.sides]
                 self.seams.append((meeting.bend, meeting.bend + allowed / max(apart, 1)))
                 self.surfaces.append(beside.intersection(nets))
-        self.bends = Bends(scene.model, uses, nets)
+        self.bends = Bends(scene.model, uses, nets, scene.still)
 
     def room(self, moved: Mapping[int, Net]) -> dict[int, float]:
         """The share of a displacement that each surface may make, 0 to 1, by index; surfaces that may make all are left

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -51,6 +52,8 @@ class Scene:
     tolerances : Tolerances
     refine : bool
         Whether control points may be added beside rims.
+    still : dict of int to ndarray
+        Curvatures at edges of faces beside surfaces that move, once known: see :class:`mracad.seam.sides.Bends`.
     """
 
     model: Model
@@ -58,6 +61,22 @@ class Scene:
     joints: Joints
     tolerances: Tolerances
     refine: bool = True
+    still: dict[int, Array] = field(default_factory=dict)
+
+    def meeting(self, surfaces: Iterable[int]) -> list[int]:
+        """The edges at which surfaces meet any others or themselves, in the order of all."""
+        return [edge for _, edge in sorted({each for i in surfaces for each in self._meetings.get(i, ())})]
+
+    @cached_property
+    def _meetings(self) -> dict[int, list[tuple[int, int]]]:
+        """Positions of meetings, and their edges, by surface."""
+        found: dict[int, list[tuple[int, int]]] = {}
+        for position, (edge, meeting) in enumerate(self.joints.meetings.items()):
+            for face in meeting.faces:
+                surface = self.model.faces[face].surface
+                if surface is not None:
+                    found.setdefault(surface, []).append((position, edge))
+        return found
 
     def allowed(self, contact: Contact, joined: Joints, width: float) -> tuple[float, float, float]:
         """By how much the gap (mm), the slope and the curvature (1/mm) of a contact may grow.

@@ -159,7 +159,8 @@ class Tried:
         found: dict[int, dict[int, Change]] = {i: {} for i in new}
         for k, change in self.ramp.changes({k: amounts[self.watch.owners[k][0]] for k in those}).items():
             place, face = self.watch.owners[k]
-            found[place][face] = replace(change, goal=self.watch.goals.get(face))
+            goal = self.watch.goals.get(face)
+            found[place][face] = replace(change, goal=goal) if goal else change
         for i, faces in found.items():
             self._seen[i][amounts[i]] = faces
         return {i: self._seen[i][amount] for i, amount in amounts.items()}

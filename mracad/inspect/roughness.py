@@ -28,7 +28,8 @@ class Rougher(Enum):
     SPREAD = "new waves in smooth places"
 
 
-SUMS = Rougher.BENDING, Rougher.VARIATION
+SUMS = {Rougher.BENDING: "bending", Rougher.VARIATION: "variation"}
+"""Figures that are integrals over a face, and their names."""
 
 SETTLED = 0.005
 """Share by which the curvature at singular points may change."""
@@ -98,7 +99,8 @@ class Change:
 
     def start(self, figure: str) -> float:
         """A figure before, or of what was asked for if that is larger."""
-        return max(float(getattr(each, figure)) for each in (self.before, self.goal) if each)
+        before = float(getattr(self.before, figure))
+        return before if self.goal is None else max(before, float(getattr(self.goal, figure)))
 
     @property
     def spread(self) -> float:
@@ -167,9 +169,9 @@ def worse(change: Change, allowed: Growth) -> tuple[Worse, ...]:
     """The figures by which a change made faces rougher than allowed, in the order of :class:`Rougher`."""
     before, after, noise = change.before, change.after, change.noise
     found = [
-        Worse(what, *(float(getattr(each, what.name.lower())) for each in (before, after)))
-        for what in SUMS
-        if _grown(change, what, allowed)
+        Worse(what, getattr(before, figure), getattr(after, figure))
+        for what, figure in SUMS.items()
+        if _grown(change, figure, allowed)
     ]
     if after.curvature > _most(change.start("curvature"), allowed.curvature) + noise.curvature:
         found.append(Worse(Rougher.CURVATURE, before.curvature, after.curvature))
@@ -185,11 +187,10 @@ def worse(change: Change, allowed: Growth) -> tuple[Worse, ...]:
     return tuple(found)
 
 
-def _grown(change: Change, what: Rougher, allowed: Growth) -> bool:
+def _grown(change: Change, figure: str, allowed: Growth) -> bool:
     """Whether total bending or curvature variation grew by more than allowed."""
-    name = what.name.lower()
-    new, ripple, share = (float(getattr(each, name)) for each in (change.after, change.noise, allowed))
-    return new > max(_most(change.start(name), share), ripple)
+    most = _most(change.start(figure), getattr(allowed, figure))
+    return bool(getattr(change.after, figure) > max(most, getattr(change.noise, figure)))
 
 
 def _most(old: float, share: float) -> float:
@@ -205,7 +206,7 @@ def places(change: Change, allowed: Growth) -> Array:
     opened = np.radians(allowed.kink + change.noise.kink) if allowed.each else np.inf
     steep = (found.turn > np.radians(allowed.fold)) | (found.opened > opened)
     rough = (found.spread > allowed.spread) | (found.curvature > most)
-    grown = [_grown(change, what, allowed) for what in SUMS]
+    grown = [_grown(change, figure, allowed) for figure in SUMS.values()]
     more = (found.rise[grown] > 1.0).any(axis=0)
     return np.asarray(steep | rough | more | (found.unsettled > max(allowed.singular, allowed.curvature)))
 

@@ -48,12 +48,18 @@ class Bends:
     uses : sequence of (Edge, Side)
     nets : mapping of int to Net
         The surfaces that move, over the knots of their displacements, by index.
+    still : dict of int to ndarray
+        What is known of sides that did not move, by the identity of each; more is added.
     """
 
-    def __init__(self, model: Model, uses: Sequence[tuple[Edge, Side]], nets: Mapping[int, Net]) -> None:
+    def __init__(
+        self, model: Model, uses: Sequence[tuple[Edge, Side]], nets: Mapping[int, Net], still: dict[int, Array]
+    ) -> None:
         moving = [side.uv is not None and model.faces[side.face].surface in nets for _, side in uses]
-        before = iter(views(model, [use for use, moves in zip(uses, moving, strict=True) if not moves]))
-        self._found = [np.empty(0) if moves else next(before)[:, 6] for moves in moving]
+        new = [use for use, moves in zip(uses, moving, strict=True) if not moves and id(use[1]) not in still]
+        still |= {id(side): seen[:, 6].copy() for (_, side), seen in zip(new, views(model, new), strict=True)}
+        both = zip(uses, moving, strict=True)
+        self._found = [np.empty(0) if moves else still[id(side)] for (_, side), moves in both]
         self._strips = list(_strips(model, {i: use for i, use in enumerate(uses) if moving[i]}, nets))
         if self._strips:
             self._functions = Scattered([strip.place for strip in self._strips], 2)
@@ -94,16 +100,19 @@ class _Strip:
 def _strips(model: Model, uses: Mapping[int, tuple[Edge, Side]], nets: Mapping[int, Net]) -> Iterator[_Strip]:
     """The samples of edges that lie on surfaces, some of which have other knots than in the model."""
     groups: dict[tuple[int, tuple[Limit, Limit]], list[tuple[int, Array]]] = defaultdict(list)
-    known = {surface.index: surface.net for surface in model.surfaces} | dict(nets)
+
+    def known(surface: int) -> Net:
+        return nets[surface] if surface in nets else model.surfaces[surface].net
+
     for i, (edge, side) in uses.items():
         face = model.faces[side.face]
         if side.uv is not None and face.surface is not None:
-            uv, limits = from_inside(face, known[face.surface], edge.index, side.uv)
+            uv, limits = from_inside(face, known(face.surface), edge.index, side.uv)
             groups[side.face, limits].append((i, uv))
     for (number, limits), members in groups.items():
         face = model.faces[number]
         assert face.surface is not None
-        place = known[face.surface], np.concatenate([uv for _, uv in members]), limits
+        place = known(face.surface), np.concatenate([uv for _, uv in members]), limits
         yield _Strip(face, face.surface, place, [i for i, _ in members])
 
 
