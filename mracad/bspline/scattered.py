@@ -105,15 +105,16 @@ class _Batch:
         Numbers of the parameters.
     firsts : list of int
         Places on different surfaces.
-    index : ndarray of int (q, du + 1, dv + 1)
-        Control points that matter, of the surfaces there one after another.
+    rows, columns : ndarray of int (q, d + 1)
+        Numbers whose sums are those of control points that matter, of the surfaces there one after another.
     in_u, in_v : ndarray (q, derivatives + 1, d + 1)
         Values and derivatives of their functions.
     """
 
     at: Array
     firsts: list[int]
-    index: Array
+    rows: Array
+    columns: Array
     in_u: Array
     in_v: Array
 
@@ -132,11 +133,12 @@ class _Batch:
         begin, count_u, count_v = np.repeat(layout, [len(uv) for _, uv, _ in places], axis=0).T[..., None]
         row = (np.concatenate(first_u)[:, None] + np.arange(net.u.degree + 1)) % count_u
         column = (np.concatenate(first_v)[:, None] + np.arange(net.v.degree + 1)) % count_v
-        index = (begin + row * count_v)[:, :, None] + column[:, None, :]
-        return cls(at, list(firsts.values()), index, np.concatenate(in_u), np.concatenate(in_v))
+        rows, functions = begin + row * count_v, (np.concatenate(in_u), np.concatenate(in_v))
+        return cls(at, list(firsts.values()), rows, column, *functions)
 
     def evaluate(self, nets: Sequence[Net]) -> tuple[Array, ...]:
         """Points and derivatives, given the surfaces of all places."""
         own = [nets[i] for i in self.firsts]
         poles = [(each := homogeneous(net.poles, net.weights)).reshape(-1, each.shape[-1]) for net in own]
-        return evaluated(np.concatenate(poles)[self.index], self.in_u, self.in_v, own[0].weights is not None)
+        places, functions = (self.rows, self.columns), (self.in_u, self.in_v)
+        return evaluated(np.concatenate(poles), places, functions, own[0].weights is not None)

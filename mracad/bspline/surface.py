@@ -13,10 +13,12 @@ from numpy.typing import ArrayLike
 from mracad.brief import line
 from mracad.bspline.basis import SHORT, jet
 from mracad.bspline.curve import check_weights, euclidean, homogeneous
+from mracad.bspline.gather import GATHER
 from mracad.bspline.knots import Array, KnotVector, Side
 from mracad.bspline.refine import refinement
 from mracad.bspline.rows import Rows
 from mracad.bspline.vectors import cross
+from mracad.compiled import pointer
 from mracad.errors import UsageError
 from mracad.memo import kept
 
@@ -199,13 +201,14 @@ class Collocation:
 
     Attributes
     ----------
-    index : ndarray of int (q, du + 1, dv + 1)
-        Control points, u-major.
+    rows, columns : ndarray of int (q, d + 1)
+        Numbers whose sums are those of the control points, u-major.
     in_u, in_v : ndarray (q, derivatives + 1, d + 1)
         Values and derivatives of the functions of each.
     """
 
-    index: Array
+    rows: Array
+    columns: Array
     in_u: Array
     in_v: Array
 
@@ -216,33 +219,47 @@ class Collocation:
         first_v, in_v = jet(v, uv[:, 1], range(derivatives + 1), side[1])
         row = (first_u[:, None] + np.arange(u.degree + 1)) % u.count
         column = (first_v[:, None] + np.arange(v.degree + 1)) % v.count
-        return cls(row[:, :, None] * v.count + column[:, None, :], in_u, in_v)
+        return cls(row * v.count, column, in_u, in_v)
 
     def evaluate(self, net: Net) -> tuple[Array, ...]:
         """Points and derivatives, ``(q, k)`` each, in the order of :meth:`Net.evaluate`."""
         poles = homogeneous(net.poles, net.weights)
-        local = poles.reshape(-1, poles.shape[2])[self.index]
-        return evaluated(local, self.in_u, self.in_v, net.weights is not None)
+        places = self.rows, self.columns
+        return evaluated(poles.reshape(-1, poles.shape[2]), places, (self.in_u, self.in_v), net.weights is not None)
 
 
-def evaluated(local: Array, in_u: Array, in_v: Array, rational: bool) -> tuple[Array, ...]:
+def evaluated(
+    poles: Array, places: tuple[Array, Array], functions: tuple[Array, Array], rational: bool
+) -> tuple[Array, ...]:
     """Points and derivatives in the order of :meth:`Net.evaluate`, ``(q, k)`` each.
 
     Parameters
     ----------
-    local : ndarray (q, du + 1, dv + 1, k)
-        The control points that matter for each, homogeneous if rational.
-    in_u, in_v : ndarray (q, derivatives + 1, d + 1)
+    poles : ndarray (points, k)
+        Control points, homogeneous if rational.
+    places : pair of ndarray of int (q, du + 1) and (q, dv + 1)
+        Numbers whose sums are those of the control points that matter.
+    functions : pair of ndarray (q, derivatives + 1, d + 1)
         Values and derivatives of their functions.
     rational : bool
     """
-    q, a, b, k = local.shape
-    count = in_u.shape[1]
-    partial = np.matmul(in_u, local.reshape(q, a, b * k)).reshape(q, count, b, k)
-    full = np.matmul(in_v[:, None], partial)
+    (rows, columns), (in_u, in_v), k = places, functions, poles.shape[1]
+    (q, count, a), b = in_u.shape, in_v.shape[2]
     orders = [order for total in range(count) for order in _pairs(total)]
-    stack = tuple(np.ascontiguousarray(full[:, r, s]) for r, s in orders)
-    return surface_quotient(stack) if rational else stack
+    found = np.zeros((len(orders), q, k))
+    if GATHER.pays(q):
+        held = [np.ascontiguousarray(each) for each in (poles, rows, columns, in_u, in_v)]
+        at_poles, at_rows, at_columns, at_u, at_v = map(pointer, held)
+        memory = np.empty(count * b * k)
+        GATHER(at_poles, k, at_rows, at_columns, q, a, b, at_u, at_v, count, pointer(found), pointer(memory))
+    else:
+        local, partial = poles[rows[:, :, None] + columns[:, None]], np.zeros((q, count, b, k))
+        for i in range(a):
+            partial += in_u[:, :, i, None, None] * local[:, None, i]
+        for one, (r, s) in zip(found, orders, strict=True):
+            for j in range(b):
+                one += in_v[:, s, j, None] * partial[:, r, j]
+    return surface_quotient(tuple(found)) if rational else tuple(found)
 
 
 def pairs(us: ArrayLike, vs: ArrayLike) -> Array:

@@ -4,6 +4,7 @@ import pytest
 from mracad.bspline.curve import Curve
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
+from mracad.compiled import Compiled
 from mracad.errors import UsageError
 from tests.bspline.spaces import KINDS, random_knots
 
@@ -191,3 +192,13 @@ def test_shapes_are_checked():
         Net(kv, kv, np.zeros((3, 3, 3)), np.zeros((3, 3)))
     with pytest.raises(UsageError):
         Curve(kv, np.zeros((3, 3)), np.ones(2))
+
+
+@pytest.mark.parametrize("rational", [False, True])
+def test_compiled_code_and_arrays_give_the_same_bits(rational, monkeypatch):
+    net, found = random_net("periodic", "clamped", rational), []
+    for used in (True, False):
+        monkeypatch.setattr(Compiled, "pays", lambda self, work, used=used: used)
+        found.append(net.evaluate(places(net), 2))
+    for compiled, arrays in zip(*found, strict=True):
+        np.testing.assert_array_equal(compiled, arrays)
