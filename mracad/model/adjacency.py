@@ -181,8 +181,8 @@ def _close(edge: Edge, far: float) -> bool:
 
 
 def _carried(edges: list[Edge], pairs: Array) -> Iterator[tuple[Edge, Edge, tuple[Array, Array]]]:
-    """For pairs of edges, in order: both, the offsets of the samples of the first from the second, ``(k, 3)``, and where
-    they lie among its samples, as fractional indices."""
+    """For pairs of edges, in order: both, the offsets of the samples of the first from the second, ``(k, 3)``, and
+    where they lie among its samples, as fractional indices."""
     for block in np.split(pairs, np.arange(_BLOCK, len(pairs), _BLOCK)):
         members = [(edges[i], edges[j]) for i, j in block.tolist()]
         laid: list[tuple[Array, Array]] = [(np.empty(0), np.empty(0))] * len(members)
