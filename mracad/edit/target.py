@@ -297,9 +297,10 @@ def _sheet(asked: Asked, wish: Wish) -> Sheet:
     metric = smoothed(net, points, SMOOTHER**4 * stiffness(wavelength), stretch)
     form = forms(net, metric, points, sharp, stretch)
     depends = seen(net, form)
-    finer = stretch.limit.finer(net, stretch.times(TREND * wavelength)) if stretch.limit else None
-    trend = at_scale(net, stretch.times(TREND * wavelength), sharp, finer)
-    base = at_scale(net, stretch.times(BASE * wavelength), sharp)
+    trend, base = (
+        at_scale(net, lengths, sharp, stretch.limit.finer(net, lengths) if stretch.limit else None)
+        for lengths in (stretch.times(TREND * wavelength), stretch.times(BASE * wavelength))
+    )
     if not _follows(trend, net, metric, form):
         trend = net.with_poles(np.zeros_like(net.poles))
     sheet = _prepared(asked, metric, trend, base, form=form, depends=depends)
