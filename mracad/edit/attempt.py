@@ -93,7 +93,7 @@ def _limited(moved: Mapping[int, Moved], found: Sequence[Verdict]) -> dict[int, 
 
 def _best(trial: Trial, members: Mapping[int, Sheet], found: list[Verdict], target: Array) -> dict[int, Moved]:
     """The best result after verdicts, to which those on combinations are added."""
-    if len(members) > 1:
+    if len(members) > 1 and not trial.tolerances.whole:
         _blend(trial, target, found)
     return _confirmed(trial, members, found, target)
 
@@ -114,7 +114,7 @@ def _ways(trial: Trial, wish: Wish, target: Array, nothing: Verdict) -> tuple[li
             if verdict.least == 1.0 and NEARER * verdict.gain >= most:
                 return ([*found, verdict], left[:-1]) if several else (found, [])
         _judge(trial, left, found)
-        if max(found, key=rank).least <= ENOUGH:
+        if max(found, key=rank).least <= ENOUGH and not trial.tolerances.whole:
             for each in found[first:]:
                 found.append(trial.eased(each, target, found))
         if max(found, key=rank).least > ENOUGH:

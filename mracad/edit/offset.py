@@ -7,31 +7,39 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
 
 from mracad.bspline.fit import Knots, divided, middles, missing, offsets_over, spans, through
 from mracad.bspline.surface import Net, pairs
-from mracad.edit.result import Edit
+from mracad.edit.result import Edit, Reason
 from mracad.edit.target import Sheet, Wish, stiffness
 from mracad.edit.tolerances import RESHAPED
 from mracad.edit.whole import edited
 from mracad.inspect.roughness import Growth
 from mracad.model.brep import Face, Model
+from mracad.model.cells import quadrature
 from mracad.seam.interface import Joints
 from mracad.seam.ladders import Creases
 from mracad.seam.solve import Problem
 from mracad.seam.space import MOST_POINTS
 from mracad.spec.quantity import length
 from mracad.spec.select import Scope
+from mracad.spec.select import scope as scope_of
 from mracad.spec.steps.smooth import OffsetFaces
 
 Array = np.ndarray
 
 MISSED, LEAST = 1e-4, 0.25
 """Shares of the distance: the allowed error of splines, and the shortest spans into which they are divided."""
+
+RIM = 64
+"""Points of each edge at which faces are asked how tightly they bend, besides those of quadrature."""
+
+POLE = 1e-8
+"""Square of the area element, over the largest, below which a point is a pole, which tells no curvature."""
 
 FADE = 8.0
 """Number of distances within which an offset fades beside what is held: it tilts faces by at most 13° there."""
@@ -108,4 +116,35 @@ def offset(
     assert options.distance is not None
     distance = length(options.distance, model.diagonal, "distance")
     wish = Outward(-distance if options.inward else distance, options.refine == "auto")
-    return edited(model, options, wish, scope, progress)
+    scope = scope or scope_of(model, options)
+    tight = {i: _tightest(model, model.faces[i], wish.distance) for i in scope.movable(model)}
+    folded = {i: radius for i, radius in tight.items() if radius <= distance}
+    edit = edited(model, options, wish, replace(scope, faces=scope.faces - folded.keys()), progress)
+    outcomes = list(edit.outcomes)
+    for i, radius in folded.items():
+        outcomes[i] = replace(
+            outcomes[i], status="left", reason=Reason.FOLDED, said=f"bends with a radius of {radius:.3g} mm"
+        )
+    return replace(edit, outcomes=tuple(outcomes))
+
+
+def _tightest(model: Model, face: Face, distance: float) -> float:
+    """The least radius with which a face bends towards the side to which it is offset, mm: an offset by more folds.
+
+    S + d n has the area element (1 − d κ₁) (1 − d κ₂) |S_u × S_v|.
+    """
+    assert face.surface is not None
+    net = model.surfaces[face.surface].net
+    rule = quadrature(net, [face])
+    rims = [trim.curve.evaluate(np.linspace(*trim.curve.knots.domain, RIM))[0] for trim in face.trims]
+    uv = np.concatenate([pairs(rule.u.ravel(), rule.v.ravel())[rule.mask.ravel()], *rims])
+    _, su, sv, suu, suv, svv = net.evaluate(uv, 2)
+    e, f, g = ((a * b).sum(axis=1) for a, b in ((su, su), (su, sv), (sv, sv)))
+    area = e * g - f * f
+    sound = area > POLE * area.max()
+    normals = net.normals(uv) * math.copysign(1.0, -distance if face.reversed else distance)
+    ll, mm, nn = ((each * normals).sum(axis=1) for each in (suu, suv, svv))
+    mean, total = ((each[sound] / area[sound]) for each in ((e * nn - 2 * f * mm + g * ll) / 2, ll * nn - mm * mm))
+    bends = mean + np.sqrt(np.maximum(mean * mean - total, 0.0))
+    most = float(np.nanmax(bends, initial=0.0))
+    return 1 / most if most > 0.0 else math.inf

@@ -107,6 +107,15 @@ def test_what_would_fold_is_left():
     assert outcome.status == "left" and not edit.displacement.offsets and "fold" in outcome.words
 
 
+def test_what_bends_more_tightly_than_the_distance_is_left():
+    """Rounded edges have no offset inward by more than their radius, whatever their seams allow; outward they have."""
+    box = body(zoo.rounded_box().val().wrapped)
+    edit = offset(box, OffsetFaces(distance="4.1mm", inward=True))
+    folded = [outcome for outcome in edit.outcomes if outcome.words == "would fold: bends with a radius of 4 mm"]
+    assert len(folded) == 20 and all(outcome.status == "left" for outcome in folded)
+    assert len(offset(box, OffsetFaces(distance="4.1mm")).faces("edited")) == 26
+
+
 def test_the_command_writes_what_is_asked_for(tmp_path):
     source, target, report = grounds.save(tmp_path / "in.step", grounds.uneven()), tmp_path / "out.step", tmp_path / "r"
     assert main(["offset", str(source), "-o", str(target), "--distance", "0.2cm", "--report", str(report)]) == 0
