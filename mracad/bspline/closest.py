@@ -36,7 +36,8 @@ def distances(net: Net, points: Array) -> Array:
     beyond = np.any([(x < low) | (x > high) for x, (low, high) in zip(uv.T, around, strict=True)], axis=0)
     more = beyond[:, None] | (np.abs(places[:, 1:] - places[:, :1]) > 1).any(axis=-1)
     point, seed = np.nonzero(more)
-    np.minimum.at(best, point, _descend(net, points[point], starts[point, seed + 1])[1])
+    if len(point):
+        np.minimum.at(best, point, _descend(net, points[point], starts[point, seed + 1])[1])
     return best
 
 
@@ -71,7 +72,7 @@ def feet(net: Net, points: Array, uv: Array) -> tuple[Array, Array]:
     uv, best = _descend(net, points, uv)
     # near their minimum, distances hardly depend on parameters
     low, high = _limits(net)
-    tried = np.clip(uv + _newton(net, points, uv, low, high)[0], low, high)
+    tried = np.clip(uv + _newton(np.stack(net.evaluate(uv, 2)), points, uv, low, high)[0], low, high)
     good = np.linalg.norm(net.evaluate(tried) - points, axis=1) <= best * (1 + 1e-15)
     return np.where(good[:, None], tried, uv), best
 
@@ -87,10 +88,11 @@ def _descend(net: Net, points: Array, uv: Array) -> tuple[Array, Array]:
     """Parameters that Newton's method reaches from given ones, and distances there."""
     low, high = _limits(net)
     uv = np.clip(uv, low, high)
-    best = np.linalg.norm(net.evaluate(uv) - points, axis=1)
+    jets = np.stack(net.evaluate(uv, 2))
+    best = np.linalg.norm(jets[0] - points, axis=1)
     active, extent = np.arange(len(points)), float(np.linalg.norm(np.ptp(net.poles, axis=(0, 1))))
     for _ in range(_STEPS):
-        step, length = _newton(net, points[active], uv[active], low, high)
+        step, length = _newton(jets[:, active], points[active], uv[active], low, high)
         far = length > np.maximum(_SETTLED[0] * extent, _SETTLED[1] * best[active])
         active, step = active[far], step[far]
         moved = np.zeros(len(active), bool)
@@ -98,10 +100,11 @@ def _descend(net: Net, points: Array, uv: Array) -> tuple[Array, Array]:
         while share > 1e-3 and not moved.all():
             rest = ~moved
             tried = np.clip(uv[active[rest]] + share * step[rest], low, high)
-            there = np.linalg.norm(net.evaluate(tried) - points[active[rest]], axis=1)
+            found = np.stack(net.evaluate(tried, 2))
+            there = np.linalg.norm(found[0] - points[active[rest]], axis=1)
             nearer = there < best[active[rest]] * (1 - 1e-15)
             which = active[rest][nearer]
-            uv[which], best[which] = tried[nearer], there[nearer]
+            uv[which], best[which], jets[:, which] = tried[nearer], there[nearer], found[:, nearer]
             moved[np.flatnonzero(rest)[nearer]] = True
             share /= 4
         active = active[moved]
@@ -110,9 +113,9 @@ def _descend(net: Net, points: Array, uv: Array) -> tuple[Array, Array]:
     return uv, best
 
 
-def _newton(net: Net, points: Array, uv: Array, low: Array, high: Array) -> tuple[Array, Array]:
-    """One step each, and how far it goes on the surface."""
-    s, su, sv, suu, suv, svv = net.evaluate(uv, 2)
+def _newton(jets: Array, points: Array, uv: Array, low: Array, high: Array) -> tuple[Array, Array]:
+    """One step each, and how far it goes on the surface, given its points and derivatives there."""
+    s, su, sv, suu, suv, svv = jets
     r = s - points
     gradient = np.stack([(r * su).sum(1), (r * sv).sum(1)], axis=1)
     a, b, c = (su * su).sum(1), (su * sv).sum(1), (sv * sv).sum(1)

@@ -21,6 +21,7 @@ from OCP.TColStd import TColStd_Array1OfInteger, TColStd_Array1OfReal, TColStd_A
 from mracad.bspline.curve import Curve
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
+from mracad.memo import kept
 
 Array = np.ndarray
 _KNOTS = np.dtype([("knot", "<f8"), ("mult", "<i4")])
@@ -180,8 +181,14 @@ def _poles(stream: _Stream, shape: tuple[int, ...], dimension: int, rational: in
 
 
 def _knots(stream: _Stream, count: int, degree: int, periodic: bool) -> KnotVector:
-    table = stream.take(_KNOTS, count)
-    return KnotVector.from_multiplicities(table["knot"], table["mult"], degree, periodic)
+    return _vector(stream.take(_KNOTS, count).tobytes(), degree, periodic)
+
+
+@kept(4096)
+def _vector(table: bytes, degree: int, periodic: bool) -> KnotVector:
+    """The vector of a table of knots, which many curves and surfaces share."""
+    knots = np.frombuffer(table, _KNOTS)
+    return KnotVector.from_multiplicities(knots["knot"], knots["mult"], degree, periodic)
 
 
 def _spline(curve: Geom2d_Curve, first: float, last: float) -> Geom2d_BSplineCurve | None:
