@@ -35,6 +35,9 @@ Array = np.ndarray
 MISSED, LEAST = 1e-4, 0.25
 """Shares of the distance: the allowed error of splines, and the shortest spans into which they are divided."""
 
+REACHED = 0.5
+"""Share of the distance that must be reached somewhere: nearer to what is held on all sides, faces are left."""
+
 RIM = 64
 """Points of each edge at which faces are asked how tightly they bend, besides those of quadrature."""
 
@@ -100,7 +103,10 @@ class Outward(Wish):
     def ways(self, problem: Problem, target: Array, width: float) -> Iterable[Iterable[Array]]:
         """The nearest displacement that seams allow; it fades beside what is held."""
         if problem.rimmed:
-            target = problem.fading(width) * target
+            share = problem.fading(width)
+            if share.max() < REACHED:
+                return
+            target = share * target
         yield [problem.nearest(target, stiff, beyond=True) for stiff in (0.0, stiffness(width / 8))]
 
 
@@ -121,10 +127,9 @@ def offset(
     folded = {i: radius for i, radius in tight.items() if radius <= distance}
     edit = edited(model, options, wish, replace(scope, faces=scope.faces - folded.keys()), progress)
     outcomes = list(edit.outcomes)
-    for i, radius in folded.items():
-        outcomes[i] = replace(
-            outcomes[i], status="left", reason=Reason.FOLDED, said=f"bends with a radius of {radius:.3g} mm"
-        )
+    said = f"bends with radii down to {min(folded.values(), default=0.0):.3g} mm"
+    for i in folded:
+        outcomes[i] = replace(outcomes[i], status="left", reason=Reason.FOLDED, said=said)
     return replace(edit, outcomes=tuple(outcomes))
 
 

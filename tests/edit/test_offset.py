@@ -100,6 +100,13 @@ def test_what_is_held_stays():
     assert abs(points(edit.displacement.applied(flat))[:, 2].max() - DISTANCE) < 1e-2
 
 
+def test_what_is_too_narrow_to_reach_the_distance_is_left():
+    """Sides of a box 50 mm wide would fade over 8 × 10 mm from each of their edges."""
+    box = body(BRepPrimAPI_MakeBox(50.0, 50.0, 50.0).Shape())
+    outcomes = offset(box, OffsetFaces(distance="10mm")).outcomes
+    assert {each.words for each in outcomes} == {"can hardly move with its edges held"}
+
+
 def test_what_would_fold_is_left():
     """A cylinder has no offset beyond its axis; less than was asked for is not done instead."""
     edit = offset(sheet(grounds.cylinder(40.0, 120.0)), OffsetFaces(distance="60mm", inward=True))
@@ -111,7 +118,7 @@ def test_what_bends_more_tightly_than_the_distance_is_left():
     """Rounded edges have no offset inward by more than their radius, whatever their seams allow; outward they have."""
     box = body(zoo.rounded_box().val().wrapped)
     edit = offset(box, OffsetFaces(distance="4.1mm", inward=True))
-    folded = [outcome for outcome in edit.outcomes if outcome.words == "would fold: bends with a radius of 4 mm"]
+    folded = [outcome for outcome in edit.outcomes if outcome.words == "would fold: bends with radii down to 4 mm"]
     assert len(folded) == 20 and all(outcome.status == "left" for outcome in folded)
     assert len(offset(box, OffsetFaces(distance="4.1mm")).faces("edited")) == 26
 

@@ -218,7 +218,7 @@ class OffsetFaces(Fitting, frozen=True, kw_only=True, forbid_unknown_fields=True
 
     @property
     def done(self) -> str:
-        return f"offset {'inward' if self.inward else 'outward'} by {self.distance}"
+        return f"offset {'inward' if self.inward else 'outward'} by {worded(self.distance)}"
 
     @property
     def quiet(self) -> str:
