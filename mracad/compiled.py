@@ -13,14 +13,15 @@ import hashlib
 import os
 from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property, partial
-from importlib.metadata import version
 from importlib.util import cache_from_source
 from pathlib import Path
 from types import FunctionType
 from typing import TYPE_CHECKING, Any
 
-from mracad import cache, flat, note
+from mracad.cache import SEAL, find, keep, sealed
 from mracad.errors import MracadError
+from mracad.flat import flat, is_flat, placed, processor
+from mracad.note import COMPILING, doing
 from mracad.output import put
 
 _NUMBERS = {"float64": ctypes.c_double, "int64": ctypes.c_int64}
@@ -92,9 +93,11 @@ class Compiled:
 
     @cached_property
     def _key(self) -> bytes:
+        from importlib.metadata import version  # 10 ms, which small models need not wait for
+
         parts = (self._function, *self._helpers, *self._inlined)
         sources = b"".join(Path(each).read_bytes() for each in sorted({part.__code__.co_filename for part in parts}))
-        about = "|".join([version("llvmlite"), flat.processor() or _processor(), repr(self._arguments)])
+        about = "|".join([version("llvmlite"), processor() or _processor(), repr(self._arguments)])
         return hashlib.sha256(sources + about.encode()).digest()
 
     @cached_property
@@ -111,11 +114,11 @@ class Compiled:
 
     def _on_disk(self) -> bytes | None:
         """The machine code on disk, if it is whole."""
-        for place in (self._beside, cache.find(self._name)):
+        for place in (self._beside, find(self._name)):
             with contextlib.suppress(OSError):
                 data = place.read_bytes() if place else b""
-                if data.startswith(self._key) and cache.sealed(data[: -cache.SEAL]) == data:
-                    return data[len(self._key) : -cache.SEAL]
+                if data.startswith(self._key) and sealed(data[:-SEAL]) == data:
+                    return data[len(self._key) : -SEAL]
         return None
 
     def _made(self) -> bytes:
@@ -124,13 +127,13 @@ class Compiled:
             found = self._on_disk()
             if found is not None:
                 return found
-            note.doing(note.COMPILING)
+            doing(COMPILING)
             code = self._compiled()
             try:
                 self._beside.parent.mkdir(parents=True, exist_ok=True)
-                put(cache.sealed(self._key + code), self._beside)
+                put(sealed(self._key + code), self._beside)
             except (OSError, MracadError):
-                cache.keep(self._name, cache.sealed(self._key + code))
+                keep(self._name, sealed(self._key + code))
             return code
 
     def _compiled(self) -> bytes:
@@ -153,7 +156,7 @@ class Compiled:
         passes = binding.create_new_module_pass_manager()
         passes.add_global_dead_code_eliminate_pass()
         passes.run(module, binding.create_pass_builder(machine, binding.create_pipeline_tuning_options()))
-        return flat.flat(machine.emit_object(module), _NAME)
+        return flat(machine.emit_object(module), _NAME)
 
     def _linked(self, compiler: Callable[..., Any]) -> Function:
         """The function, with helpers that are compiled when it is."""
@@ -167,7 +170,7 @@ class Compiled:
         return FunctionType(self._function.__code__, self._function.__globals__ | names, self._function.__name__)
 
     def _load(self, code: bytes) -> Callable[..., None]:
-        owner, start = flat.placed(code) if flat.is_flat(code) else _linked_by_compiler(code)
+        owner, start = placed(code) if is_flat(code) else _linked_by_compiler(code)
         _owners.append(owner)
         names = [name for group in self._arguments for name in group]
         kinds: Any = [ctypes.c_void_p if name.endswith("*") else _NUMBERS[name] for name in names]

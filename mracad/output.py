@@ -11,8 +11,8 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import IO, BinaryIO
 
-from mracad import note
 from mracad.errors import FileError
+from mracad.note import ending
 from mracad.store import Location, Url, location
 
 PREFIX = ".mracad-"
@@ -47,7 +47,7 @@ def beside(target: str | os.PathLike, prefix: str = PREFIX) -> Iterator[Path]:
             yield made
             with _writing(path):
                 os.fsync(held.fileno())
-        note.ending()
+        ending()
         with _writing(path):
             made.chmod(_mode(path))
             made.replace(path)
@@ -89,7 +89,7 @@ def put_all(
             with _writing(path):
                 made.write_bytes(data)
         for url, data in remote:
-            note.ending()
+            ending()
             url.write_bytes(data)
         last()
 

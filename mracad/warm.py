@@ -13,6 +13,7 @@ from importlib.util import find_spec
 
 import numpy as np
 
+from mracad.bspline.band import BAND
 from mracad.bspline.boor import EVALUATE
 from mracad.bspline.gather import GATHER
 from mracad.bspline.knots import KnotVector
@@ -34,7 +35,7 @@ def warm() -> None:
         found = find_spec(package)
         for folder in (found.submodule_search_locations or ()) if found else ():
             compile_dir(folder, quiet=2)
-    for code in (EVALUATE, GATHER, COMBINE, FRAME, CURVE, LOOK, SQUARE, PLACE, MIRROR, COMPARE, SWEEP):
+    for code in (EVALUATE, BAND, GATHER, COMBINE, FRAME, CURVE, LOOK, SQUARE, PLACE, MIRROR, COMPARE, SWEEP):
         code.prepare()
     rungs = rungs_by_level(KnotVector.clamped(np.arange(COUNT - 2.0), 3))[:3]
     reconstruct(decompose(np.zeros((COUNT, COUNT, 3)), rungs, rungs))

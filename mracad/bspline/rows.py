@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mracad.bspline.band import BAND
 from mracad.bspline.knots import Array
+from mracad.compiled import pointer
 from mracad.errors import UsageError
 
 if TYPE_CHECKING:
@@ -15,9 +18,6 @@ if TYPE_CHECKING:
 
 LARGE = 200_000
 """Number of values above which compiled sweeps are worth importing their compiler."""
-
-_BLOCK = 1 << 20
-"""Number of values that are gathered at once."""
 
 
 class Rows:
@@ -80,14 +80,21 @@ class Rows:
             from mracad.bspline import sweeps
 
             return sweeps.apply(self, c, axis % c.ndim)
-        moved = c.swapaxes(0, axis)
-        flat = moved.reshape(self.columns, -1)
-        out = np.empty((len(self.start), 1, flat.shape[1]))
-        step = max(1, _BLOCK // max(flat.shape[1] * self.values.shape[1], 1))
-        for begin in range(0, len(out), step):
-            part = slice(begin, begin + step)
-            np.matmul(self.values[part, None], flat[self.index[part]], out=out[part])
-        return out.reshape(len(out), *moved.shape[1:]).swapaxes(0, axis)
+        axis %= c.ndim
+        before, after = math.prod(c.shape[:axis]), math.prod(c.shape[axis + 1 :])
+        rows, width = self.values.shape
+        flat, found = np.ascontiguousarray(c).reshape(before, self.columns, after), np.zeros((before, rows, after))
+        if BAND.pays(found.size * width):
+            BAND(*map(pointer, self._flat), rows, width, self.columns, pointer(flat), before, after, pointer(found))
+        else:
+            for tap, column in zip(self.values.T, self.index.T, strict=True):
+                found += tap[:, None] * flat[:, column]
+        return found.reshape(*c.shape[:axis], rows, *c.shape[axis + 1 :])
+
+    @cached_property
+    def _flat(self) -> tuple[Array, Array]:
+        """The runs as compiled code wants them."""
+        return np.ascontiguousarray(self.start, np.int64), np.ascontiguousarray(self.values)
 
     def apply_transposed(self, c: Array, axis: int = 0) -> Array:
         """The transposed matrix times ``c`` along ``axis``."""

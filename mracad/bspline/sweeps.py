@@ -15,16 +15,16 @@ import numpy as np
 from numba import njit, types
 from numba.core import event
 
-from mracad import note
 from mracad.bspline.knots import Array
 from mracad.bspline.rows import Rows
+from mracad.note import COMPILING, doing
 
 
 class _Compiling(event.Listener):  # type: ignore[misc]
     """Notes that the compiler works, which it does only where its cache on disk has nothing."""
 
     def on_start(self, event: event.Event) -> None:
-        note.doing(note.COMPILING)
+        doing(COMPILING)
 
     def on_end(self, event: event.Event) -> None:
         pass
