@@ -12,7 +12,7 @@ import ctypes
 import hashlib
 import os
 from collections.abc import Callable, Iterator, Sequence
-from functools import cached_property, partial
+from functools import cache, cached_property, partial
 from importlib.util import cache_from_source
 from pathlib import Path
 from types import FunctionType
@@ -93,11 +93,9 @@ class Compiled:
 
     @cached_property
     def _key(self) -> bytes:
-        from importlib.metadata import version  # 10 ms, which small models need not wait for
-
         parts = (self._function, *self._helpers, *self._inlined)
         sources = b"".join(Path(each).read_bytes() for each in sorted({part.__code__.co_filename for part in parts}))
-        about = "|".join([version("llvmlite"), processor() or _processor(), repr(self._arguments)])
+        about = "|".join([_version(), processor() or _processor(), repr(self._arguments)])
         return hashlib.sha256(sources + about.encode()).digest()
 
     @cached_property
@@ -206,6 +204,14 @@ def _alone(folder: Path) -> Iterator[None]:
         yield
     finally:
         os.close(lock)
+
+
+@cache
+def _version() -> str:
+    """The version of the compiler."""
+    from importlib.metadata import version  # 10 ms, which small models need not wait for
+
+    return version("llvmlite")
 
 
 def _processor() -> str:

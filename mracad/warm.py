@@ -28,6 +28,9 @@ from mracad.wavelet.transform import decompose, reconstruct
 COUNT = 515
 """Control points along a net whose transform is compiled, in levels above and below the limit."""
 
+CODE = EVALUATE, BAND, GATHER, COMBINE, FRAME, CURVE, LOOK, SQUARE, PLACE, MIRROR, COMPARE, SWEEP
+"""All that is kept as machine code."""
+
 
 def warm() -> None:
     """Compile everything that is not yet on disk."""
@@ -35,7 +38,7 @@ def warm() -> None:
         found = find_spec(package)
         for folder in (found.submodule_search_locations or ()) if found else ():
             compile_dir(folder, quiet=2)
-    for code in (EVALUATE, BAND, GATHER, COMBINE, FRAME, CURVE, LOOK, SQUARE, PLACE, MIRROR, COMPARE, SWEEP):
+    for code in CODE:
         code.prepare()
     rungs = rungs_by_level(KnotVector.clamped(np.arange(COUNT - 2.0), 3))[:3]
     reconstruct(decompose(np.zeros((COUNT, COUNT, 3)), rungs, rungs))

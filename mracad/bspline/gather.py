@@ -38,8 +38,8 @@ def _gather(poles: Any, places: Any, functions: Any, found: Any) -> None:
             for s in range(total + 1):
                 to, start, at = (order * count + q) * size, (total - s) * b * size, (q * orders + s) * b
                 for k in range(size):
-                    value = 0.0
-                    for j in range(b):
+                    value = in_v[at] * partial[start + k]
+                    for j in range(1, b):
                         value += in_v[at + j] * partial[start + j * size + k]
                     result[to + k] = value
                 order += 1
@@ -49,8 +49,8 @@ def _blend(factors: Any, places: Any, shape: Any, poles: Any, found: Any) -> Non
     """The sum of control points times factors."""
     (f, start), (rows, first, column), (count, size), (x, to) = factors, places, shape, found
     for k in range(size):
-        value = 0.0
-        for i in range(count):
+        value = f[start] * poles[(rows[first] + column) * size + k]
+        for i in range(1, count):
             value += f[start + i] * poles[(rows[first + i] + column) * size + k]
         x[to + k] = value
 
