@@ -261,7 +261,9 @@ class _Shapes:
     def _boxes(self) -> tuple[Array, Array]:
         """Those of the surfaces, with the number of the part as a fourth coordinate."""
         part = self.parts[:, None]
-        low, high = self.spots.min(axis=1) - self.off[:, None], self.spots.max(axis=1) + self.off[:, None]
+        a, b, c = self.spots.swapaxes(0, 1)
+        low = np.minimum(np.minimum(a, b), c) - self.off[:, None]
+        high = np.maximum(np.maximum(a, b), c) + self.off[:, None]
         return np.concatenate([low, part], axis=1), np.concatenate([high, part], axis=1)
 
     def _close(self, pairs: Array) -> Array:
@@ -279,7 +281,7 @@ class _Shapes:
         left = np.arange(len(ones))
         for axes, low, high in self._slabs:
             axis = axes[ones[left]]
-            heights = [(self.spots[others[left], k] * axis).sum(axis=1) for k in range(3)]
+            heights = [np.einsum("kj,kj->k", self.spots[others[left], k], axis) for k in range(3)]
             room = self.off[ones[left]] + self.off[others[left]]
             beyond = np.minimum(np.minimum(*heights[:2]), heights[2]) > high[ones[left]] + room
             beyond |= np.maximum(np.maximum(*heights[:2]), heights[2]) < low[ones[left]] - room
@@ -293,8 +295,8 @@ class _Shapes:
         sides = [unit(cross(self.spots[:, (k + 1) % 3] - self.spots[:, k], self.normals)) for k in range(3)]
         found = []
         for axis in (self.normals, *sides):
-            reach = np.einsum("kij,kj->ki", self.spots, axis)
-            found.append((axis, reach.min(axis=1), reach.max(axis=1)))
+            a, b, c = np.einsum("kij,kj->ik", self.spots, axis)
+            found.append((axis, np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)))
         return found
 
 

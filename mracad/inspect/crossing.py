@@ -70,12 +70,12 @@ def _pierced(start: Array, end: Array, triangle: Array) -> Array:
     along = end - start
     u, v = triangle[:, 1] - triangle[:, 0], triangle[:, 2] - triangle[:, 0]
     p = cross(along, v)
-    determinant = (u * p).sum(1)
+    determinant = np.einsum("ki,ki->k", u, p)
     size = np.linalg.norm(along, axis=1) * np.linalg.norm(cross(u, v), axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):
         off = start - triangle[:, 0]
         q = cross(off, u)
-        a, b, t = ((x * y).sum(1) / determinant for x, y in ((off, p), (along, q), (v, q)))
+        a, b, t = (np.einsum("ki,ki->k", x, y) / determinant for x, y in ((off, p), (along, q), (v, q)))
         inside = (np.abs(determinant) > 1e-9 * size) & (a > 1e-6) & (b > 1e-6) & (a + b < 1 - 1e-6)
         return np.where(inside & (t > 1e-6) & (t < 1 - 1e-6), t, np.nan)
 
