@@ -29,19 +29,23 @@ BARELY = 1e-6
 
 
 def planar(net: Net) -> Net:
-    """A plane with the mean chord lengths of a surface along its parameters."""
-    columns = np.linalg.norm(np.diff(net.poles, axis=0), axis=2).mean(axis=1)
-    rows = np.linalg.norm(np.diff(net.poles, axis=1), axis=2).mean(axis=0)
+    """A plane with the mean chord lengths of a surface along its parameters, rolled up along one that is periodic; the
+    surface itself if both are."""
+    if net.u.periodic and net.v.periodic:
+        return Net(net.u, net.v, net.poles)
     points = np.zeros(net.poles.shape)
-    points[..., 0] = _walked(net.u.count, columns)[:, None]
-    points[..., 1] = _walked(net.v.count, rows)
+    for axis, knots in enumerate((net.u, net.v)):
+        chords = np.diff(net.poles, axis=axis, append=np.take(net.poles, [0], axis))
+        steps = np.linalg.norm(chords, axis=2).mean(axis=1 - axis)
+        steps = np.maximum(steps, 1e-9 * steps.max(initial=1e-300))
+        walked = np.append(0.0, np.cumsum(steps[:-1]))
+        if knots.periodic:
+            radius = float(steps.sum()) / (2 * np.pi)
+            both = np.stack([np.cos(walked / radius), np.sin(walked / radius)], axis=1) * radius
+            points[..., [axis, 2]] = np.expand_dims(both, 1 - axis)
+        else:
+            points[..., axis] = np.expand_dims(walked, 1 - axis)
     return Net(net.u, net.v, points)
-
-
-def _walked(count: int, steps: Array) -> Array:
-    """Positions ``(count,)`` after steps from 0; steps are kept positive."""
-    steps = np.maximum(steps, 1e-9 * steps.max(initial=1e-300))
-    return np.append(0.0, np.cumsum(steps))[:count]
 
 
 def seen(net: Net, masses: Forms) -> Array:

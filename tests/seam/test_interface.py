@@ -8,6 +8,7 @@ from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeFace
 from OCP.gp import gp_Dir, gp_Pln, gp_Pnt
 
 from mracad.bspline.fit import interpolated
+from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
 from mracad.model.brep import Edge, Face, Model, Side, Surface, Trim
 from mracad.model.cells import quadrature
@@ -249,6 +250,20 @@ def test_the_first_metric_is_a_plane_of_mean_chords():
     steps = np.linalg.norm(np.diff(net.poles, axis=0), axis=2).mean(axis=1)
     assert np.abs(np.diff(flat.poles[:, 0, 0]) - steps).max() < 1e-14
     assert not np.ptp(flat.poles[..., 2]) and not np.ptp(flat.poles[..., 0], axis=1).any()
+
+
+@pytest.mark.parametrize("most", [1, 3])
+def test_the_first_metric_of_a_tube_is_rolled_up(most):
+    """Unrolled, its end would lead back to its start: lengths would be wrong there, and smoothing open the tube."""
+    u = KnotVector.from_multiplicities(np.arange(25.0), [most, *[1] * 23, most], 3, periodic=True)
+    v = KnotVector.clamped(np.linspace(0.0, 60.0, 7), 3)
+    turn = 2 * np.pi * np.arange(u.count)[:, None] / u.count
+    ring = np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=-1) * [9.0, 9.0, 0.0]
+    net = Net(u, v, ring + v.greville()[None, :, None] * [0.0, 0.0, 1.0])
+    us, vs = np.linspace(0.0, 24.0, 200), np.linspace(0.0, 60.0, 7)
+    for axis in (0, 1):
+        own, flat = (np.linalg.norm(each.tangents(us, vs, axis), axis=-1) for each in (net, planar(net)))
+        np.testing.assert_allclose(flat, own, rtol=0.02)
 
 
 def test_a_smoothed_metric_loses_noise_and_keeps_its_plane():
