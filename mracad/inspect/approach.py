@@ -3,8 +3,8 @@
 A triangle is off its surface by its *sag*, estimated in the middles of its sides.  Two triangles may be neglected
 where the surfaces over them are certainly apart: if a plane divides them with room for their sags, or if they have a
 corner in common and all normals of both lie within a half space, so that together they are a graph over a plane.
-All others are divided at the middles of sides that are off by more than the chord, until none is; what never gets
-there, as where a surface is torn, is left out.
+All others are divided at the middles of sides that are off by more than the chord, or by so much that a narrow one may
+be turned over, until none is; what never gets there, as where a surface is torn, is left out.
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ Array = np.ndarray
 _ROUNDS = 10  # each divides sags by four
 _ROOM = 1.5  # times the sag in the middles of sides: that in the middle of a triangle is up to 4/3 of it
 _HALF = np.radians(150.0)  # of normals that lie within a half space, with some room
+_SHARP, _FINEST = 0.25, 1 / 4  # largest sag over the height of a triangle, unless it is so small beside the chord
 _CURVED = np.radians(12.0)  # the kernel's triangles on elementary surfaces turn by no more
 
 
@@ -44,7 +45,7 @@ def crossing_faces(mesh: Triangles, model: Model, chord: float) -> dict[tuple[in
     pairs = shapes.near()
     found: dict[tuple[int, int], tuple[float, float, float]] = {}
     for _ in range(_ROUNDS):
-        rough = shapes.sags > chord
+        rough = shapes.rough(chord)
         open_ones = np.asarray(rough.any(axis=1))[pairs].any(axis=1)
         shapes.crossing(pairs[~open_ones], found)
         live, pairs = np.unique(pairs[open_ones], return_inverse=True)
@@ -229,9 +230,26 @@ class _Shapes:
         middles = np.concatenate([middles, at, gaps], axis=1)
         return cls(spots, facets.corners, facets.faces, facets.parts, normals, sags, off, turns, sides, middles)
 
+    def rough(self, chord: float) -> Array:
+        """Sides ``(m, 3)`` to be divided, from both of their triangles."""
+        limits = np.clip(_SHARP * self.heights, _FINEST * chord, chord)
+        marked = np.zeros(max(len(self.middles), 1), bool)
+        marked[self.sides[self.sags > limits[:, None]]] = True
+        return np.asarray(marked[self.sides] & (self.sags > 0.0))
+
+    @cached_property
+    def heights(self) -> Array:
+        """The least height of each triangle, mm."""
+        sides = np.roll(self.spots, -1, axis=1) - self.spots
+        longest = np.linalg.norm(sides, axis=2).max(axis=1, initial=0.0)
+        return np.asarray(np.linalg.norm(cross(sides[:, 0], sides[:, 1]), axis=1) / np.maximum(longest, 1e-300))
+
     def crossing(self, pairs: Array, found: dict[tuple[int, int], tuple[float, float, float]]) -> None:
         """Add the faces of those of some pairs of triangles that cross, and where."""
-        pairs, where = crossings(self.spots, pairs[~_sharing(self.corners, pairs)])
+        pairs = pairs[
+            ~_sharing(self.corners, pairs) & (self.sags.max(axis=1) <= _SHARP * self.heights)[pairs].all(axis=1)
+        ]
+        pairs, where = crossings(self.spots, pairs)
         for (a, b), (x, y, z) in zip(np.sort(self.faces[pairs], axis=1).tolist(), where.tolist(), strict=True):
             found.setdefault((a, b), (x, y, z))
 
