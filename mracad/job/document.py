@@ -5,7 +5,8 @@ from __future__ import annotations
 import importlib
 import time
 from collections import Counter
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
 from types import MappingProxyType
@@ -16,7 +17,7 @@ from mracad.brief import named_line
 from mracad.edit.result import Edit, Reason
 from mracad.edit.tolerances import Tolerances, tolerances
 from mracad.edit.torn import gaps, torn
-from mracad.errors import EditError
+from mracad.errors import EditError, MracadError
 from mracad.inspect.deviation import Deviation, deviations
 from mracad.inspect.mended import Mending, unmended
 from mracad.inspect.seams import SeamMeasure, key, remeasured, seams
@@ -144,16 +145,31 @@ def play(
         module, _, name = step.options.function.partition(":")
         function = getattr(importlib.import_module(module), name)
         result: Report | Judged
-        if isinstance(step.options, Selection):
-            put = apply or step is not steps[-1]
-            result = run(document, function, step.options, progress=progress, apply=put, excluded=excluded, firm=firm)
-        else:
-            tell(progress, step.use)
-            result = function(document, step.options, original)
+        with _telling(step.id if len(steps) > 1 else ""):
+            if isinstance(step.options, Selection):
+                put = apply or step is not steps[-1]
+                result = run(
+                    document, function, step.options, progress=progress, apply=put, excluded=excluded, firm=firm
+                )
+            else:
+                tell(progress, step.use)
+                result = function(document, step.options, original)
         results.append(result)
         if isinstance(result, Judged) and not result.passed:
             break
     return results
+
+
+@contextmanager
+def _telling(step: str) -> Iterator[None]:
+    """Errors of the block name a step."""
+    try:
+        yield
+    except MracadError as error:
+        if step:
+            error.message = f"{step}: {error.message}"
+            error.args = (str(error),)
+        raise
 
 
 def run(

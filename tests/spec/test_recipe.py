@@ -157,6 +157,14 @@ def test_one_read_and_one_write_for_the_whole_recipe(tmp_path, capsys, monkeypat
     assert (tmp_path / "out.step").stat().st_mtime_ns == stamp
 
 
+def test_an_error_names_the_step_where_there_are_several(tmp_path, capsys):
+    source = models(tmp_path / "in", 1) / "part000.step"
+    sweep = "sweep --at 900,0,0 --by 0,0,1 --scale 9mm"
+    for steps, start in ((f"smooth --scale 20% ! {sweep}", "sweep: point 1 (900"), (sweep, "point 1 (900")):
+        assert main(["pipeline", steps, str(source), "--dry-run"]) == 4
+        assert capsys.readouterr().err.startswith(f"mracad: {start}")
+
+
 def test_a_failed_check_stops_the_run(tmp_path, capsys):
     source = models(tmp_path / "in", 1) / "part000.step"
     words = ["check --fail-on free-edges ! smooth --scale 20%", str(source), "-o", str(tmp_path / "out.step")]
