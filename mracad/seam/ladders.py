@@ -188,6 +188,8 @@ def _placed(net: Net, creases: frozenset[float], axis: int, way: Map, degree: in
         counts[[0, -1]] = degree + 1
     breaks = way[0] * knots.breaks + way[1]
     kept = np.isin(knots.breaks, list(creases))
+    if knots.periodic:
+        kept[[0, -1]] = kept[[0, -1]].any()  # one line
     vector = KnotVector.from_multiplicities(breaks[order], counts[order], degree, knots.periodic)
     excess = zip(knots.breaks[kept].tolist(), (knots.multiplicities[kept] - knots.degree).tolist(), strict=True)
     return _Placed(vector, kept[order], lengths[order], dict(excess))

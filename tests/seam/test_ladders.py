@@ -116,3 +116,16 @@ def test_directions_that_contradict_each_other_keep_their_own_ladders():
     twice = ladders(nets, sharp(nets), [*joined, seam(0, 1, two=(1.0, 0.0))])
     fine = KnotVector.clamped(np.unique(np.concatenate([one.breaks, two.breaks])), 3)
     assert twice[0, 1].coarse((0, 1), 2, fine) == plain[0, 1].coarse((0, 1), 2, fine)
+
+
+@pytest.mark.parametrize("at", [0.0, 16.0])
+def test_a_closing_line_that_is_a_crease_stays_on_every_level(at):
+    """It is one line, at whichever end of the period it is told."""
+    u = KnotVector.from_multiplicities(np.arange(17.0), [3, *[1] * 15, 3], 3, periodic=True)
+    v = KnotVector.clamped(np.linspace(0.0, 4.0, 5), 3)
+    turn = 2 * np.pi * np.arange(u.count)[:, None, None] / u.count
+    points = np.concatenate([np.cos(turn), np.sin(turn), 0 * turn], axis=2) + v.greville()[None, :, None] * [0, 0, 1]
+    ladder = ladders({0: Net(u, v, points)}, {0: (frozenset({at}), frozenset())}, ())[0, 0]
+    for level in range(5):
+        counts = ladder.coarse((0, 0), level, u).multiplicities
+        assert counts[0] == counts[-1] == 3
