@@ -15,7 +15,7 @@ ROUND = KnotVector.clamped([0.0, 1.0], 2)
 
 def arch(height, base=0.0):
     """z = base + 4 height x (1 - x) over the unit square."""
-    poles = np.array([[(x, y, base + z) for y in (0, 1)] for x, z in ((0, 0), (0.5, 2 * height), (1, 0))])
+    poles = np.array([[(x, y, base + z) for y in (0.0, 1.0)] for x, z in ((0, 0), (0.5, 2 * height), (1, 0))])
     return Net(ROUND, FLAT, poles)
 
 
@@ -54,7 +54,7 @@ def test_edges_off_their_faces_are_followed():
 
 
 def test_a_sheet_rolled_through_itself():
-    poles = np.array([[(x, y, z) for y in (0, 1)] for x, z in ((0, 0), (3, 1), (-2, 1), (1, 0))])
+    poles = np.array([[(x, y, z) for y in (0.0, 1.0)] for x, z in ((0, 0), (3, 1), (-2, 1), (1, 0))])
     loop = Net(KnotVector.clamped([0.0, 1.0], 3), FLAT, poles)
     ((pair, where),) = crossed(loop).items()
     assert pair == (0, 0) and where[0] == pytest.approx(0.5, abs=1e-2)
