@@ -13,7 +13,10 @@ from mracad.model.brep import Edge, Model
 from mracad.spec.quantity import length
 from mracad.spec.steps import Fitting, Selection
 
-GROWTH = Growth(0.005, 0.005, 0.005, 0.02, 30.0, 0.25)
+ANGLE = 0.01
+"""Allowed growth of an angle along an edge or a knot line, degrees: of a closing line, which is both, too."""
+
+GROWTH = Growth(0.005, 0.005, 0.005, ANGLE, 30.0, 0.25)
 """Growth that the judge allows by default: a quarter of the 2 % that count as worse in comparisons, and waves at a
 place an eighth larger than those around it."""
 
@@ -66,7 +69,7 @@ class Tolerances:
 
     gap: float = 1e-4
     least: float = 1e-5
-    angle: float = math.radians(0.01)
+    angle: float = math.radians(ANGLE)
     bend: float = 1e-3
     jump: float = 1e-2
     growth: Growth = GROWTH
