@@ -21,6 +21,7 @@ from mracad.bspline.tensor import COMBINE
 from mracad.inspect.spread import COMPARE
 from mracad.inspect.sweep import SWEEP
 from mracad.seam.points import CURVE, FRAME, LOOK, SQUARE
+from mracad.seam.room import ROOM
 from mracad.seam.stencil import MIRROR, PLACE
 from mracad.wavelet.ladder import rungs_by_level
 from mracad.wavelet.transform import decompose, reconstruct
@@ -28,7 +29,7 @@ from mracad.wavelet.transform import decompose, reconstruct
 COUNT = 515
 """Control points along a net whose transform is compiled, in levels above and below the limit."""
 
-CODE = EVALUATE, BAND, GATHER, COMBINE, FRAME, CURVE, LOOK, SQUARE, PLACE, MIRROR, COMPARE, SWEEP
+CODE = EVALUATE, BAND, GATHER, COMBINE, FRAME, CURVE, LOOK, SQUARE, PLACE, MIRROR, ROOM, COMPARE, SWEEP
 """All that is kept as machine code."""
 
 

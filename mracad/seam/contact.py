@@ -15,13 +15,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from mracad.bspline.functions import functions
 from mracad.bspline.surface import Net
+from mracad.compiled import pointer
 from mracad.seam.conditions import laid_out
+from mracad.seam.room import ROOM
 from mracad.seam.trace import Trace, derived, directions, pieces
 
 Array = np.ndarray
@@ -110,11 +113,22 @@ class Rows:
 
     def room(self, delta: Array, opened: Array, limits: Array) -> Array:
         """The share of a displacement ``(points, 3)`` that each contact allows, 0 to 1."""
+        room = np.ones(int(self.owner.max(initial=-1)) + 1)
+        if ROOM.pays(self.matrix.nnz):
+            delta, opened, limits = (np.ascontiguousarray(each) for each in (delta, opened, limits))
+            given = map(pointer, (delta, opened, limits, self.owner, room))
+            ROOM(*map(pointer, self._entries), len(limits), *given)
+            return room
         old, new = (np.linalg.norm(each, axis=1) for each in (opened, opened + self.matrix @ delta))
         share = np.where(new > limits, (limits - old) / np.maximum(new - old, 1e-300), 1.0)
-        room = np.ones(int(self.owner.max(initial=-1)) + 1)
         np.minimum.at(room, self.owner, share)
         return room
+
+    @cached_property
+    def _entries(self) -> tuple[Array, Array, Array]:
+        """The matrix as compiled code wants it."""
+        begins, columns = (np.ascontiguousarray(each, np.int32) for each in (self.matrix.indptr, self.matrix.indices))
+        return begins, columns, np.ascontiguousarray(self.matrix.data)
 
 
 def rows(nets: Mapping[int, Net], contacts: Sequence[Contact]) -> Rows:

@@ -8,6 +8,7 @@ from mracad.bspline.curve import Curve
 from mracad.bspline.fit import interpolated
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
+from mracad.compiled import Compiled
 from mracad.seam.contact import MORE, Contact, rows
 from mracad.seam.trace import Trace
 from tests.model.shapes import graph, plane, segment
@@ -192,7 +193,9 @@ def test_contacts_may_lack_what_they_lacked_and_a_little_more():
         assert limits[found.order == order] == pytest.approx(lacked[found.order == order].max() + more)
 
 
-def test_room_is_what_leaves_every_contact_within_its_limits():
+@pytest.mark.parametrize("used", [False, True])
+def test_room_is_what_leaves_every_contact_within_its_limits(used, monkeypatch):
+    monkeypatch.setattr(Compiled, "pays", lambda self, work: used)
     net = plane(3)
     found = rows({0: net, 1: net}, [contact_of(), Contact(Trace(1, 1, segment((0, 0.5), (1, 0.5))), None, 1)])
     n = net.u.count * net.v.count
@@ -203,6 +206,8 @@ def test_room_is_what_leaves_every_contact_within_its_limits():
     for amount in found.room(delta, opened, limits)[found.owner]:
         assert 0 < amount < 1
     room = found.room(delta, opened, limits)
+    monkeypatch.setattr(Compiled, "pays", lambda self, work: not used)
+    np.testing.assert_array_equal(found.room(delta, opened, limits), room)
     off = np.linalg.norm(opened + room[found.owner, None] * (found.matrix @ delta), axis=1)
     assert (off <= limits * (1 + 1e-9)).all()
     still = np.zeros_like(delta)
