@@ -181,10 +181,11 @@ _NAME = "function"
 
 
 def pointer(array: np.ndarray) -> int:
-    """Where an array is in memory."""
+    """Where an array is in memory, whose numbers lie there one after another."""
     try:
         return ctypes.addressof(ctypes.c_char.from_buffer(array))  # type: ignore[arg-type]
     except (TypeError, ValueError):  # read-only, or empty: that takes five times as long
+        assert array.flags.c_contiguous
         return int(array.__array_interface__["data"][0])
 
 

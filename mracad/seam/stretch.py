@@ -112,7 +112,7 @@ class Limit:
     def shape(self, u: Array, v: Array, frame: Array) -> Array:
         """The shape operator, components 11, 12 and 22 ``(3, qv, qu)``, in the frame p, q and r ``(3, qv, qu)``: p ∂_u
         and q ∂_u + r ∂_v are orthonormal."""
-        found, left = np.empty(frame.shape), np.ones(frame.shape[1:], bool)
+        frame, found, left = np.ascontiguousarray(frame), np.empty(frame.shape), np.ones(frame.shape[1:], bool)
         count = np.empty(1, int)
         for length, net in self.looks:
             most = THETA / max(length, 1e-300)

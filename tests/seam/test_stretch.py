@@ -6,6 +6,7 @@ import pytest
 from mracad.bspline.fit import interpolated
 from mracad.bspline.knots import KnotVector
 from mracad.bspline.surface import Net
+from mracad.compiled import Compiled
 from mracad.model.cells import quadrature
 from mracad.seam.energy import forms
 from mracad.seam.points import limited
@@ -95,3 +96,15 @@ def test_a_limit_never_makes_a_length_longer():
     a, b, c = (float(each[0, 0]) for each in found)
     lengths = np.linalg.eigvalsh([[a, b], [b, c]])
     assert 0.0 < lengths[0] < 1e-3 and lengths[1] == pytest.approx(1.0, abs=1e-6)
+
+
+@pytest.mark.parametrize("used", [False, True])
+def test_shapes_do_not_depend_on_how_frames_lie_in_memory(used, monkeypatch):
+    """Half a tube, most bent where it is narrow: around it, all spans are too long, and none along it."""
+    monkeypatch.setattr(Compiled, "pays", lambda self, work: used)
+    net = surface(lambda u, v: [(2 + v) * np.cos(u), (2 + v) * np.sin(u), 3 * v], (7, 5), (np.pi, 4.0))
+    us, vs = (np.linspace(0.1, 0.9, n)[:, None] * size for n, size in ((7, np.pi), (5, 4.0)))
+    limit, frame = Limit(10.0, ((1e-6, net),)), orthonormal(net, us, vs)
+    around, *_ = limit.shape(us, vs, np.ascontiguousarray(frame))
+    np.testing.assert_allclose(np.abs(around), np.repeat(3 / np.sqrt(10) / (2 + vs), 7, axis=1), rtol=1e-3)
+    np.testing.assert_array_equal(limit.shape(us, vs, np.asfortranarray(frame))[0], around)
