@@ -243,9 +243,7 @@ def sparse(forms: Sequence[Array], net: Net, rows: tuple[Array, Array] | None = 
     values = [each.ravel() if pattern.there is None else each.ravel()[pattern.there] for each in forms]
     row, indices, ends = pattern.row, pattern.indices, pattern.indptr
     some = np.logical_or.reduce([each != 0 for each in values])
-    if some.all():
-        indices, ends = indices.copy(), ends.copy()
-    else:
+    if not some.all():
         values, row, indices = [each[some] for each in values], row[some], indices[some]
         ends = np.append(np.int32(0), np.bincount(row, minlength=n).cumsum(dtype=np.int32))
     if net.weights is not None:
