@@ -167,10 +167,11 @@ def group(model: Any) -> Any:
     """All faces as one problem, with free edges not held."""
     from mracad.model.cells import quadrature
     from mracad.seam.conditions import matched, rows
+    from mracad.seam.domains import problem
     from mracad.seam.energy import forms
     from mracad.seam.interface import joints
     from mracad.seam.metric import planar, seen
-    from mracad.seam.solve import Problem, Space
+    from mracad.seam.solve import Space
     from mracad.seam.wishes import Wishes
 
     joined = joints(model, set(range(len(model.faces))), Wishes("g1"))
@@ -180,7 +181,7 @@ def group(model: Any) -> Any:
         form = forms(net, planar(net), quadrature(net, [model.faces[k] for k in model.surfaces[i].faces]))
         points = seen(net, form)
         spaces[i] = Space(net, form, points, points)
-    return Problem(spaces, rows(nets, joined.exact)[0])
+    return problem(spaces, rows(nets, joined.exact)[0])
 
 
 def measure_solve(source: Path) -> None:
@@ -192,19 +193,19 @@ def measure_solve(source: Path) -> None:
     from mracad.seam import constrained
     from mracad.seam.solve import Effort, Problem
 
-    problem, assembly = timed(lambda: group(view(read_step(source))))
+    whole, assembly = timed(lambda: group(view(read_step(source))))
     stiffness = (7 * SIZE / quilt(source.stem)[1] / (2 * np.pi)) ** 4
-    found, own = timed(lambda: problem.filtered(stiffness))
+    found, own = timed(lambda: whole.filtered(stiffness))
     memory = peak()
-    off = float(np.abs(problem.rows @ found).max() / np.abs(found).max())
+    off = float(np.abs(whole.rows @ found).max() / np.abs(found).max())
     line = f"solve {own:.2f} s, {memory:.0f} MB, |Lδ| / |δ| {off:.0e}"
     if len(found) <= WHOLE:
         constrained.MANY = sys.maxsize  # multipliers for all conditions
-        again = Problem(problem.spaces, problem.rows, effort=Effort(direct=sys.maxsize))
-        whole, peer = timed(lambda: again.filtered(stiffness))
-        apart = float(np.abs(found - whole).max() / np.abs(whole).max())
+        again = Problem(whole.spaces, whole.rows, effort=Effort(direct=sys.maxsize))
+        other, peer = timed(lambda: again.filtered(stiffness))
+        apart = float(np.abs(found - other).max() / np.abs(other).max())
         line += f"; SuperLU {peer:.2f} s, {peak():.0f} MB: {own / peer:.2f} of its time, {apart:.0e} apart"
-    print(f"  {len(problem.spaces)} faces: read and assembled {assembly:.2f} s, {line}")
+    print(f"  {len(whole.spaces)} faces: read and assembled {assembly:.2f} s, {line}")
 
 
 def child(*words: str | Path) -> str:
