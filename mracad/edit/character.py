@@ -22,7 +22,7 @@ from mracad.edit.feature.ideal import Way
 from mracad.edit.feature.patch import Patch
 from mracad.errors import EditError
 from mracad.model.displacement import lifted
-from mracad.seam.solve import faded
+from mracad.seam.zones import faded
 from mracad.wavelet.ladder import arc_lengths
 from mracad.wavelet.project import at_scale
 

@@ -19,10 +19,10 @@ from mracad.seam.contact import rows as contact_rows
 from mracad.seam.domains import problem
 from mracad.seam.guide import Led, led
 from mracad.seam.interface import Joints, away, contact, mended_ends, rims, twists
-from mracad.seam.solve import Problem, Soft, Space, faded
+from mracad.seam.solve import Problem, Soft, Space
 from mracad.seam.space import refined
 from mracad.seam.stretch import Limit
-from mracad.seam.zones import Zoned
+from mracad.seam.zones import Zoned, faded
 
 Array = np.ndarray
 

@@ -20,7 +20,7 @@ from mracad.edit.character import Character
 from mracad.edit.feature.ideal import Way
 from mracad.errors import EditError
 from mracad.inspect.spectrum import EDGE
-from mracad.seam.solve import faded
+from mracad.seam.zones import faded
 
 Array = np.ndarray
 

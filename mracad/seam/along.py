@@ -130,9 +130,9 @@ class Along:
         self.tied = np.flatnonzero(tied)
         making = _Strips(strips, layout, self.rows, self.tied)
         for surface, (begin, end) in enumerate(pairwise(layout.ends.tolist())):
-            if not self._asked(making, surface):
-                continue
             own = slice(begin, end)
+            if not (free[own].any() and self._asked(making, surface)):
+                continue
             part = form(surface)
             part = scaled((part if soft is None else part + soft[own, own]).tocsr(), self.scale[own])
             bound, other = (np.flatnonzero(each) for each in (tied[own], near[own] & ~tied[own]))

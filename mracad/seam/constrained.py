@@ -28,6 +28,9 @@ LEAST = 1e-10
 """Share of the largest diagonal entry that is added to the form, so that functions that barely reach into a face
 stay."""
 
+ROUNDING = 1e-13
+"""Share of the motion by which conditions may be missed."""
+
 MANY = 1000
 """Number of unknowns above which conditions are eliminated if possible."""
 
@@ -176,6 +179,12 @@ class Banded:
     def settled(self, x: Array) -> Array:
         """The same point: there are no conditions."""
         return x
+
+
+def missed(rows: Any, x: Array, goal: Array | None) -> Array:
+    """Numbers of the conditions L x = r, r zero by default, that x ``(n, k)`` misses by more than rounding."""
+    lacking = np.abs((0.0 if goal is None else goal) - rows @ x).max(axis=1, initial=0.0)
+    return np.flatnonzero(lacking > ROUNDING * (abs(rows) @ np.abs(x).max(axis=1, initial=0.0)).max(initial=0.0))
 
 
 def lengths(rows: Any) -> Array:

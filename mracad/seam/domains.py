@@ -20,7 +20,7 @@ from mracad.seam.along import Along
 from mracad.seam.constrained import part, taken
 from mracad.seam.guided import Guides
 from mracad.seam.solve import WIDTH, Effort, Problem, Soft, Space
-from mracad.seam.strips import Division, Layout, joints, strips
+from mracad.seam.strips import Division, Layout, about, joints, strips
 
 Array = np.ndarray
 
@@ -157,23 +157,15 @@ class Partitioned(Problem):
         for number in range(self._number.max() + 1):
             own = self._number == number
             outer = [points for (a, b), points in self._joints.items() if own[a] != own[b]]
-            found.append(self._near(layout, own, np.unique(np.concatenate(outer)) if outer else None, reach))
+            found.append(self._surrounding(layout, own, np.unique(np.concatenate(outer)) if outer else None, reach))
         total = sum(sizes[each].sum() for each in found)
         return found if total <= MOST * sizes.sum() else None
 
-    def _near(self, layout: Layout, own: Array, outer: Array | None, reach: Array) -> Array:
+    def _surrounding(self, layout: Layout, own: Array, outer: Array | None, reach: Array) -> Array:
         """Surfaces of a domain, and those joined to them, directly or through others, that come near to its joints."""
-        from scipy.spatial import cKDTree
-
         if outer is None:
             return np.flatnonzero(own)
-        tree = cKDTree(layout.places[outer])
-        low, high = layout.places[outer].min(axis=0), layout.places[outer].max(axis=0)
-        near = own.copy()
-        for i in np.flatnonzero(~own).tolist():
-            places = layout.places[layout.ends[i] : layout.ends[i + 1]]
-            if (places.max(axis=0) >= low - reach[i]).all() and (places.min(axis=0) <= high + reach[i]).all():
-                near[i] = bool(np.isfinite(tree.query(places, distance_upper_bound=reach[i])[0]).any())
+        near = own | np.logical_or.reduceat(about(layout, outer, reach), layout.ends[:-1])
         return _connected(own, near, self._joints)
 
     def _domain(self, layout: Layout, number: int, surfaces: Array) -> Domain:

@@ -59,6 +59,17 @@ class Forms:
     bending: Any
     creases: Any
 
+    def sum(self, stiffness: float) -> Any:
+        """M + stiffness · K."""
+        from scipy.sparse import csr_array
+
+        mass, bending = self.mass, self.bending
+        if not stiffness:
+            return mass
+        if np.may_share_memory(bending.indices, mass.indices) and not self.creases.nnz:
+            return csr_array((mass.data + stiffness * bending.data, mass.indices, mass.indptr), shape=mass.shape)
+        return mass + stiffness * (bending + self.creases)
+
 
 def forms(
     net: Net,

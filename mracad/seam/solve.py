@@ -25,12 +25,13 @@ import numpy as np
 
 from mracad.bspline.surface import Net
 from mracad.seam.bands import Bands, Blocks, whole
-from mracad.seam.constrained import Banded, Constrained
+from mracad.seam.constrained import Banded, Constrained, missed
 from mracad.seam.divided import LEFT, Divided
 from mracad.seam.energy import Forms
 from mracad.seam.gain import applied
 from mracad.seam.guided import Guided, Guides
-from mracad.seam.strips import Division, Layout, joints, strips
+from mracad.seam.strips import Division, Layout, about, joints, strips
+from mracad.seam.zones import faded
 
 Array = np.ndarray
 Alone = Banded | Constrained | Divided
@@ -44,6 +45,12 @@ OVERLAP = 4.0
 
 WIDTH = 7.0
 """Width of strips, in lengths within which the effect of joints fades."""
+
+FAR = 10.0
+"""Distance beyond which a correction is less than a thousandth, in these lengths."""
+
+LESS = 0.5
+"""Share of the free control points up to which only they are solved, instead of all."""
 
 MASS = 0.37
 """Length within which it fades by masses alone, in chords of the control net times degrees."""
@@ -217,9 +224,7 @@ class Problem:
             pull -= Blocks(self.bands, 3) @ kept if len(self.spaces) == 1 else self.soft @ kept
         if self.pull is not None:
             pull = pull + self.pull
-        if not (pull.any() or self.rows.shape[0] or self.guides):  # nothing is in the way
-            return kept
-        return np.asarray(kept + self._solver(stiffness, self.free)(pull, start=kept, goal=self.goal))
+        return self._corrected(kept, stiffness, pull)
 
     def response(self, rows: Any, stiffness: float) -> Array:
         """P M P Φᵀ for rows Φ, ``(points, rows)``: P takes pulls to displacements, by the form M + ``stiffness`` K."""
@@ -228,8 +233,26 @@ class Problem:
 
     def settled(self, delta: Array, stiffness: float = 0.0, free: Array | None = None) -> Array:
         """A displacement ``(points, k)`` corrected as smoothly as possible to meet the conditions."""
-        solver = self._solver(stiffness, self.free if free is None else free)
-        return np.asarray(delta + solver(np.zeros_like(delta), start=delta, goal=self.goal))
+        return self._corrected(delta, stiffness, np.zeros_like(delta), free)
+
+    def _corrected(self, start: Array, stiffness: float, pull: Array, free: Array | None = None) -> Array:
+        """A displacement corrected by pulls, and to meet the conditions."""
+        near = self._near(start, stiffness, pull, self.free if free is None else free)
+        if not (near.any() or self.guides):
+            return start
+        solve = self._solver(stiffness, near, held=free is None)
+        return np.asarray(start + solve(pull, start=start, goal=self.goal))
+
+    def _near(self, start: Array, stiffness: float, pull: Array, free: Array) -> Array:
+        """The free control points that pulls on a displacement, or conditions that it does not meet, may move; of
+        smaller problems all, if any."""
+        if free.sum() <= self.effort.direct or self.guides is not None:
+            return free if pull.any() or self.rows.shape[0] or self.guides else np.zeros_like(free)
+        moved = np.asarray(pull.any(axis=1))
+        moved[self.rows[missed(self.rows, start, self.goal)].indices] = True
+        layout = self._layout(stiffness)
+        near = free & about(layout, np.flatnonzero(moved), FAR / WIDTH * layout.reach)
+        return near if near.sum() < LESS * free.sum() else free
 
     def aimed(self, delta: Array, stiffness: float, ways: Array, off: Array) -> Array:
         """A displacement ``(points, 3)`` corrected as smoothly as possible, for edges that left what they slide along.
@@ -253,9 +276,9 @@ class Problem:
             self._solvers.clear()
             self._last = None
 
-    def _solver(self, stiffness: float, free: Array) -> Solver:
+    def _solver(self, stiffness: float, free: Array, held: bool | None = None) -> Solver:
         """The solver of the form M + stiffness · K and the contacts, with sliding edges unless all rims are free."""
-        held = free is self.free
+        held = free is self.free if held is None else held
         key = stiffness, free.tobytes(), held
         if key not in self._solvers:
             while self._solvers and (len(self._solvers) + 1) * len(free) > KEPT:
@@ -276,7 +299,7 @@ class Problem:
             if along is not None:
                 whole_form = self._form(stiffness)
                 return Divided(*whole_form, soft, self.rows, free, Division(layout, joined, along), self.effort.left)
-        form = whole([_sum(space.forms, stiffness) for space in self.spaces.values()])
+        form = whole([each.forms.sum(stiffness) for each in self.spaces.values()])
         alone = [np.indices(space.free.shape).reshape(2, -1).T for space in self.spaces.values()]
         places = alone[0] if len(alone) == 1 else None
         return Constrained(form if soft is None else form + soft, self.rows, free, places=places)
@@ -285,7 +308,7 @@ class Problem:
         """M + stiffness · K of the surface of a number, and its diagonal over all."""
         spaces = list(self.spaces.values())
         mass, bending, creases = (each.diagonal() for each in (self.mass, self.bending, self.creases))
-        return lambda i: _sum(spaces[i].forms, stiffness), mass + stiffness * (bending + creases)
+        return lambda i: spaces[i].forms.sum(stiffness), mass + stiffness * (bending + creases)
 
     def _layout(self, stiffness: float) -> Layout:
         """The layout of control points, and how far the effect of a joint reaches among them."""
@@ -323,25 +346,7 @@ class Problem:
         return {i: part.reshape(*s.free.shape, -1) for (i, s), part in zip(self.spaces.items(), parts, strict=True)}
 
 
-def faded(away: Array, width: float) -> Array:
-    """0 at no distance (mm), 1 beyond ``width``, smooth in between."""
-    share = np.minimum(away / width, 1.0)
-    return np.asarray(share**3 * (10 - 15 * share + 6 * share**2))
-
-
 def _bands(space: Space, more: Sequence[Any]) -> Bands:
     """The forms of a surface, and others over its control points alone."""
     form, places = space.forms, np.indices(space.free.shape).reshape(2, -1).T
     return Bands([form.mass, form.bending, form.creases, *more], places)
-
-
-def _sum(forms: Forms, stiffness: float) -> Any:
-    """M + stiffness · K."""
-    from scipy.sparse import csr_array
-
-    mass, bending = forms.mass, forms.bending
-    if not stiffness:
-        return mass
-    if np.may_share_memory(bending.indices, mass.indices) and not forms.creases.nnz:
-        return csr_array((mass.data + stiffness * bending.data, mass.indices, mass.indptr), shape=mass.shape)
-    return mass + stiffness * (bending + forms.creases)

@@ -118,6 +118,23 @@ def strips(
     return found
 
 
+def about(layout: Layout, those: Array, reach: Array) -> Array:
+    """Which points lie within the reach of their surface (mm) from some points, ``(points,)``."""
+    from scipy.spatial import cKDTree
+
+    found = np.zeros(len(layout.places), bool)
+    if not len(those):
+        return found
+    tree, (low, high) = cKDTree(layout.places[those]), _box(layout.places[those])
+    for (begin, end), far in zip(pairwise(layout.ends.tolist()), reach.tolist(), strict=True):
+        places = layout.places[begin:end]
+        close = ((places >= low - far) & (places <= high + far)).all(axis=1)
+        if close.any():
+            away = tree.query(places[close], distance_upper_bound=far)[0]
+            found[begin + np.flatnonzero(close)[np.isfinite(away)]] = True
+    return found
+
+
 def _box(places: Array) -> tuple[Array, Array]:
     """The least and the largest coordinates of points."""
     return places.min(axis=0), places.max(axis=0)

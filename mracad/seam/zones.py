@@ -122,3 +122,9 @@ def _distance(zone: Disc | Box, points: Array) -> Array:
 def zoned(net: Net, faces: Iterable[Face], zones: Sequence[Zone]) -> Array:
     """Control points ``(nu, nv)`` that regions hold, with the curvature of the surface as it is."""
     return Zoned.of(net, tuple(faces), zones).held
+
+
+def faded(away: Array, width: float) -> Array:
+    """0 at no distance (mm), 1 beyond ``width``, smooth in between."""
+    share = np.minimum(away / width, 1.0)
+    return np.asarray(share**3 * (10 - 15 * share + 6 * share**2))
