@@ -17,10 +17,10 @@ from typing import Any
 import numpy as np
 
 from mracad.seam.along import Along
-from mracad.seam.constrained import part, taken
+from mracad.seam.constrained import missed, part, taken
 from mracad.seam.guided import Guides
-from mracad.seam.solve import WIDTH, Effort, Problem, Soft, Space
-from mracad.seam.strips import Division, Layout, about, joints, strips
+from mracad.seam.solve import Effort, Problem, Soft, Space
+from mracad.seam.strips import WIDTH, Division, Layout, about, joints, strips
 
 Array = np.ndarray
 
@@ -189,8 +189,10 @@ class Partitioned(Problem):
     ) -> Array:
         """Displacements of domains, corrected to meet the conditions between them."""
         soft, free = (self.soft, self.free) if free is None or free is self.free else (self.between, free)
+        lacking = np.zeros(len(free), bool)
+        lacking[self.rows[missed(self.rows, found, goal)].indices] = True
         joined = joints(layout, self.rows, soft, free)
-        apart = [(a, b) for a, b in joined if self._number[a] != self._number[b]]
+        apart = [(a, b) for (a, b), own in joined.items() if self._number[a] != self._number[b] and lacking[own].any()]
         along = strips(layout, joined, free, those=apart)
         if not along:
             return found

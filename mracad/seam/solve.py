@@ -30,7 +30,7 @@ from mracad.seam.divided import LEFT, Divided
 from mracad.seam.energy import Forms
 from mracad.seam.gain import applied
 from mracad.seam.guided import Guided, Guides
-from mracad.seam.strips import Division, Layout, about, joints, strips
+from mracad.seam.strips import WIDTH, Division, Layout, about, joints, strips
 from mracad.seam.zones import faded
 
 Array = np.ndarray
@@ -43,17 +43,11 @@ KEPT = 60_000
 OVERLAP = 4.0
 """Largest share of control points in strips for the alternating method."""
 
-WIDTH = 7.0
-"""Width of strips, in lengths within which the effect of joints fades."""
-
 FAR = 10.0
-"""Distance beyond which a correction is less than a thousandth, in these lengths."""
+"""Distance beyond which a correction is less than a thousandth, in lengths within which the effect of joints fades."""
 
 LESS = 0.5
 """Share of the free control points up to which only they are solved, instead of all."""
-
-MASS = 0.37
-"""Length within which it fades by masses alone, in chords of the control net times degrees."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -240,8 +234,10 @@ class Problem:
         near = self._near(start, stiffness, pull, self.free if free is None else free)
         if not (near.any() or self.guides):
             return start
+        own = np.where(near[:, None], start, 0.0)
+        goal = (0.0 if self.goal is None else self.goal) - self.rows @ (start - own)
         solve = self._solver(stiffness, near, held=free is None)
-        return np.asarray(start + solve(pull, start=start, goal=self.goal))
+        return np.asarray(start + solve(pull, start=own, goal=goal if goal.any() else None))
 
     def _near(self, start: Array, stiffness: float, pull: Array, free: Array) -> Array:
         """The free control points that pulls on a displacement, or conditions that it does not meet, may move; of
@@ -311,13 +307,7 @@ class Problem:
         return lambda i: spaces[i].forms.sum(stiffness), mass + stiffness * (bending + creases)
 
     def _layout(self, stiffness: float) -> Layout:
-        """The layout of control points, and how far the effect of a joint reaches among them."""
-        reach = []
-        for net in (space.net for space in self.spaces.values()):
-            chord = max(float(np.linalg.norm(np.diff(net.poles, axis=k), axis=2).mean()) for k in (0, 1))
-            reach.append(WIDTH * max(stiffness**0.25, MASS * max(net.u.degree, net.v.degree) * chord))
-        ends = np.cumsum([0, *(space.free.size for space in self.spaces.values())])
-        return Layout(ends, np.concatenate([s.net.poles.reshape(-1, 3) for s in self.spaces.values()]), np.array(reach))
+        return Layout.of([space.net for space in self.spaces.values()], stiffness)
 
     @property
     def rimmed(self) -> bool:

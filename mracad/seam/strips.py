@@ -9,7 +9,15 @@ from typing import Any
 
 import numpy as np
 
+from mracad.bspline.surface import Net
+
 Array = np.ndarray
+
+WIDTH = 7.0
+"""Width of strips, in lengths within which the effect of joints fades."""
+
+MASS = 0.37
+"""Length within which it fades by masses alone, in chords of the control net times degrees."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,6 +36,16 @@ class Layout:
     ends: Array
     places: Array
     reach: Array
+
+    @classmethod
+    def of(cls, nets: Sequence[Net], stiffness: float) -> Layout:
+        """That of nets; strips are as wide as the effect of a joint reaches, by the form of a stiffness (mm⁴)."""
+        reach = []
+        for net in nets:
+            chord = max(float(np.linalg.norm(np.diff(net.poles, axis=k), axis=2).mean()) for k in (0, 1))
+            reach.append(WIDTH * max(stiffness**0.25, MASS * max(net.u.degree, net.v.degree) * chord))
+        ends = np.cumsum([0, *(net.u.count * net.v.count for net in nets)])
+        return cls(ends, np.concatenate([net.poles.reshape(-1, 3) for net in nets]), np.array(reach))
 
     @property
     def owner(self) -> Array:

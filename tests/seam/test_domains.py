@@ -94,6 +94,22 @@ def test_no_domain_is_solved_with_more_than_its_surroundings(monkeypatch):
     assert own == (3, 3, 3, 3) and around == (4, 5, 5, 4)
 
 
+def test_displacements_are_corrected_only_near_what_is_in_their_way(monkeypatch):
+    near, whole = (problem(spaces(), seams(), effort=Effort(direct, 1e-9)) for direct in (0, 10**9))
+    target = whole.filtered(STIFFNESS, whole.seen)
+    held = []
+    factored = Problem._factored
+    monkeypatch.setattr(Problem, "_factored", lambda p, a, free, soft: held.append(free) or factored(p, a, free, soft))
+    for stiffness in (0.0, STIFFNESS):
+        found, wanted = near.nearest(target, stiffness), whole.nearest(target, stiffness)
+        assert size(wanted - target) > 0.01 * size(target)
+        assert 0 < size(found - wanted) < 1e-3 * size(wanted - target)
+        assert size(near.rows @ found) < 1e-12 * size(found) and not found[~near.free].any()
+    count = near.free.sum()
+    assert [int(each.sum()) < count / 2 for each in held] == [True, False] * 2
+    assert near.settled(found, STIFFNESS).tobytes() == found.tobytes() and len(held) == 4
+
+
 def test_held_control_points_stay():
     p = problem(spaces(), seams(), effort=SMALL)
     assert not p.filtered(STIFFNESS)[~p.free].any() and not p.nearest(WANTED)[~p.free].any()
