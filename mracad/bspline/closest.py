@@ -73,7 +73,8 @@ def feet(net: Net, points: Array, uv: Array) -> tuple[Array, Array]:
     # near their minimum, distances hardly depend on parameters
     low, high = _limits(net)
     tried = np.clip(uv + _newton(np.stack(net.evaluate(uv, 2)), points, uv, low, high)[0], low, high)
-    good = np.linalg.norm(net.evaluate(tried) - points, axis=1) <= best * (1 + 1e-15)
+    rounding = 4 * np.finfo(float).eps * float(np.abs(net.poles).max())
+    good = np.linalg.norm(net.evaluate(tried) - points, axis=1) <= best + rounding
     return np.where(good[:, None], tried, uv), best
 
 
