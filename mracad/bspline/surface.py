@@ -51,6 +51,10 @@ class Net:
                 f"control points of shape {self.poles.shape}, but the knots need {self.u.count} × {self.v.count}"
             )
         check_weights(self.weights, self.poles.shape[:2])
+        for name in ("poles", "weights"):
+            values = getattr(self, name)
+            if values is not None and values.dtype != float:
+                object.__setattr__(self, name, values.astype(float))
 
     def with_poles(self, poles: Array) -> Net:
         """The net with other control points over the same knots, with the same weights."""

@@ -204,3 +204,13 @@ def test_compiled_code_and_arrays_give_the_same_bits(rational, monkeypatch):
         found.append([*net.evaluate(places(net), 2), *net.grid(*places(net, 6).T, 1)])
     for compiled, arrays in zip(*found, strict=True):
         np.testing.assert_array_equal(compiled, arrays)
+
+
+def test_whole_numbers_are_control_points_as_others_are():
+    knots, rng = random_knots(3, "clamped", 6, 1), np.random.default_rng(2)
+    poles = rng.integers(-9, 9, (knots.count, knots.count, 3))
+    whole, real = (
+        Net(knots, knots, each, np.ones(poles.shape[:2], each.dtype)) for each in (poles, poles.astype(float))
+    )
+    uv = rng.uniform(*knots.domain, (30_000, 2))
+    assert whole.evaluate(uv).tobytes() == real.evaluate(uv).tobytes()
