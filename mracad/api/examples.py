@@ -32,7 +32,7 @@ Document(assembly.step: 1 NURBS face of 15, in, AP214, 1 edit)
 >>> coarse = mracad.level("assembly.step", level=2)
 >>> before, after = mracad.report_of(coarse).control_points
 >>> before, after
-(493, 540)
+(493, 493)
 
 """,
     "compose": """
